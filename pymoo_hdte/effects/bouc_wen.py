@@ -22,11 +22,11 @@ from pymoo_hdte.effects.unknowns import unknown
 class BoucWen(Aperiodic):
     """T = force z, dz/dx = (1 - ``|z|``^exponent (share sgn(z x') + 1 - share)) / torsion.
 
-    From rest the torque rises with the slope force / torsion and nears ``force``, the sooner the
-    larger the exponent. Back from there it begins to fall with 2 share of that slope: with 1/2 it
-    falls along a straight line, with 1 and exponent 1 the law is Dahl's friction. Small loops under
-    a load do not close: they creep until their mean is as good as zero, so that a motion that
-    repeats itself long enough has forgotten how it began.
+    From rest the torque rises with the slope force / torsion and nears ``force``, with a sharper
+    corner for a larger exponent. Back from there it begins to fall with 2 share of that slope: with
+    1/2 it falls along a straight line, with 1 and exponent 1 the law is Dahl's friction. Small
+    loops under a load do not close: they creep until their mean is as good as zero, so that a
+    motion that repeats itself long enough has forgotten how it began.
     Bouc, Proc. 4th Conference on Nonlinear Oscillation, Prague (1967); Wen, J. Engineering
     Mechanics Division 102 (1976).
 
@@ -44,8 +44,8 @@ class BoucWen(Aperiodic):
     Raises
     ------
     InvalidInput
-        For a number that is not finite, a torsion or exponent that is not above 0, or a share that
-        is not, with which nothing would be lost, or is above 2.
+        For a number that is not finite, a torsion that is not above 0, an exponent outside 0.5 to
+        8, or a share that is not above 0 (at 0 nothing would be lost) or above 2.
     """
 
     states: ClassVar[int] = 1
@@ -57,7 +57,7 @@ class BoucWen(Aperiodic):
     def __post_init__(self) -> None:
         real_number("bouc_wen_hysteresis.force", self.force)
         real_number("bouc_wen_hysteresis.torsion", self.torsion, above=0.0)
-        real_number("bouc_wen_hysteresis.exponent", self.exponent, above=0.0)
+        real_number("bouc_wen_hysteresis.exponent", self.exponent, at_least=0.5, at_most=8.0)
         real_number("bouc_wen_hysteresis.share", self.share, above=0.0, at_most=2.0)
 
     def respond(self, state: PortState) -> Response:
@@ -137,7 +137,7 @@ def bouc_wen(sizes: Sizes) -> Guess:
         unknown("exponent", 0.6, 4.0, 1.5),
         unknown("share", 0.3, 1.5, 0.6),
     )
-    starts = [(force, share * travel, 1.5, 0.6) for share in (0.1, 0.03, 0.4)]
+    starts = [(force, part * travel, 1.5, 0.6) for part in (0.1, 0.03, 0.4)]
     sentence = (
         "The {force} at the {port} lags behind the motion in a smooth loop, of Bouc and Wen's form "
         "or Dahl's, which forgets gradually: it creeps after each change of the load, and how much "

@@ -11,19 +11,24 @@ import numpy as np
 from pymoo_hdte.compilation import compiled
 from pymoo_hdte.effects.law import Values
 
-Rise = tuple[Values, Values, int]
-"""States of a rise at steps of equal ways, their slopes, and the step of the state zero."""
+Rise = tuple[Values, Values, int, float, float]
+"""States of a rise at steps of equal ways, their slopes, the step of the state zero; exponent and
+share."""
 
 _STEP = 0.04
-"""Ways between the states that are integrated, in torsions of yield: errors of the state stay below
-1e-6 for exponents from 1 on."""
+"""Ways between the states that are integrated, in torsions of yield: errors of the state stay at
+some 1e-5, for exponents below 1 at some 1e-4."""
 _STEPS = 1000
 """Of them: after forty torsions of yield nothing is left of where it began, to the last digit."""
 _FLAT = 1e-12
 """Slope below which a state is that of the end of the rise."""
-_UNCHANGED = 1e-10
-"""Share of the force by which a passage may still change a state that repeats itself."""
+_SETTLED = 1e-10
+"""Share of the force by which a state that repeats itself may be wrong, and what rounding leaves
+of its change in a passage."""
+_ROUNDING = 1e-15
 _PASSAGES = 50
+_RESTS = 1e-12
+"""Way, in torsions of yield, within which a port rests: it bears what wound it up."""
 
 
 @compiled
@@ -33,36 +38,52 @@ def slope_of(z: float, exponent: float, share: float) -> float:
 
 
 @compiled
-def rise_of(exponent: float, share: float) -> Rise:
-    """Return z and its slope at steps of a motion towards positive z, and the step of zero.
+def _from_zero(way: float, exponent: float, share: float) -> tuple[float, float]:
+    """Return z and its slope after a short way from zero, by the series in what the slope loses.
 
-    By the classical method of Runge and Kutta, from zero to 1 and back to -1, so that its kink at
-    zero lies between steps.
+    Small loops settle by what little the slope loses there, which steps would miss.
+    """
+    n, lost = exponent, 1.0 - slope_of(way, exponent, share)
+    first = 1.0 / (n + 1.0)
+    second = n * first / (2.0 * n + 1.0)
+    third = (n * second + 0.5 * n * (n - 1.0) * first**2) / (3.0 * n + 1.0)
+    z = way * (1.0 - lost * (first - lost * (second - lost * third)))
+    return z, slope_of(z, exponent, share)
+
+
+@compiled
+def rise_of(exponent: float, share: float) -> Rise:
+    """Return a motion towards positive z, from -1 to 1.
+
+    By the classical method of Runge and Kutta, from its series next to zero, where it has a kink.
     """
     z, slope = np.empty(2 * _STEPS + 1), np.empty(2 * _STEPS + 1)
     z[_STEPS], slope[_STEPS] = 0.0, 1.0
-    first = _STEPS
+    place = _STEPS
     for way in (_STEP, -_STEP):
-        now, going = 0.0, 1.0
+        now, going = _from_zero(way, exponent, share)
         for step in range(1, _STEPS + 1):
-            second = slope_of(now + 0.5 * way * going, exponent, share)
-            third = slope_of(now + 0.5 * way * second, exponent, share)
-            fourth = slope_of(min(now + way * third, 1.0), exponent, share)
-            now += way * (going + 2.0 * second + 2.0 * third + fourth) / 6.0
-            now = min(now, 1.0)
-            going = slope_of(now, exponent, share)
+            if step > 1:
+                second = slope_of(now + 0.5 * way * going, exponent, share)
+                third = slope_of(now + 0.5 * way * second, exponent, share)
+                fourth = slope_of(now + way * third, exponent, share)
+                now += way * (going + 2.0 * second + 2.0 * third + fourth) / 6.0
+                now = min(now, 1.0)
+                going = slope_of(now, exponent, share)
             place = _STEPS + (step if way > 0.0 else -step)
             z[place], slope[place] = now, going
             if now <= -1.0:
                 break
-        first = min(first, place)
-    return z[first:], slope[first:], _STEPS - first
+    # The last place is that of the way down.
+    return z[place:], slope[place:], _STEPS - place, exponent, share
 
 
 @compiled
 def state_at(way: float, rise: Rise) -> tuple[float, float]:
     """Return z and its slope after a way from zero along a rise: cubics between its steps."""
-    z, slope, zero = rise
+    z, slope, zero, exponent, share = rise
+    if abs(way) <= _STEP:
+        return _from_zero(way, exponent, share)
     steps = way / _STEP + zero
     if steps >= len(z) - 1:
         return 1.0, 0.0
@@ -139,15 +160,14 @@ def follow(
 ) -> None:
     """Follow paths (n, steps) from rest; where their second half recurs, as it does for ever."""
     rows, steps = path.shape
-    half = steps // 2 if recurs else 0
+    half = steps // 2
     for row in range(rows):
-        of_row = along[row, half:], slope[row, half:], kept[row, half:]
-        if recurs and np.ptp(path[row]) > 0.0:
-            _settle(path[row, half:], rise, *of_row)
-        else:
-            _passed(path[row, half:], 0.0, 0.0, rise, *of_row)
+        if not (recurs and np.ptp(path[row]) > _RESTS):
+            _passed(path[row], 0.0, 0.0, rise, along[row], slope[row], kept[row])
+            continue
+        _settle(path[row, half:], rise, along[row, half:], slope[row, half:], kept[row, half:])
         for one in (along, slope, kept):
-            one[row, :half] = one[row, half : 2 * half]
+            one[row, :half] = one[row, half:]
 
 
 @compiled
@@ -161,13 +181,14 @@ def _settle(
     """Follow a path from the state to which it returns.
 
     A passage leads two states nearer to each other, and keeps their order: Newton's method stays
-    between states that a passage raises and lowers.
+    between states that a passage raises and lowers. The nearer it leads them, the less a change is
+    of what is still missing.
     """
     z, low, high = 0.0, -1.0, 1.0
     for _ in range(_PASSAGES):
         product = _passed(path, z, path[-1], rise, along, slope, kept)
         change = along[-1] - z
-        if abs(change) <= _UNCHANGED:
+        if abs(change) <= max(_SETTLED * (1.0 - product), _ROUNDING):
             break
         if change > 0.0:
             low = z

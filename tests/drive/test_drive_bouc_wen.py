@@ -15,6 +15,7 @@ from pymoo_hdte.drive.solve.quasi_static import quasi_static_torsion
 from pymoo_hdte.drive.solve.torus import Torus
 from pymoo_hdte.effects.bouc_wen import BoucWen
 from pymoo_hdte.effects.law import PortState
+from pymoo_hdte.effects.smooth_loop import rise_of
 from pymoo_hdte.units import ARCSEC
 
 FORCE, YIELD = 2.0, 1e-4
@@ -127,9 +128,13 @@ def test_a_position_that_is_no_number_leads_to_none():
 
 def test_a_port_that_rests_bears_what_wound_it_up():
     law = BoucWen(FORCE, YIELD)
-    assert torque(law, np.full(8, 2.0 * YIELD), recurs=True) == pytest.approx(
-        FORCE * (1.0 - np.exp(-2.0)), rel=1e-5
-    )
+    rests = np.full(8, 2.0 * YIELD)
+    wound_up = pytest.approx(FORCE * (1.0 - np.exp(-2.0)), rel=1e-5)
+    assert torque(law, rests, recurs=True) == wound_up
+    # Rounding is no motion, and a port that rests keeps all of it.
+    assert torque(law, rests * (1.0 + 1e-15 * np.arange(8.0)), recurs=True) == wound_up
+    kept, _ = law.recall(rests[None])
+    assert np.all(kept[0, 0, 1:] == 1.0)
 
 
 def with_loop(name, law):
@@ -161,7 +166,7 @@ def test_a_drive_that_runs_on_repeats_itself_as_an_integrator_finds():
 
 
 @pytest.mark.parametrize("force", [2.0, 8.0])
-@pytest.mark.parametrize(("exponent", "share"), [(1.0, 0.6), (2.0, 1.0)])
+@pytest.mark.parametrize(("exponent", "share"), [(1.0, 0.6), (2.5, 1.0), (4.0, 0.6)])
 def test_it_converges_at_any_load_and_speed(force, exponent, share):
     coefficients = drive(BoucWen(force, 8e-5, exponent, share))
     speed, load = np.meshgrid([20.0, 100.0, 209.4], [0.0, 0.5, 2.0, 20.0])
@@ -187,9 +192,29 @@ def test_a_sweep_of_the_load_is_carried_by_spring_and_loop_together():
 
 
 @pytest.mark.parametrize(
-    "bad",
-    [(np.nan, 1e-4), (1.0, 0.0), (1.0, 1e-4, 0.0), (1.0, 1e-4, 1.0, 0.0), (1.0, 1e-4, 1.0, 2.1)],
+    ("field", "bad"),
+    [
+        ("force", (np.nan, 1e-4)),
+        ("torsion", (1.0, 0.0)),
+        ("torsion", (1.0, np.inf)),
+        ("exponent", (1.0, 1e-4, 0.4)),
+        ("exponent", (1.0, 1e-4, 9.0)),
+        ("exponent", (1.0, 1e-4, np.nan)),
+        ("share", (1.0, 1e-4, 1.0, 0.0)),
+        ("share", (1.0, 1e-4, 1.0, -0.5)),
+        ("share", (1.0, 1e-4, 1.0, 2.1)),
+    ],
 )
-def test_numbers_that_are_none_of_such_a_loop_are_refused(bad):
-    with pytest.raises(InvalidInput, match="bouc_wen_hysteresis"):
+def test_numbers_that_are_none_of_such_a_loop_are_refused(field, bad):
+    with pytest.raises(InvalidInput, match=rf"^bouc_wen_hysteresis\.{field} "):
         BoucWen(*bad)
+
+
+@given(st.floats(0.5, 8.0), st.floats(0.01, 2.0))
+def test_every_rise_goes_up_from_minus_one_to_one(exponent, share):
+    z, slope, zero, *_ = rise_of(exponent, share)
+    assert np.all(np.diff(z) >= 0.0)
+    assert np.all(slope >= 0.0)
+    assert (z[zero], z[-1]) == (0.0, pytest.approx(1.0, abs=1e-8))
+    assert z[1] > -1.0
+    assert z[0] <= -1.0 or zero == 1000

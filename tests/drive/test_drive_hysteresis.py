@@ -72,6 +72,28 @@ def test_slope_and_memory_together_are_the_derivative_of_the_torque(direction, e
     assert np.abs(along(slope) - numerical).max() > 1e-2 * scale
 
 
+@pytest.mark.parametrize("exponent", [1.0, 2.0, 3.0])
+@pytest.mark.parametrize("ripple", [0.1, 0.01])
+def test_the_mean_torque_of_a_loop_is_that_of_its_small_motion(exponent, ripple):
+    """It fades: the mean of the motion moves the drive's spring alone, however small the loop."""
+    force, torsion = 8.0, 1e-4
+    law = BoucWen(force, torsion, exponent, 0.7)
+    coefficients = drive_with("calibrated", LawAtPort("bouc_wen_hysteresis", "mesh", law))
+    torus = torus_of(coefficients)
+    still, load = np.array([200.0]), np.array([40.0])
+    equations = AngleEquations(coefficients, still, load, SpeedLoop(), torus)
+    there = np.zeros((1, len(torus.orders)), dtype=complex)
+    there[:, 0], there[:, torus.place(2.0)[0]] = 1e-3, ripple * torsion
+    energy = np.zeros_like(there)
+    energy[:, 0] = still**2 / 2.0
+    motion = equations.motion(there, energy)
+    of_mean = torus.product_matrix(motion.mesh_slope) + equations.recall_matrix(there)
+    stiffness = coefficients.stiffness[0]
+    assert of_mean[0, 0, 0] == pytest.approx(stiffness, abs=1e-3 * force / torsion)
+    mean = torus.phasors(motion.mesh_torque)[0, 0].real
+    assert mean == pytest.approx(stiffness * 1e-3, abs=2e-2 * ripple * force)
+
+
 @pytest.mark.parametrize("name", ["calibrated", "resonant"])
 @pytest.mark.parametrize("force", [1.0, 5.0, 8.0])
 @pytest.mark.parametrize("torsion", [5e-5, 1e-4, 2e-4])

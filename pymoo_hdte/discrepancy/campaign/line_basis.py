@@ -18,9 +18,9 @@ LARGEST_CONDITION = 1e3
 """Largest condition number of the fit; beyond it the noise of the lines grows a thousandfold."""
 
 FADING = (0.02, 0.05, 0.1, 0.25, 0.6, 2.0)
-"""Time constants of what fades in a record, as shares of its duration: from two input turns of a
-record of one output turn to what hardly fades. A loop that forgets slows down as it fades, so that
-what is left of it takes several."""
+"""Time constants of what fades in a record, as shares of its duration. Set by hand on one seen
+record of an output turn: from two turns of its input, before which a loop is not yet formed, to
+what hardly fades, some three times apart. A loop that forgets takes several, as it slows down."""
 
 ROWS_A_BLOCK = 1 << 15
 """Rows worked on at once, to bound the memory."""

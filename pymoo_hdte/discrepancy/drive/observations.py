@@ -80,15 +80,17 @@ class Observations:
 
     @property
     def creep(self) -> float:
-        """Torque, N.m, that fades in its believed and included effects: see `Behaviour.creep`."""
+        """Mesh torque that fades in believed and included effects, N.m: see `Behaviour.creep`."""
         effects = (*self.campaign.believed.effects, *self.reference_effects)
-        return sum(effect.law.creep for effect in effects if isinstance(effect, LawAtPort))
+        laws = (one for one in effects if isinstance(one, LawAtPort) and one.port == "mesh")
+        return sum(one.law.creep for one in laws)
 
     def _creep(self, stiffness: float) -> NDArray[np.float64] | float:
         """Return the covariance by torsion that fades in a record, which loads had left before.
 
         Nobody knows how long the drive had turned on when a record began, so that any of it may be
-        left, up to that of the whole force, and fade at any rate.
+        left, and fade at any rate: each decay has the size of the whole force as its deviation,
+        which is so much more than the noise that a smaller one would make no difference.
         """
         size, features = self.creep / stiffness, self.features
         fading = features.conditions.fading

@@ -248,9 +248,8 @@ def _explains(search: Search, one: Hypothesis) -> bool:
 
 
 def _is_effect(one: Hypothesis) -> bool:
-    """Tell whether a set is a single effect, no base parameter and no stand-in for another form."""
-    (first, *others) = one.candidates
-    return not others and first.frees is None and not first.only_as_form
+    """Tell whether a set is a single effect, and no base parameter."""
+    return len(one.candidates) == 1 and one.candidates[0].frees is None
 
 
 def in_one_law(search: Search, chosen: Hypothesis) -> list[Hypothesis]:

@@ -206,8 +206,9 @@ def alike(
     exact form only, or one is a special case of the other. Where even the chosen form leaves more
     than noise, differences of chi-square are compared with this residual. Two laws at one port
     ``overlap`` where other forms of both are known, beside the same values out of tolerance. Where
-    an effect of one stands for several base parameters of the other, the evidence alone tells, and
-    so it does of a form that stands in for a listed one: that one is compared, too.
+    an effect of one stands for several base parameters of the other, the evidence alone tells. And
+    so it does where ``one`` has a form that only stands in for a listed one: the listed form is
+    compared as well, and has these shares.
     """
     if one.names == chosen.names:
         return False
@@ -216,14 +217,15 @@ def alike(
     if len(one.candidates) != len(chosen.candidates):
         return near and _stands_for_parameters(one, chosen)
     residual = chosen.fit.chi_square - degrees_of_freedom
+    pairs = differing(one.candidates, chosen.candidates)
+    if any(mine.only_as_form for mine, _ in pairs):
+        return near
     if not (near or one.exact or chosen.exact or contains(one, chosen) or contains(chosen, one)):
         further = one.fit.chi_square - chosen.fit.chi_square
-        pairs = differing(one.candidates, chosen.candidates)
         same = all(mine.beside(other) for mine, other in pairs)
         accuracy = rules.form_share if overlap and same else rules.form_accuracy
         exact = all(mine.exact and other.exact for mine, other in pairs)
-        stands_in = any(mine.only_as_form for mine, _ in pairs)
-        near = not (exact or stands_in) and further < accuracy**2 * (chosen.removed + residual)
+        near = not exact and further < accuracy**2 * (chosen.removed + residual)
     if near or misfit <= adequate(degrees_of_freedom, rules) or (one.exact and chosen.exact):
         return near
     return one.fit.chi_square - degrees_of_freedom < rules.form_ratio * residual

@@ -175,12 +175,10 @@ def _renewed_search(search: Search) -> Search:
     With less noise than there is, further effects would be sought for what is none. A wrong effect
     that lets much noise through may hide others in it, but hardly as much as noise in each part. An
     effect beside which sensors are far from what is stated is not all, and a base that needs no
-    effect with that noise says nothing of this one. Nor does what only stands for a listed form:
-    what may stand in its place instead has not been tried yet.
+    effect with that noise says nothing of this one.
     """
     data, first = search.data, search.found[0]
-    stands_in = any(one.only_as_form for one in first.candidates)
-    explained = first.listed and first.explained >= data.rules.explained_share and not stands_in
+    explained = first.listed and first.explained >= data.rules.explained_share
     renewed = data.with_noise_of(first.fit) if explained and not search.enough(first) else None
     if renewed is None or not _is_all(renewed, fit(renewed, first.candidates, first.fit.values)):
         return search
