@@ -64,8 +64,8 @@ class OrderLines:
         a drift is curved in a record of ten minutes, and an order with one cycle per record absorbs
         the curvature.
     fading : ndarray of complex, shape (6, 1 + m)
-        Mean and phasors that a fit assigns to signals that fade from one at the first row, with
-        the time constants `line_basis.FADING`.
+        Mean and phasors, dimensionless, that a fit assigns to signals that fade from one at the
+        first row, with the time constants `line_basis.FADING`.
 
     Examples
     --------

@@ -208,7 +208,7 @@ def alike(
     ``overlap`` where other forms of both are known, beside the same values out of tolerance. Where
     an effect of one stands for several base parameters of the other, the evidence alone tells. And
     so it does where ``one`` has a form that only stands in for a listed one: the listed form is
-    compared as well, and has these shares.
+    compared as well, with room for its form.
     """
     if one.names == chosen.names:
         return False
@@ -217,11 +217,11 @@ def alike(
     if len(one.candidates) != len(chosen.candidates):
         return near and _stands_for_parameters(one, chosen)
     residual = chosen.fit.chi_square - degrees_of_freedom
-    pairs = differing(one.candidates, chosen.candidates)
-    if any(mine.only_as_form for mine, _ in pairs):
-        return near
     if not (near or one.exact or chosen.exact or contains(one, chosen) or contains(chosen, one)):
         further = one.fit.chi_square - chosen.fit.chi_square
+        pairs = differing(one.candidates, chosen.candidates)
+        if any(mine.only_as_form for mine, _ in pairs):
+            return False
         same = all(mine.beside(other) for mine, other in pairs)
         accuracy = rules.form_share if overlap and same else rules.form_accuracy
         exact = all(mine.exact and other.exact for mine, other in pairs)
