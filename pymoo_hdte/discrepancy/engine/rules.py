@@ -100,8 +100,10 @@ class Rules(MechanismRules, ReportRules, RecordRules, RowRules, SearchRules):
         "Least share of the excess of each single part of the data that effects remove, and of "
         "what is left that a second effect removes before its fit is finished, or that, to first "
         "order, base parameters at bounds would remove to be freed beside effects, or other forms "
-        "of the laws of a set for those to be tried that stand for listed ones only. The nearest "
-        "effect of a misfit that none explains is told, and a test for it, from this share on.",
+        "of the laws of a set for those to be tried that stand for listed ones only (of laws with "
+        "memory, which have forms that are no sums of theirs, wherever more than noise is left). "
+        "The nearest effect of a misfit that none explains is told, and a test for it, from this "
+        "share on.",
         f"{BY_HAND}: half is the least that may be called most of it. A curve that removes 96 % of "
         "the whole and nothing of the input torque is not the cause of both.",
         at_least=0.0,
