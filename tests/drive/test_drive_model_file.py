@@ -29,6 +29,7 @@ from pymoo_hdte.drive import (
 )
 from pymoo_hdte.drive.datasheet import ERROR_CLASSES, MEMBERS, ErrorSource, Mesh, Nominal
 from pymoo_hdte.drive.effects import drive_effects
+from pymoo_hdte.effects.bouc_wen import BoucWen
 from pymoo_hdte.effects.effect import place_of
 
 any_size = st.floats(allow_nan=False, allow_infinity=False)
@@ -46,6 +47,8 @@ AT_LEAST_1 = (
     "exponent",
     "reference",
 )
+OF_LOOPS = {"exponent": st.floats(0.5, 8.0), "share": st.floats(0.0, 2.0, exclude_min=True)}
+"""Of a loop that forgets, which has limits of its own."""
 texts = st.text(min_size=1).filter(str.strip)
 
 
@@ -59,6 +62,7 @@ def laws():
             for field in fields(kind)
             if field.init and field.name != "locked"
         }
+        values |= OF_LOOPS if kind is BoucWen else {}
         return st.builds(LawAtPort, st.just(name), st.just(port), st.builds(kind, **values))
 
     return st.one_of(*(of(name, port) for name, effect in LAWS.items() for port in effect.ports))
