@@ -20,7 +20,7 @@ from pymoo_hdte.effects.unknowns import unknown
 
 @dataclass(frozen=True)
 class BoucWen(Aperiodic):
-    """T = force z, dz/dx = (1 - ``|z|``^exponent (share sgn(z x') + 1 - share)) / torsion.
+    """T = force z with dz/dx = (1 - ``|z|`` ^ exponent (share sgn(z x') + 1 - share)) / torsion.
 
     From rest the torque rises with the slope force / torsion and nears ``force``, with a sharper
     corner for a larger exponent. Back from there it begins to fall with 2 share of that slope: with
