@@ -12,10 +12,10 @@ import numpy as np
 
 from pymoo_hdte.checks import real_number
 from pymoo_hdte.effects.effect import Effect, register
-from pymoo_hdte.effects.guess import Guess, Sizes
+from pymoo_hdte.effects.guess import Guess
 from pymoo_hdte.effects.law import Aperiodic, PortState, Response, Values
 from pymoo_hdte.effects.smooth_loop import Rise, follow, rise_of, slope_of, state_at, way_to
-from pymoo_hdte.effects.unknowns import unknown
+from pymoo_hdte.effects.unknowns import Parameter, unknown
 
 
 @dataclass(frozen=True)
@@ -125,26 +125,33 @@ class BoucWen(Aperiodic):
         return self.torsion
 
 
-def bouc_wen(sizes: Sizes) -> Guess:
+def bouc_wen(force: Parameter, torsion: Parameter, starts: Sequence[tuple[float, ...]]) -> Guess:
     """Guess a smooth loop, in the place of springs that slip.
 
     Exponent and share may go beyond what the literature has, by what noise may make of 1 and 1/2.
+
+    Parameters
+    ----------
+    force, torsion : Parameter
+        Of the springs, N.m and rad.
+    starts : sequence of (float, float)
+        Forces and torsions from which fits of springs start, the typical torsion among them.
     """
-    travel, force = sizes.travel, sizes.force
-    unknowns = (
-        unknown("force", 0.0, sizes.largest, force),
-        unknown("torsion", 0.003 * travel, 2.0 * travel, 0.1 * travel),
-        unknown("exponent", 0.6, 4.0, 1.5),
-        unknown("share", 0.3, 1.5, 0.6),
-    )
-    starts = [(force, part * travel, 1.5, 0.6) for part in (0.1, 0.03, 0.4)]
+    exponent, share = unknown("exponent", 0.6, 4.0, 1.5), unknown("share", 0.3, 1.5, 0.6)
+    # In the place of springs only the first is tried.
+    typical_first = sorted(starts, key=lambda one: one[1] != torsion.start)
     sentence = (
         "The {force} at the {port} lags behind the motion in a smooth loop, of Bouc and Wen's form "
         "or Dahl's, which forgets gradually: it creeps after each change of the load, and how much "
         "of that is left when a record begins is not known."
     )
     return Guess(
-        unknowns, starts, _built, form="bouc_wen", sentence=sentence, instead_of=("hysteresis",)
+        (force, torsion, exponent, share),
+        [(*one, exponent.start, share.start) for one in typical_first],
+        _built,
+        form="bouc_wen",
+        sentence=sentence,
+        instead_of=("hysteresis",),
     )
 
 

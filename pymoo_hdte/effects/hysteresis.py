@@ -98,7 +98,11 @@ def _slipping(sizes: Sizes) -> list[Guess]:
 
     In a motion without reversal both would act as dry friction.
     """
-    return [Guess(*springs("force", sizes)), bouc_wen(sizes)] if sizes.both_ways else []
+    if not sizes.both_ways:
+        return []
+    unknowns, starts = springs("force", sizes)
+    force, torsion, _ = unknowns
+    return [Guess(unknowns, starts), bouc_wen(force, torsion, [one[:2] for one in starts])]
 
 
 def springs(strength: str, sizes: Sizes) -> tuple[tuple[Parameter, ...], list[tuple[float, ...]]]:

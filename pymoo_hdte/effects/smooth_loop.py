@@ -23,9 +23,9 @@ _STEPS = 1000
 _FLAT = 1e-12
 """Slope below which a state is that of the end of the rise."""
 _SETTLED = 1e-10
-"""Share of the force by which a state that repeats itself may be wrong, and what rounding leaves
-of its change in a passage."""
+"""Share of the force by which a state that repeats itself may be wrong."""
 _ROUNDING = 1e-15
+"""What rounding leaves of its change in a passage, as a share of the force."""
 _PASSAGES = 50
 _RESTS = 1e-12
 """Way, in torsions of yield, within which a port rests: it bears what wound it up."""

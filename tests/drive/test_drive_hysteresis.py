@@ -104,10 +104,21 @@ def test_hysteresis_of_any_strength_converges_under_load(name, force, torsion):
     assert np.all(balance.converged)
 
 
-@pytest.mark.parametrize("force", [2.5, 8.0])
-def test_springs_stiffer_than_the_gearing_converge_at_any_load_and_speed(force):
-    """Most of them stick: without their memory the steps cycle between sticking and slipping."""
-    coefficients = drive("calibrated", force, 4e-5)
+@pytest.mark.parametrize(
+    "law",
+    [
+        *(MaxwellSlip(force, 4e-5) for force in (2.5, 8.0)),
+        *(
+            BoucWen(force, 8e-5, exponent, share)
+            for force in (2.0, 8.0)
+            for exponent, share in ((1.0, 0.6), (2.5, 1.0), (4.0, 0.6))
+        ),
+    ],
+)
+def test_what_is_stiffer_than_the_gearing_converges_at_any_load_and_speed(law):
+    """Most springs stick: without their memory the steps cycle between sticking and slipping."""
+    name = "hysteresis" if isinstance(law, MaxwellSlip) else "bouc_wen_hysteresis"
+    coefficients = drive_with("calibrated", LawAtPort(name, "mesh", law))
     speed, load = np.meshgrid([20.0, 100.0, 209.4], [0.0, 0.2, 0.5, 1.0, 2.0, 5.0, 20.0])
     balance = harmonic_balance(
         coefficients.rows(np.zeros(speed.size, dtype=int)),

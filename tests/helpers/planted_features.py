@@ -66,6 +66,13 @@ def known_data(conditions=CONDITIONS, orders=ORDERS):
     return Data(campaign, features, base_parameters(BELIEVED, RIG, PHASES, 0.0))
 
 
+FEW = known_data(
+    [(10.0, 5.0), (40.0, 40.0), (150.0, 5.0), (500.0, 20.0), (1200.0, 40.0), (2000.0, 10.0)],
+    [1.0, 2.0, 2.02],
+)
+"""Records enough beside a sweep."""
+
+
 def measured(effects=(), rng=None, data=None, **changes):
     """Data whose features a true drive gives, with noise of their covariance from ``rng``.
 

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from planted_features import known_data, library, measured, with_sweep
+from planted_features import FEW, known_data, library, measured, with_sweep
 
 from pymoo_hdte.discrepancy.drive.evidence import Data
 from pymoo_hdte.discrepancy.drive.forms.corrections import (
@@ -39,11 +39,6 @@ DATA = known_data(
     [1.0, 2.0, 2.02, 3.0],
 )
 REACTION = "kinematic_reaction:input"
-FEW = known_data(
-    [(10.0, 5.0), (40.0, 40.0), (150.0, 5.0), (500.0, 20.0), (1200.0, 40.0), (2000.0, 10.0)],
-    [1.0, 2.0, 2.02],
-)
-"""Records enough beside a sweep."""
 OF_LOAD, LOAD = "load_dependent_friction:input", "load_inertia:output"
 
 

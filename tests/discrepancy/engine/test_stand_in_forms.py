@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from planted_features import known_data, library, measured, with_sweep
+from planted_features import FEW, library, measured, with_sweep
 
 from pymoo_hdte.discrepancy.engine.fitted_sets import FittedSets
 from pymoo_hdte.discrepancy.engine.fitting import fit
@@ -16,10 +16,6 @@ from pymoo_hdte.effects.bouc_wen import BoucWen
 from pymoo_hdte.effects.hysteresis import MaxwellSlip
 from pymoo_hdte.units import ARCSEC
 
-FEW = known_data(
-    [(10.0, 5.0), (40.0, 40.0), (150.0, 5.0), (500.0, 20.0), (1200.0, 40.0), (2000.0, 10.0)],
-    [1.0, 2.0, 2.02],
-)
 LOOP, REACTION = "hysteresis/bouc_wen:mesh", "kinematic_reaction:input"
 FORCE = 1.5
 
