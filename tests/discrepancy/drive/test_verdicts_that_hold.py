@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 import verdict_cases as mends
 from night import others_at_night
+from scipy.stats import chi2
 from verdict_cases import case_campaign
 
 from pymoo_hdte.discrepancy import analyse
@@ -95,11 +96,12 @@ ROUNDED = 0.005 * ARCSEC
 
 
 def said(analysis):
-    """Return status, labels and rivals of a verdict."""
+    """Return status, labels and rivals of a verdict, in each order that is not told from it."""
     verdict = analysis.verdict
     accepted = () if verdict.accepted is verdict.base else verdict.accepted.candidates
     labels = {one.label for one in accepted}
-    rivals = {one.label for other in verdict.equivalent for one in other.candidates}
+    near = [other for other in verdict.alternatives if verdict.is_equivalent(other)]
+    rivals = {one.label for other in near for one in other.candidates}
     return verdict.status, labels, rivals
 
 
@@ -193,7 +195,10 @@ def also_of_hardening(analysis):
 
 
 def also_of_rig_11(analysis):
-    assert analysis.verdict.accepted.chi_square == pytest.approx(1546.7, abs=0.1)
+    # At the minimum nothing is left but noise, the beats of orders 2 and 2.02 included.
+    fitted = analysis.verdict.accepted
+    assert fitted.chi_square == pytest.approx(1441.0, abs=0.1)
+    assert chi2.sf(fitted.chi_square, analysis.verdict.degrees_of_freedom) > 0.05
 
 
 def also_of_the_amplitude(analysis):
@@ -220,7 +225,7 @@ ALSO: dict[str, Callable] = {
     [
         ("coulomb", mends.ranking_fits_decide),
         ("rig-11", mends.ranking_fits_decide),
-        ("coulomb-one-load", mends.three_steps),
+        ("coulomb-one-load", mends.one_step),
         ("coulomb-gap", mends.rows_are_believed),
         ("coulomb-noise-x3", mends.rows_are_believed),
         ("nothing-encoder-spikes", mends.rows_are_believed),
@@ -234,7 +239,7 @@ ALSO: dict[str, Callable] = {
         ("nothing-all-values-off", mends.one_parameter_at_a_time),
         ("stiffness-off", mends.freed_values_are_believed),
         ("amplitude-off", mends.amplitudes_are_never_wrong),
-        ("rig-11", mends.three_steps),
+        ("rig-11", mends.one_step),
         ("kinematic-eccentricity", mends.one_effect),
     ],
     ids=lambda one: one if isinstance(one, str) else one.__name__,
