@@ -238,23 +238,6 @@ class Search(FittedSets):
         known = {one.candidate.label: one for one in self.screened}
         return [known[one.label] for one in others] if known else []
 
-    def complete(self, chosen: Hypothesis) -> None:
-        """Fit the sets in which a part of a chosen one is another that comes near it by itself.
-
-        Only the better one was extended: a screening beside the other would find the same further
-        effects, and takes longest where a line beats with those of the error.
-        """
-        whole, rules = label_of(chosen.candidates), self.data.rules
-        for part in [one for one in self.found if label_of(one.candidates) < whole]:
-            kept = [each for each in chosen.candidates if each not in part.candidates]
-            for other in self.of_size(len(part.members)):
-                both = (*other.candidates, *kept)
-                near = leave_the_same(other, part, rules) or self.alike(other, part)
-                if other is not part and near and may_be_together(both):
-                    start = chosen.values_of(kept)[len(self.base.values) :]
-                    self.fitted(both, np.append(other.fit.values, start))
-        self.finish_near(len(chosen.members))
-
     def _vary_best(self, size: int) -> None:
         """Fit sets that differ from the best of a size by one member, until it stays the best."""
         varied = frozenset[str]()

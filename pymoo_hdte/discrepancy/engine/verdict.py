@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 from pymoo_hdte.discrepancy.engine import probability
 from pymoo_hdte.discrepancy.engine.candidate import Candidate
 from pymoo_hdte.discrepancy.engine.choice import in_one_law, replaced
+from pymoo_hdte.discrepancy.engine.comparisons import complete
 from pymoo_hdte.discrepancy.engine.doubts import (
     NOT_PROVEN,
     doubts_of,
@@ -160,9 +161,8 @@ def judge(
     search.grow()
     search.leave_out_lacking()
     chosen = chosen_of(search)
-    if len(chosen.members) > 1:
-        search.complete(chosen)
-        chosen = chosen_of(search)
+    complete(search, chosen)
+    chosen = chosen_of(search)
     if replaced(search, chosen, [one for one in candidates if one.instead_of]):
         chosen = chosen_of(search)
     verdict = _verdict(search, answer_of(search, chosen, search.screened))

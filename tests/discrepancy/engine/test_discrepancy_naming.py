@@ -13,6 +13,7 @@ from pymoo_hdte.discrepancy.engine import fitted_sets, hypothesis, membership, s
 from pymoo_hdte.discrepancy.engine import verdict as naming
 from pymoo_hdte.discrepancy.engine.any_form import AnyForm
 from pymoo_hdte.discrepancy.engine.candidate import Layout
+from pymoo_hdte.discrepancy.engine.comparisons import complete
 from pymoo_hdte.discrepancy.engine.excess import Excess
 from pymoo_hdte.discrepancy.engine.fitting import fit
 from pymoo_hdte.discrepancy.engine.hypothesis import adequate
@@ -33,6 +34,7 @@ OF_ENCODER = known_data(CONDITIONS[::2], [1.0 / 101.0, SCALE, *ORDERS])
 """With orders of the output's encoder, which make every solution much longer."""
 RIPPLE, LINE = "torque_ripple:input@5", "kinematic_error:mesh@3"
 SOFT, CUBIC = "soft_windup:mesh", "hardening_stiffness:mesh"
+CORNER = "hardening_stiffness/corner:mesh"
 DRAG, OUTPUT_FRICTION = "nonlinear_drag:input", "coulomb_friction:output"
 OF_LOAD = "load_dependent_friction:input"
 REACTION, INERTIA = "kinematic_reaction:input", "load_inertia:output"
@@ -274,7 +276,7 @@ def test_a_part_is_noise_if_it_has_neither_more_nor_less(of_records, noise):
 
 
 def test_two_effects_are_both_named():
-    data = planted({RIPPLE: (0.003, 0.0), LINE: (1.0 * ARCSEC, 0.0)})
+    data = planted({RIPPLE: (0.003, 0.0), LINE: (0.2 * ARCSEC, 0.0)})
     verdict = verdict_on(data, FEW)
     assert verdict.status == "named"
     assert labels_of(verdict) == {RIPPLE, LINE}
@@ -301,7 +303,7 @@ def test_a_set_that_only_the_removal_of_a_member_gives_is_named(monkeypatch):
 def test_the_other_form_of_a_member_is_tried_beside_the_others():
     """A spring that stiffens at a corner came nearer alone than the cubic one that was there."""
     data = planted({CUBIC: (2e9,), DRAG: (0.01, 2.0)})
-    corner, drag = of_labels(["hardening_stiffness/corner:mesh", DRAG])
+    corner, drag = of_labels([CORNER, DRAG])
     found = search.Search(data, fit(data), of_labels([CUBIC, corner.label, DRAG]))
     start = np.concatenate([found.base.values, corner.starts[0], drag.starts[0]])
     found._exchange_forms(found.fitted((corner, drag), start))
@@ -320,6 +322,26 @@ def test_where_more_than_noise_is_left_every_curve_is_tried_for_a_curve(left):
     assert tried == (left > 0.0)
 
 
+def test_a_law_is_compared_in_the_form_that_does_most_beside_the_others():
+    """A second spring beyond a torsion was named a soft wind-up: only a cubic was tried there."""
+    stiffer = (0.09, 5e-4, 100.0)
+    data = planted({CORNER: stiffer, LINE: (0.2 * ARCSEC, 0.0)})
+    soft, cubic, corner, order = of_labels([SOFT, CUBIC, CORNER, LINE])
+    found = search.Search(data, fit(data), [soft, cubic, corner, order])
+
+    def fitted(law, start):
+        values = np.concatenate([found.base.values, start, order.starts[0]])
+        return found.finished(found.fitted((law, order), values))
+
+    # With a stiffness that lies within its tolerance it is the same spring.
+    chosen = fitted(soft, stiffer)
+    assert found.enough(chosen)
+    assert not found.alike(fitted(cubic, (2e9,)), chosen)
+    complete(found, chosen)
+    rivals = [one for one in found.of_size(2) if found.alike(one, chosen)]
+    assert {corner, order} in [set(one.candidates) for one in rivals]
+
+
 @pytest.mark.nightly
 def test_what_is_alike_alone_is_compared_beside_the_further_effect():
     """A soft wind-up at its bound beside friction was named in part; the play was never tried."""
@@ -334,7 +356,7 @@ def test_what_is_alike_alone_is_compared_beside_the_further_effect():
 
     of_soft, of_play = fitted((soft,), skin), fitted((play,), (2e-5,))
     assert not hypothesis.leave_the_same(of_play, of_soft, data.rules)
-    found.complete(fitted((soft, friction), (*skin, *rubbed)))
+    complete(found, fitted((soft, friction), (*skin, *rubbed)))
     assert {play, friction} in [set(one.candidates) for one in found.of_size(2)]
 
 
