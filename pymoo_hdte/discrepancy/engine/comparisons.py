@@ -19,7 +19,7 @@ def complete(search: Search, chosen: Hypothesis) -> None:
     """Fit the sets that may explain as much as a chosen one by other laws."""
     if len(chosen.members) > 1:
         _with_other_parts(search, chosen)
-    _with_other_forms(search, chosen)
+    _with_other_laws(search, chosen)
     search.finish_near(len(chosen.members))
 
 
@@ -40,12 +40,14 @@ def _with_other_parts(search: Search, chosen: Hypothesis) -> None:
                 search.fitted(both, np.append(other.fit.values, start))
 
 
-def _with_other_forms(search: Search, chosen: Hypothesis) -> None:
-    """Fit the best set with each other law at the port of a member in further forms of that law.
+def _with_other_laws(search: Search, chosen: Hypothesis) -> None:
+    """Fit the best set with each other law at the port of a member in any form, from any start.
 
-    Only the form that does most by itself was tried beside the others: a second spring as a cubic,
-    beside a drag for which a spring that is stiffer beyond a corner leaves noise, as does a soft
-    wind-up. Where what is left is neither noise nor mostly forms, none would do.
+    Only the form and the start that do most by themselves were tried beside the others: a second
+    spring as a cubic, beside a drag for which a spring that is stiffer beyond a corner leaves
+    noise, as does a soft wind-up; and a drift that settles at once, where a new zero is nearly as
+    good as one that settles within the session. Where what a set leaves is neither noise but for
+    the forms of its laws, nor mostly forms, none would do.
     """
     of_names: dict[frozenset[tuple[str, str]], Hypothesis] = {}
     for other in search.of_size(len(chosen.members)):
@@ -59,15 +61,18 @@ def _with_other_forms(search: Search, chosen: Hypothesis) -> None:
             continue
         if search.forms.rest_is_noise(other.fit) or search.leaves_forms(other):
             for mine, _ in pairs:
-                _in_other_forms(search, other, mine)
+                _from_all_starts(search, other, mine)
 
 
-def _in_other_forms(search: Search, one: Hypothesis, member: Candidate) -> None:
-    """Fit a set with each form of a member that was not tried in it, from all its starts."""
+def _from_all_starts(search: Search, one: Hypothesis, member: Candidate) -> None:
+    """Fit a set with a member from each of its starts, and with each form that was not tried."""
     kept: Effects = tuple(each for each in one.candidates if each is not member)
-    known = [label_of(each.candidates) for each in search.found]
-    for form in search.candidates:
-        effects = (*kept, form)
-        if form.is_form_of(member) and may_be_together(effects) and label_of(effects) not in known:
-            for start in form.starts:
-                search.fitted(effects, np.append(one.values_of(kept), start), again=True)
+    tried = [label_of(each.candidates) for each in search.found]
+    forms = [form for form in search.candidates if form.is_form_of(member)]
+    for law in [member] * (not member.linear) + forms:
+        effects = (*kept, law)
+        if law is not member and (label_of(effects) in tried or not may_be_together(effects)):
+            continue
+        for start in law.starts:
+            values = np.append(one.values_of(kept), start)
+            search.fitted(effects, values, again=True, hopeless=search.hopeless)

@@ -322,24 +322,33 @@ def test_where_more_than_noise_is_left_every_curve_is_tried_for_a_curve(left):
     assert tried == (left > 0.0)
 
 
-def test_a_law_is_compared_in_the_form_that_does_most_beside_the_others():
-    """A second spring beyond a torsion was named a soft wind-up: only a cubic was tried there."""
+@pytest.mark.parametrize(
+    ("tried", "start", "steps"),
+    [
+        # A second spring beyond a torsion was named a soft wind-up: only a cubic was tried there.
+        (CUBIC, (2e9,), None),
+        # A drift was named a new zero: its fit had ended where it settles at once.
+        (CORNER, (0.05, 1e-3, 100.0), 0),
+    ],
+)
+def test_a_law_is_compared_in_each_form_and_from_each_start(tried, start, steps):
     stiffer = (0.09, 5e-4, 100.0)
     data = planted({CORNER: stiffer, LINE: (0.2 * ARCSEC, 0.0)})
-    soft, cubic, corner, order = of_labels([SOFT, CUBIC, CORNER, LINE])
-    found = search.Search(data, fit(data), [soft, cubic, corner, order])
+    laws = of_labels([SOFT, CUBIC, CORNER, LINE])
+    found, line = search.Search(data, fit(data), laws), laws[-1]
 
-    def fitted(law, start):
-        values = np.concatenate([found.base.values, start, order.starts[0]])
-        return found.finished(found.fitted((law, order), values))
+    def fitted(label, start, steps=None):
+        law = next(one for one in laws if one.label == label)
+        values = np.concatenate([found.base.values, start, line.starts[0]])
+        return found.fitted((law, line), values, steps=steps)
 
     # With a stiffness that lies within its tolerance it is the same spring.
-    chosen = fitted(soft, stiffer)
+    chosen = found.finished(fitted(SOFT, stiffer))
     assert found.enough(chosen)
-    assert not found.alike(fitted(cubic, (2e9,)), chosen)
+    assert not found.alike(fitted(tried, start, steps), chosen)
     complete(found, chosen)
     rivals = [one for one in found.of_size(2) if found.alike(one, chosen)]
-    assert {corner, order} in [set(one.candidates) for one in rivals]
+    assert {CORNER, LINE} in [hypothesis.label_of(one.candidates) for one in rivals]
 
 
 @pytest.mark.nightly
