@@ -84,19 +84,16 @@ def chosen_of(search: Search) -> Hypothesis:
 def rivals(search: Search, chosen: Hypothesis) -> list[Hypothesis]:
     """Return the sets that explain the data as well as the chosen one by something else.
 
-    What contains one of them is a further one only where it comes near that, too. Of sets of the
-    same names, as of several orders, the first stands for all.
+    What contains one of them is a further one only where it comes near that, too.
     """
-    found = list[Hypothesis]()
-    for one in search.found:
-        if (
-            one is not chosen
-            and one.names not in [each.names for each in found]
-            and _comes_near(search, one, chosen)
-            and explains_in_any_form(search, one)
-            and search.earned(one)
-        ):
-            found.append(one)
+    found = [
+        one
+        for one in search.found
+        if one is not chosen
+        and _comes_near(search, one, chosen)
+        and explains_in_any_form(search, one)
+        and search.earned(one)
+    ]
     return [
         one
         for one in found
