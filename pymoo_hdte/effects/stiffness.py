@@ -267,9 +267,7 @@ def _uneven(sizes: Sizes) -> list[Guess]:
     """Guess a play that varies with the shaft, by half of its mean and more.
 
     Its least width is an unknown of its own: a play with negative width would be clipped to zero,
-    where a search has no gradient. Where the input was locked it differs from its mean by twice the
-    variation at most, which leaves room for a harmonic of the same size: a play that shows in the
-    torsion sweep only is none that varies.
+    where a search has no gradient.
     """
     if sizes.stiffness == 0.0 or sizes.between:
         return []
@@ -278,10 +276,8 @@ def _uneven(sizes: Sizes) -> list[Guess]:
     for order in sizes.expected:
 
         def build(values: Sequence[float], order: float = order) -> tuple[Law, ...]:
-            (variation, phase), narrowest = polar(values[0], values[1]), values[2]
-            least, most = max(narrowest - variation, 0.0), narrowest + 3.0 * variation
-            locked = min(max(values[3], least), most)
-            return (PeriodicClearance(order, phase, narrowest + variation, variation, locked),)
+            variation, phase = polar(values[0], values[1])
+            return (PeriodicClearance(order, phase, values[2] + variation, variation, values[3]),)
 
         unknowns = (
             *wave("variation", widest / 2.0, size),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pymoo_hdte.discrepancy.engine.candidate import Candidate
-from pymoo_hdte.discrepancy.engine.fitted_sets import Effects, may_be_together
+from pymoo_hdte.discrepancy.engine.fitted_sets import may_be_together
 from pymoo_hdte.discrepancy.engine.hypothesis import (
     Hypothesis,
     differing,
@@ -16,11 +16,14 @@ from pymoo_hdte.discrepancy.engine.search import Search
 
 
 def complete(search: Search, chosen: Hypothesis) -> None:
-    """Fit the sets that may explain as much as a chosen one by other laws."""
+    """Fit the sets that may explain as much as a chosen one of several members by other laws.
+
+    Single effects have all been fitted alone, the best ones in other forms and from other starts.
+    """
     if len(chosen.members) > 1:
         _with_other_parts(search, chosen)
-    _with_other_laws(search, chosen)
-    search.finish_near(len(chosen.members))
+        _with_other_laws(search, chosen)
+        search.finish_near(len(chosen.members))
 
 
 def _with_other_parts(search: Search, chosen: Hypothesis) -> None:
@@ -41,38 +44,49 @@ def _with_other_parts(search: Search, chosen: Hypothesis) -> None:
 
 
 def _with_other_laws(search: Search, chosen: Hypothesis) -> None:
-    """Fit the best set with each other law at the port of a member in any form, from any start.
+    """Fit sets with another law at the port of a member in all forms of it, from all starts.
 
-    Only the form and the start that do most by themselves were tried beside the others: a second
-    spring as a cubic, beside a drag for which a spring that is stiffer beyond a corner leaves
-    noise, as does a soft wind-up; and a drift that settles at once, where a new zero is nearly as
-    good as one that settles within the session. Where what a set leaves is neither noise but for
-    the forms of its laws, nor mostly forms, none would do.
+    Beside other members only one form was tried, from one start: those that do most by themselves.
+    A second spring beyond a torsion was named a soft wind-up, since only a cubic one was tried
+    beside the drag. A drift was named a new zero, since its fit had ended where it settles at once.
+    Only where another form can take most of what such a set leaves, or all but noise: not for
+    machines whose laws have no known forms.
+    """
+    for other in _rivals_at_its_ports(search, chosen):
+        if search.forms.rest_is_noise(other.fit) or search.leaves_forms(other):
+            best = other
+            for member, _ in differing(other.candidates, chosen.candidates):
+                best = _from_all_starts(search, best, member)
+
+
+def _rivals_at_its_ports(search: Search, chosen: Hypothesis) -> list[Hypothesis]:
+    """Return the best set of each names that has other laws at the same ports, told from it so far.
+
+    One that is not told from the chosen set is in its class already.
     """
     of_names: dict[frozenset[tuple[str, str]], Hypothesis] = {}
-    for other in search.of_size(len(chosen.members)):
-        if len(other.candidates) == len(chosen.candidates):
-            of_names.setdefault(other.names, other)
+    for one in search.of_size(len(chosen.members)):
+        if len(one.candidates) == len(chosen.candidates):
+            of_names.setdefault(one.names, one)
     of_names.pop(chosen.names, None)
-    for other in of_names.values():
-        pairs = differing(other.candidates, chosen.candidates)
-        same_port = all(mine.beside(its) for mine, its in pairs)
-        if not same_port or search.alike(other, chosen):
-            continue
-        if search.forms.rest_is_noise(other.fit) or search.leaves_forms(other):
-            for mine, _ in pairs:
-                _from_all_starts(search, other, mine)
+    return [
+        one
+        for one in of_names.values()
+        if all(mine.beside(its) for mine, its in differing(one.candidates, chosen.candidates))
+        and not search.alike(one, chosen)
+    ]
 
 
-def _from_all_starts(search: Search, one: Hypothesis, member: Candidate) -> None:
-    """Fit a set with a member from each of its starts, and with each form that was not tried."""
-    kept: Effects = tuple(each for each in one.candidates if each is not member)
-    tried = [label_of(each.candidates) for each in search.found]
+def _from_all_starts(search: Search, one: Hypothesis, member: Candidate) -> Hypothesis:
+    """Fit a set with each form of a member, from each start of it; return the best of them."""
+    found, base = [one], one.fit.values[: one.fit.n_base]
     forms = [form for form in search.candidates if form.is_form_of(member)]
-    for law in [member] * (not member.linear) + forms:
-        effects = (*kept, law)
-        if law is not member and (label_of(effects) in tried or not may_be_together(effects)):
-            continue
-        for start in law.starts:
-            values = np.append(one.values_of(kept), start)
-            search.fitted(effects, values, again=True, hopeless=search.hopeless)
+    for law in (member, *forms):
+        effects = tuple(law if each is member else each for each in one.candidates)
+        for start in law.starts if may_be_together(effects) else ():
+            values = [
+                start if each is member else one.fit.values[place] for each, place in one.fit.places
+            ]
+            begin = np.concatenate([base, *values])
+            found.append(search.fitted(effects, begin, again=True, hopeless=search.hopeless))
+    return min(found, key=lambda each: each.bic)

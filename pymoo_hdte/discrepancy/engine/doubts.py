@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from itertools import permutations
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.stats import chi2, norm
 
 from pymoo_hdte.discrepancy.engine.candidate import Candidate
@@ -150,15 +151,29 @@ def strength_is_certain(fitted: Fit, candidate: Candidate, place: slice, rules: 
     if not candidate.parameters:
         return True
     values = expected_values(fitted, rules)
-    limit = chi2.isf(2.0 * norm.sf(rules.certain_deviations), 2)
+    if varies(candidate, values[place], fitted.covariance[place, place], rules):
+        return True
     for row, parameter in enumerate(candidate.parameters, place.start):
-        if parameter.name.endswith("_cosine"):
-            pair = np.array([row, row + 1])
-            block = fitted.covariance[np.ix_(pair, pair)]
-            if values[pair] @ np.linalg.solve(block, values[pair]) > limit:
-                return True
-        elif parameter.lower <= 0.0 and not parameter.name.endswith("_sine"):
+        if parameter.lower <= 0.0 and not parameter.name.endswith(("_cosine", "_sine")):
             deviation = np.sqrt(fitted.covariance[row, row])
             if abs(values[row]) > rules.certain_deviations * deviation:
                 return True
     return all(parameter.lower > 0.0 for parameter in candidate.parameters)
+
+
+def varies(
+    law: Candidate, values: NDArray[np.float64], covariance: NDArray[np.float64], rules: Rules
+) -> bool:
+    """Tell whether any line of a law differs from nothing, by values (k,) and covariance (k, k)."""
+    limit = chi2.isf(2.0 * norm.sf(rules.certain_deviations), 2)
+    pairs = [np.array([row, row + 1]) for row in lines_of_law(law)]
+    blocks = (covariance[np.ix_(pair, pair)] for pair in pairs)
+    return any(
+        values[pair] @ np.linalg.solve(block, values[pair]) > limit
+        for pair, block in zip(pairs, blocks, strict=True)
+    )
+
+
+def lines_of_law(law: Candidate) -> list[int]:
+    """Return where the parts of each line stand among the unknowns of a law: cosine, then sine."""
+    return [row for row, one in enumerate(law.parameters) if one.name.endswith("_cosine")]

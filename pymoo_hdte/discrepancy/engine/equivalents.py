@@ -20,7 +20,12 @@ from pymoo_hdte.discrepancy.engine.choice import (
     stands_out,
     twins,
 )
-from pymoo_hdte.discrepancy.engine.doubts import doubts_of, explains_in_any_form
+from pymoo_hdte.discrepancy.engine.doubts import (
+    doubts_of,
+    explains_in_any_form,
+    lines_of_law,
+    varies,
+)
 from pymoo_hdte.discrepancy.engine.fitting import Fit
 from pymoo_hdte.discrepancy.engine.hypothesis import (
     Hypothesis,
@@ -195,28 +200,32 @@ def _may_vary_as_much(
 ) -> bool:
     """Tell whether a line that a law adds may be as strong as its special case, by its interval."""
     place, strength = _place(of_law, law), _strength(of_case, case)
-    for row, parameter in enumerate(law.parameters, place.start):
-        if parameter.name.endswith("_cosine"):
-            pair = np.array([row, row + 1])
-            spread = np.linalg.eigvalsh(of_law.covariance[np.ix_(pair, pair)])[-1] ** 0.5
-            largest = np.hypot(*of_law.values[pair]) + rules.certain_deviations * spread
-            if largest >= strength:
-                return True
+    for row in lines_of_law(law):
+        pair = place.start + np.array([row, row + 1])
+        spread = np.linalg.eigvalsh(of_law.covariance[np.ix_(pair, pair)])[-1] ** 0.5
+        largest = np.hypot(*of_law.values[pair]) + rules.certain_deviations * spread
+        if largest >= strength:
+            return True
     return False
 
 
 def _is_its_form(of_law: Fit, law: Candidate, of_case: Fit, case: Candidate, rules: Rules) -> bool:
-    """Tell whether what a law has beyond its special case, other than lines, is a small part."""
-    shared = {one.name for one in case.parameters}
+    """Tell whether what a law has beyond its special case is a small part of that.
+
+    Of a law that varies as lines do: whether these may be nothing. What else the law is free in, as
+    the width of a play where the input was locked, does not show that it varies.
+    """
     place = _place(of_law, law)
+    if lines_of_law(law):
+        return not varies(law, of_law.values[place], of_law.covariance[place, place], rules)
+    shared = {one.name for one in case.parameters}
     further = [
         abs(value)
         for one, value in zip(law.parameters, of_law.values[place], strict=True)
         if one.lower <= 0.0 and one.name not in shared
     ]
-    lines = any(one.name.endswith("_cosine") for one in law.parameters)
     most = rules.form_share * _strength(of_case, case)
-    return bool(further) and not lines and max(further) <= most
+    return bool(further) and max(further) <= most
 
 
 def _place(fitted: Fit, candidate: Candidate) -> slice:

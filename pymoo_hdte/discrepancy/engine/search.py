@@ -2,8 +2,7 @@
 
 Sets grow by the effects that could remove most of what is left, in total, in the part of the data
 that is explained worst, or beyond all forms of their laws, and by the base parameters that they
-leave at bounds. Members are tried by exchange, too, and each has to be earned. The chosen set is
-compared with those in which another effect that explains as much stands for a part of it.
+leave at bounds. Members are tried by exchange, too, and each has to be earned.
 """
 
 from __future__ import annotations

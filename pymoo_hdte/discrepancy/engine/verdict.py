@@ -161,8 +161,11 @@ def judge(
     search.grow()
     search.leave_out_lacking()
     chosen = chosen_of(search)
-    complete(search, chosen)
-    chosen = chosen_of(search)
+    completed = set[frozenset[tuple[str, str]]]()
+    while chosen.names not in completed:
+        completed.add(chosen.names)
+        complete(search, chosen)
+        chosen = chosen_of(search)
     if replaced(search, chosen, [one for one in candidates if one.instead_of]):
         chosen = chosen_of(search)
     verdict = _verdict(search, answer_of(search, chosen, search.screened))

@@ -105,19 +105,6 @@ def test_a_model_takes_the_effects_and_its_file_gives_them_back(candidate, data)
     assert effects[0].name == named or not candidate.listed
 
 
-@pytest.mark.parametrize(
-    "candidate", [one for one in LISTED if one.name == "clearance_variation"], ids=label
-)
-@given(data=st.data())
-def test_a_play_that_varies_has_where_it_is_locked_a_width_that_it_has_elsewhere(candidate, data):
-    """A play that only the sweep showed was told as one that varies, by a thirtieth of it."""
-    (effect,) = candidate.build(data.draw(values_of(candidate)))
-    law = effect.law
-    beyond = abs(law.locked - law.half_width)
-    assert law.locked >= 0.0
-    assert beyond <= 2.0 * law.variation + 1e-9 * law.half_width
-
-
 @given(parts, parts, st.floats(-10.0, 10.0))
 def test_polar_is_the_same_wave(cosine, sine, angle):
     amplitude, phase = polar(cosine, sine)
