@@ -24,14 +24,17 @@ bench written apart took 50 at most."""
 def in_free_form(data: Evidence, fitted: Fit) -> Fit:
     """Return a set of effects fitted further with the sizes of its corrections as unknowns.
 
-    The same fit if none of them can be larger: see `_freed`.
+    So far as to rank it: around the end, what forms could still do is taken to first order. The
+    same fit if none of them can be larger: see `_freed`.
     """
     freed = [_freed(each, data.corrections(each) or ()) for each in fitted.candidates]
     start = [fitted.values[: fitted.n_base]]
     for (each, place), more in zip(fitted.places, freed, strict=True):
         start += [fitted.values[place], np.zeros(len(more.parameters) - len(each.parameters))]
     values = np.concatenate(start)
-    return fit(data, freed, values) if len(values) > len(fitted.values) else fitted
+    if len(values) == len(fitted.values):
+        return fitted
+    return fit(data, freed, values, settled=data.rules.trial_gain)
 
 
 def _freed(candidate: Candidate, corrections: Sequence[Any]) -> Candidate:
