@@ -276,7 +276,7 @@ def test_a_part_is_noise_if_it_has_neither_more_nor_less(of_records, noise):
 
 
 def test_two_effects_are_both_named():
-    data = planted({RIPPLE: (0.003, 0.0), LINE: (0.2 * ARCSEC, 0.0)})
+    data = planted({RIPPLE: (0.003, 0.0), LINE: (1.0 * ARCSEC, 0.0)})
     verdict = verdict_on(data, FEW)
     assert verdict.status == "named"
     assert labels_of(verdict) == {RIPPLE, LINE}
