@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from pymoo_hdte.discrepancy.engine.candidate import Candidate
 from pymoo_hdte.discrepancy.engine.fitting import Evidence, Fit
-from pymoo_hdte.discrepancy.engine.free_form import in_free_form
+from pymoo_hdte.discrepancy.engine.freed import in_free_form
 from pymoo_hdte.discrepancy.engine.hypothesis import (
     Hypothesis,
     adequate,
@@ -141,7 +141,7 @@ class AnyForm:
         return fitted, self.rest(fitted)
 
     def in_free_form(self, fitted: Fit) -> Fit:
-        """Return a fit with the form of its laws free: see `free_form`."""
+        """Return a fit with the form of its laws free: see `freed`."""
         if fitted not in self._free:
             self._free[fitted] = in_free_form(self.data, fitted)
         return self._free[fitted]

@@ -14,7 +14,7 @@ import numpy as np
 from pymoo_hdte.discrepancy.engine.candidate import Candidate
 from pymoo_hdte.discrepancy.engine.fitted_sets import Effects, FittedSets, may_be_together
 from pymoo_hdte.discrepancy.engine.fitting import Evidence, Fit
-from pymoo_hdte.discrepancy.engine.freed_parameters import freed_together, gain_of_freed
+from pymoo_hdte.discrepancy.engine.freed import freed_together, gain_of_freed
 from pymoo_hdte.discrepancy.engine.hypothesis import (
     Hypothesis,
     label_of,

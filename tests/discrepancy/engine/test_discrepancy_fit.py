@@ -12,7 +12,7 @@ from pymoo_hdte.discrepancy.drive.candidates import out_of_tolerance
 from pymoo_hdte.discrepancy.drive.objective import LOST, Objective
 from pymoo_hdte.discrepancy.engine.candidate import Layout
 from pymoo_hdte.discrepancy.engine.fitting import fit
-from pymoo_hdte.discrepancy.engine.freed_parameters import gain_of_freed
+from pymoo_hdte.discrepancy.engine.freed import gain_of_freed
 from pymoo_hdte.discrepancy.engine.hypothesis import expected_values
 from pymoo_hdte.discrepancy.engine.rules import RULES
 from pymoo_hdte.units import ARCSEC
