@@ -18,12 +18,11 @@ from pymoo_hdte.discrepancy.engine.search import Search
 def complete(search: Search, chosen: Hypothesis) -> None:
     """Fit the sets that may explain as much as a chosen one of several members by other laws.
 
-    Single effects have all been fitted alone, the best ones in other forms and from other starts.
+    Single effects need none: the best were fitted in other forms and from other starts.
     """
-    if len(chosen.members) > 1:
-        _with_other_parts(search, chosen)
-        _with_other_laws(search, chosen)
-        search.finish_near(len(chosen.members))
+    _with_other_parts(search, chosen)
+    _with_other_laws(search, chosen)
+    search.finish_near(len(chosen.members))
 
 
 def _with_other_parts(search: Search, chosen: Hypothesis) -> None:

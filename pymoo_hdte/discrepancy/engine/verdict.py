@@ -162,7 +162,7 @@ def judge(
     search.leave_out_lacking()
     chosen = chosen_of(search)
     completed = set[frozenset[tuple[str, str]]]()
-    while chosen.names not in completed:
+    while len(chosen.members) > 1 and chosen.names not in completed:
         completed.add(chosen.names)
         complete(search, chosen)
         chosen = chosen_of(search)
