@@ -13,7 +13,7 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import solve_triangular
+from scipy.linalg.lapack import dtrtrs
 
 from pymoo_hdte.discrepancy.campaign.campaign import Campaign
 from pymoo_hdte.discrepancy.campaign.known_values import of_equal_numbers
@@ -190,7 +190,7 @@ class Observations:
         for record, triangle in enumerate(self.whiteners):
             part = differences[..., record, :].reshape(-1, len(triangle)).T
             # Unknown values are NaN here and are counted as lost afterwards.
-            solved = solve_triangular(triangle, part, lower=True, check_finite=False)
+            solved, _ = dtrtrs(triangle, part, lower=True)
             white[..., record, :] = solved.T.reshape(differences[..., record, :].shape)
         return white.reshape(*differences.shape[:-2], -1)
 
