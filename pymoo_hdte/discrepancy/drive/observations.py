@@ -189,8 +189,9 @@ class Observations:
         white = np.empty_like(differences)
         for record, triangle in enumerate(self.whiteners):
             part = differences[..., record, :].reshape(-1, len(triangle)).T
-            # Unknown values are NaN here and are counted as lost afterwards.
-            solved, _ = dtrtrs(triangle, part, lower=True)
+            # Unknown values are NaN here and are counted as lost afterwards. LAPACK itself, which
+            # reads columns first: SciPy's checks would take several times as long.
+            solved, _ = dtrtrs(triangle.T, part, trans=True)
             white[..., record, :] = solved.T.reshape(differences[..., record, :].shape)
         return white.reshape(*differences.shape[:-2], -1)
 

@@ -39,7 +39,7 @@ HIGHEST = 8
 """Least number of harmonics of the input turn that are kept."""
 STEPS = 50
 """Most steps of Newton's method."""
-PATIENCE = 15
+_PATIENCE = 15
 """Steps without halving what is left, after which a row counts as lost.
 
 Of 353,000 cases that converged in twelve campaigns of the virtual rig, 21 waited for longer; of 180
@@ -75,7 +75,6 @@ def harmonic_balance(
     tolerance: float = 1e-11,
     start: SteadyMotion | None = None,
     steps: int = STEPS,
-    patience: int = PATIENCE,
     tangents: bool = False,
 ) -> SteadyMotion:
     """Return the steady state of the n designs of ``coefficients``, laws at ports included.
@@ -100,9 +99,8 @@ def harmonic_balance(
     start : SteadyMotion, optional
         Nearby cases, a row each, to begin from; ignored if their torus is another.
     steps : int
-        Most steps of Newton's method; a row that would need more has not converged.
-    patience : int
-        Steps after which a row counts as lost if they have not halved what was left.
+        Most steps of Newton's method; a row that would need more, or that does not halve what is
+        left in fifteen of them, has not converged.
     tangents : bool
         Whether the result is to serve as ``start`` of cases that take steps with its matrices as
         long as these shrink fast; it then holds all that it was found from.
@@ -140,8 +138,7 @@ def harmonic_balance(
         solver = _Solver(equations, None if start is None else start.rows(rows))
         # A row that diverges is marked as not converged; its values are meaningless.
         with np.errstate(over="ignore", invalid="ignore"):
-            factors = _factors(start, rows, len(equations.speed))
-            solver.solve(tolerance, steps, patience, factors)
+            solver.solve(tolerance, steps, _factors(start, rows, len(equations.speed)))
         solvers.append(solver)
     parts = [solver.result() for solver in solvers]
     values = [np.concatenate([getattr(part, name) for part in parts]) for name in BY_CASE]
@@ -207,9 +204,7 @@ class _Solver:
                 self.torsion = np.where(kept, near.torsion, self.torsion)
                 self.energy = np.where(kept, near.energy, self.energy)
 
-    def solve(
-        self, tolerance: float, steps: int, patience: int, factors: list[Factors | None]
-    ) -> None:
+    def solve(self, tolerance: float, steps: int, factors: list[Factors | None]) -> None:
         """Iterate until the torsion converges; rows that do not are marked.
 
         Steps are taken with the matrices of nearby cases, ``factors``, as long as they shrink fast.
@@ -247,7 +242,7 @@ class _Solver:
             halved = distance <= least / 2.0
             least = np.where(halved, distance, least)
             waited = np.where(halved, 0, waited + 1)
-            lost = ~settled & (waited >= patience)
+            lost = ~settled & (waited >= _PATIENCE)
             if np.all(settled | lost):
                 break
             # A lost row leaves at once, so that none is found for the company that it is in. Once
