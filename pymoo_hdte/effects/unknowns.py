@@ -19,6 +19,8 @@ HARMONIC_NAMES = ("", "second_", "third_", "fourth_", "fifth_")
 """Prefixes of the parameters of a line's harmonics; higher ones are lines of their own."""
 _HARMONIC_SHARE = 0.2
 """Typical size of a further harmonic, as a share of the first."""
+_COSINE, _SINE = "_cosine", "_sine"
+"""Endings of the names of the two parts of a line."""
 
 
 @dataclass(frozen=True)
@@ -48,6 +50,17 @@ class Parameter:
     prior: float = np.inf
     linear: bool = False
     open_above: bool = False
+
+    @property
+    def line(self) -> str:
+        """Name of the line that it is a part of; empty for other unknowns."""
+        found = self.name.removesuffix(_COSINE).removesuffix(_SINE)
+        return "" if found == self.name else found
+
+    @property
+    def begins_line(self) -> bool:
+        """Whether it is the cosine part of a line, which the sine part follows."""
+        return self.name.endswith(_COSINE)
 
     def limited_at(self, side: float) -> bool:
         """Tell whether a value is limited that ended at a side: -1 lower, 1 upper, 0 neither."""
@@ -92,8 +105,8 @@ def wave(
 def _parts(name: str, start: float, largest: float, size: float) -> list[Parameter]:
     """Return cosine and sine part of one line."""
     return [
-        Parameter(f"{name}_{part}", begin, -largest, largest, size, linear=True)
-        for part, begin in (("cosine", start), ("sine", 0.0))
+        Parameter(f"{name}{part}", begin, -largest, largest, size, linear=True)
+        for part, begin in ((_COSINE, start), (_SINE, 0.0))
     ]
 
 

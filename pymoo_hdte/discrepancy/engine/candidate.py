@@ -146,6 +146,11 @@ class Candidate:
         return all(one.linear for one in self.parameters)
 
     @property
+    def lines(self) -> list[int]:
+        """Where the lines of its law begin among its parameters: at a cosine, then the sine."""
+        return [row for row, one in enumerate(self.parameters) if one.begins_line]
+
+    @property
     def is_curve(self) -> bool:
         """Whether it is a law without memory, order or exact form: one curve of a motion."""
         return not (self.exact or self.remembers) and self.order is None

@@ -154,7 +154,7 @@ def strength_is_certain(fitted: Fit, candidate: Candidate, place: slice, rules: 
     if varies(candidate, values[place], fitted.covariance[place, place], rules):
         return True
     for row, parameter in enumerate(candidate.parameters, place.start):
-        if parameter.lower <= 0.0 and not parameter.name.endswith(("_cosine", "_sine")):
+        if parameter.lower <= 0.0 and not parameter.line:
             deviation = np.sqrt(fitted.covariance[row, row])
             if abs(values[row]) > rules.certain_deviations * deviation:
                 return True
@@ -166,14 +166,9 @@ def varies(
 ) -> bool:
     """Tell whether any line of a law differs from nothing, by values (k,) and covariance (k, k)."""
     limit = chi2.isf(2.0 * norm.sf(rules.certain_deviations), 2)
-    pairs = [np.array([row, row + 1]) for row in lines_of_law(law)]
+    pairs = [np.array([row, row + 1]) for row in law.lines]
     blocks = (covariance[np.ix_(pair, pair)] for pair in pairs)
     return any(
         values[pair] @ np.linalg.solve(block, values[pair]) > limit
         for pair, block in zip(pairs, blocks, strict=True)
     )
-
-
-def lines_of_law(law: Candidate) -> list[int]:
-    """Return where the parts of each line stand among the unknowns of a law: cosine, then sine."""
-    return [row for row, one in enumerate(law.parameters) if one.name.endswith("_cosine")]

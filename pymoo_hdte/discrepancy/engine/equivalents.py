@@ -23,7 +23,6 @@ from pymoo_hdte.discrepancy.engine.choice import (
 from pymoo_hdte.discrepancy.engine.doubts import (
     doubts_of,
     explains_in_any_form,
-    lines_of_law,
     varies,
 )
 from pymoo_hdte.discrepancy.engine.fitting import Fit
@@ -200,7 +199,7 @@ def _may_vary_as_much(
 ) -> bool:
     """Tell whether a line that a law adds may be as strong as its special case, by its interval."""
     place, strength = _place(of_law, law), _strength(of_case, case)
-    for row in lines_of_law(law):
+    for row in law.lines:
         pair = place.start + np.array([row, row + 1])
         spread = np.linalg.eigvalsh(of_law.covariance[np.ix_(pair, pair)])[-1] ** 0.5
         largest = np.hypot(*of_law.values[pair]) + rules.certain_deviations * spread
@@ -216,7 +215,7 @@ def _is_its_form(of_law: Fit, law: Candidate, of_case: Fit, case: Candidate, rul
     the width of a play where the input was locked, does not show that it varies.
     """
     place = _place(of_law, law)
-    if lines_of_law(law):
+    if law.lines:
         return not varies(law, of_law.values[place], of_law.covariance[place, place], rules)
     shared = {one.name for one in case.parameters}
     further = [

@@ -214,18 +214,18 @@ def _parameters(
         rows = [[one.name for one in fitted.parameters].index(candidate.frees)]
     values = expected_values(fitted, rules)
     for row in rows:
-        name = fitted.parameters[row].name
-        if name.endswith("_cosine"):
+        one = fitted.parameters[row]
+        if one.begins_line:
             pair = np.array([row, row + 1])
             own = (accuracy * np.hypot(*values[pair]) / _DEVIATIONS) ** 2 * np.eye(2)
             covariance = fitted.covariance[np.ix_(pair, pair)] + own
-            found |= _line(name.removesuffix("_cosine"), candidate, values[pair], covariance)
-        elif not name.endswith("_sine"):
+            found |= _line(one.line, candidate, values[pair], covariance)
+        elif not one.line:
             own = float(accuracy * values[row] / _DEVIATIONS) ** 2
             variance = fitted.covariance[row, row] + own
             # A time or a torsion of a law is above zero, however little the data say of it.
-            least = 0.0 if fitted.parameters[row].lower > 0.0 else -np.inf
-            found[name] = quantity(values[row], variance, _unit(candidate, name), least)
+            least = 0.0 if one.lower > 0.0 else -np.inf
+            found[one.name] = quantity(values[row], variance, _unit(candidate, one.name), least)
     return found
 
 

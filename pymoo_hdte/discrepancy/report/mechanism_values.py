@@ -82,19 +82,18 @@ def _parameters(fitted: Fit, spread: Spread, rows: range) -> dict[str, Any]:
     for row in rows:
         parameter, value = fitted.parameters[row], float(fitted.values[row])
         name, reach = parameter.name, float(spread.reach[row])
-        if name.endswith("_sine"):
-            continue
-        if not name.endswith("_cosine"):
+        if not parameter.line:
             # The fit could not exceed its bounds.
             bounds = parameter.lower, parameter.upper
             found[name] = _with_interval(value, spread.covariance[row, row], reach, *bounds)
             found[name]["at_bound"] = bool(fitted.bound_sides[row])
+        if not parameter.begins_line:
             continue
         pair = slice(row, row + 2)
         cosine, sine = fitted.values[pair]
         amplitude, phase = line_with_variance(cosine, sine, spread.covariance[pair, pair])
         reach = float(spread.reach[pair].max())
-        name = name.removesuffix("_cosine")
+        name = parameter.line
         found[name] = _with_interval(*amplitude, reach, lower=0.0)
         found[f"{name}_phase"] = _with_interval(*phase, reach)
         for one in (name, f"{name}_phase"):

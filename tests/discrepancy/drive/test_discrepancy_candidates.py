@@ -154,6 +154,10 @@ def test_starts_of_a_wave_span_its_parts(typical, further):
     assert np.count_nonzero(starts) == 2 * len(harmonics)
     assert np.max(starts) == typical
     assert len({parameter.name for parameter in unknowns}) == 2 * len(harmonics)
+    # Each line begins with its cosine, and both of its parts know of it.
+    assert [one.begins_line for one in unknowns] == [True, False] * len(harmonics)
+    assert all(one.line.endswith("amplitude") for one in unknowns)
+    assert [one.line for one in unknowns[::2]] == [one.line for one in unknowns[1::2]]
 
 
 def test_cosine_and_sine_are_real_and_imaginary_part_of_the_static_error():
