@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from pymoo_hdte.checks import InvalidInput
@@ -46,6 +46,7 @@ def test_constant_lines_do_not_count():
 
 @settings(max_examples=40, deadline=None)
 @given(st.lists(phasor, min_size=4, max_size=4))
+@example([0j, 5e-324 + 0j, 5e-324 + 0j, 0j])
 def test_never_below_and_barely_above_a_dense_grid(phasors):
     spectrum = OrderSpectrum(np.array([1.0, 2.0, 2.02, 4.02]), np.array([phasors]))
     exact = spectrum.peak_to_peak(RATIO)[0]

@@ -233,7 +233,8 @@ def _high_points(
         return columns, np.where(columns <= last, values, -np.inf)
 
     _, values = over_turns(every_row, np.argmax(envelope, axis=1))
-    reached = values.max(axis=1)
+    # Rounding may lift the values of the smallest numbers above their envelope.
+    reached = np.minimum(values.max(axis=1), envelope.max(axis=1))
     rows, points = np.nonzero(envelope >= (reached - rise)[:, None])
     columns, values = over_turns(rows, points)
     first = np.searchsorted(rows, every_row)
