@@ -15,6 +15,7 @@ from pymoo_hdte.drive import (
 )
 from pymoo_hdte.drive.effects import LawAtPort
 from pymoo_hdte.drive.solve.free_angle import continued_from_neighbours, harmonic_balance
+from pymoo_hdte.effects.friction import CoulombFriction
 from pymoo_hdte.effects.stiffness import SoftWindup
 
 MODEL = preset("calibrated")
@@ -88,6 +89,19 @@ def test_a_lost_design_is_lost_in_any_company(soft, monkeypatch, patience):
     alone = [harmonic_balance(coefficients.rows([row])).converged[0] for row in range(40)]
     assert together.tolist() == alone
     assert 0 < together.sum() < 40
+
+
+@pytest.mark.parametrize("share", [1.0, 0.1, 0.01])
+@pytest.mark.parametrize("level", [7.0, 35.0])
+def test_friction_winds_up_a_precise_drive_without_load(share, level):
+    """Steps were as long as the static error at most, and fifteen of them did not lead there."""
+    plain = MODEL.coefficients(MODEL.nominal[np.newaxis])
+    small = replace(plain, error_phasors=share * plain.error_phasors)
+    rubbing = replace(small, laws=(("output", CoulombFriction(level)),))
+    found = harmonic_balance(rubbing, load_torque=np.zeros(1))
+    assert found.converged.all()
+    held = rubbing.stiffness * found.torsion[:, 0].real
+    assert held == pytest.approx(level, rel=1e-2)
 
 
 def test_the_dte_of_a_drive_uses_them(soft, monkeypatch):

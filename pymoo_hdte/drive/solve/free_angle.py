@@ -219,7 +219,9 @@ class _Solver:
             missing = np.flatnonzero(own)
             for row, one in zip(missing, at.factors(missing), strict=True):
                 factors[row] = one
-            change, energy_change = at.newton_step(size[left], factors)
+            # A friction may wind up the drive by many times what holds it at the start.
+            most = np.maximum(size[left], np.abs(at.torsion[:, :1]))
+            change, energy_change = at.newton_step(most, factors)
             longest = np.abs(change).max(axis=1)
             shrinks = longest <= _SHRINKS * before
             # With the matrix of another place a short step alone does not tell that it has arrived.
