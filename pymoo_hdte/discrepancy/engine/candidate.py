@@ -146,9 +146,10 @@ class Candidate:
         return all(one.linear for one in self.parameters)
 
     @property
-    def lines(self) -> list[int]:
-        """Where the lines of its law begin among its parameters: at a cosine, then the sine."""
-        return [row for row, one in enumerate(self.parameters) if one.begins_line]
+    def lines(self) -> list[NDArray[np.int_]]:
+        """Where cosine and sine part of each line of its law stand among its parameters, (2,)."""
+        begins = [row for row, one in enumerate(self.parameters) if one.begins_line]
+        return [np.array([row, row + 1]) for row in begins]
 
     @property
     def is_curve(self) -> bool:

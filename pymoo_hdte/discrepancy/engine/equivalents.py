@@ -199,8 +199,8 @@ def _may_vary_as_much(
 ) -> bool:
     """Tell whether a line that a law adds may be as strong as its special case, by its interval."""
     place, strength = _place(of_law, law), _strength(of_case, case)
-    for row in law.lines:
-        pair = place.start + np.array([row, row + 1])
+    for line in law.lines:
+        pair = place.start + line
         spread = np.linalg.eigvalsh(of_law.covariance[np.ix_(pair, pair)])[-1] ** 0.5
         largest = np.hypot(*of_law.values[pair]) + rules.certain_deviations * spread
         if largest >= strength:

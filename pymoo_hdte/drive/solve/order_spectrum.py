@@ -232,9 +232,10 @@ def _high_points(
         values = grid.values(rows[:, None], columns)
         return columns, np.where(columns <= last, values, -np.inf)
 
-    _, values = over_turns(every_row, np.argmax(envelope, axis=1))
+    highest_there = np.argmax(envelope, axis=1)
+    _, values = over_turns(every_row, highest_there)
     # Rounding may lift the values of the smallest numbers above their envelope.
-    reached = np.minimum(values.max(axis=1), envelope.max(axis=1))
+    reached = np.minimum(values.max(axis=1), envelope[every_row, highest_there])
     rows, points = np.nonzero(envelope >= (reached - rise)[:, None])
     columns, values = over_turns(rows, points)
     first = np.searchsorted(rows, every_row)
