@@ -11,6 +11,7 @@ import numpy as np
 from moocore import pareto_rank
 from pymoo.core.problem import Problem
 from pymoo.util.nds.non_dominated_sorting import NonDominatedSorting
+from threadpoolctl import threadpool_limits
 
 from experiments.blind.cases import BELIEVED, RIG
 from experiments.comparison.runs import robust_problem
@@ -22,7 +23,7 @@ from pymoo_hdte.drive import harmonic_balance, preset, simulate_drive
 from pymoo_hdte.problems import Design, Mean, RobustDTE, Std
 from pymoo_hdte.problems.simulator.inputs import Inputs
 from pymoo_hdte.problems.simulator.problem import SimulatorProblem
-from pymoo_hdte.surrogate.sparse.adaptive import AdaptiveFit
+from pymoo_hdte.surrogate.sparse.adaptive import AdaptiveFit, fit_adaptively
 from pymoo_hdte.surrogate.sparse.moments import SparseMoments
 from pymoo_hdte.surrogate.sparse.polynomial import SparsePolynomial
 from pymoo_hdte.surrogate.threads import usable_cores
@@ -32,6 +33,7 @@ from pymoo_hdte.virtual.rig import draw_rig, run_campaign
 N_POINTS = 1000
 SORTED = 200
 N_DESIGNS = 1_000_000
+N_RUNS = 160
 REPEATS = 5
 OUR_STUDY = (
     "from pymoo_hdte.algorithms import ElitistSwarm; from pymoo_hdte.problems import RobustDTE; "
@@ -45,6 +47,7 @@ def ratios_of_parts() -> Iterator[Ratio]:
     yield _imports()
     yield _surrogate()
     yield from _many_designs()
+    yield _growth()
     yield _harmonic_balance()
     yield from _sorting()
     yield _discrepancy()
@@ -115,6 +118,29 @@ def _of_degree_5() -> SimulatorProblem:
         polynomial, moments, none, none, 0, none, no_points, no_points, np.empty((0, 1))
     )
     return SimulatorProblem(inputs, fit, ("y",), (Mean(), Std()), (), 0)
+
+
+def _growth() -> Ratio:
+    """Measure whether libraries with a thread a core hold up growth, which fits on one."""
+    axes = Inputs({name: Design(1.0, 2.0, tolerance=0.05) for name in "abcd"}, {}).axes
+
+    def grow() -> None:
+        rng = np.random.default_rng(6)
+        fit_adaptively(axes, lambda cube: np.exp(-np.abs(cube[:, :1])), 0.001, N_RUNS, rng)
+
+    times = []
+    for threads in (usable_cores(), 1):
+        with threadpool_limits(threads):
+            times.append(best_time(grow, 2))
+    return Ratio(
+        f"growth of a surrogate to {N_RUNS} runs",
+        f"libraries with {usable_cores()} threads",
+        times[0],
+        "with one",
+        times[1],
+        "less than 1.25",
+        times[0] < 1.25 * times[1],
+    )
 
 
 def _harmonic_balance() -> Ratio:

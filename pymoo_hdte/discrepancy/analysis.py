@@ -16,8 +16,8 @@ from pymoo_hdte.discrepancy.mechanism.analysis import examine_mechanism
 from pymoo_hdte.discrepancy.mechanism.files import MeasuredMechanism
 from pymoo_hdte.discrepancy.mechanism.held_out import Progress
 from pymoo_hdte.discrepancy.mechanism_analysis import JointAnalysis, MechanismAnalysis
-from pymoo_hdte.discrepancy.one_thread import ONE_THREAD
 from pymoo_hdte.effects.effect import Effect, register
+from pymoo_hdte.one_thread import ONE_THREAD
 
 
 @overload

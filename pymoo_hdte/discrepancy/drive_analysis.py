@@ -13,9 +13,9 @@ from pymoo_hdte.discrepancy.drive.next_test import Proposal, next_experiment
 from pymoo_hdte.discrepancy.drive.proof import Proof, prove
 from pymoo_hdte.discrepancy.drive.revision import revised_model
 from pymoo_hdte.discrepancy.engine.verdict import Verdict
-from pymoo_hdte.discrepancy.one_thread import ONE_THREAD
 from pymoo_hdte.discrepancy.report.folder import check_report_folder
 from pymoo_hdte.drive import DriveModel
+from pymoo_hdte.one_thread import ONE_THREAD
 
 
 class DriveAnalysis:

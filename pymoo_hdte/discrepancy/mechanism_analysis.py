@@ -15,8 +15,8 @@ from pymoo_hdte.discrepancy.mechanism.models import MechanismModel
 from pymoo_hdte.discrepancy.mechanism.next_tests import NextTest, next_test
 from pymoo_hdte.discrepancy.mechanism.proof import MeasuredGap, prove_measured
 from pymoo_hdte.discrepancy.mechanism.revision import revised_mechanism
-from pymoo_hdte.discrepancy.one_thread import ONE_THREAD
 from pymoo_hdte.discrepancy.report.folder import check_report_folder
+from pymoo_hdte.one_thread import ONE_THREAD
 
 
 class MechanismAnalysis:

@@ -12,8 +12,9 @@ ROOT = Path(pymoo_hdte.__file__).parent
 EXPERIMENTS = Path(experiments.__file__).parent
 TESTS = Path(__file__).parents[1]
 LOWEST_FIRST = (
-    *("checks", "lazy", "units", "compilation", "interrupts", "io", "effects", "reports"),
-    *("drive.solve", "drive.effects", "drive", "mechanism", "surrogate", "surrogate.sparse"),
+    *("checks", "lazy", "units", "compilation", "one_thread", "interrupts", "io", "effects"),
+    *("reports", "drive.solve", "drive.effects", "drive", "mechanism"),
+    *("surrogate", "surrogate.sparse"),
     "validation",
     "identification",
     *(

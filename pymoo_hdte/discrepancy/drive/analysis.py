@@ -7,7 +7,6 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
-from threadpoolctl import threadpool_limits
 
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy.campaign.campaign import Campaign
@@ -33,6 +32,7 @@ from pymoo_hdte.discrepancy.engine.verdict import Verdict, judge
 from pymoo_hdte.drive import SpeedLoop, harmonic_balance
 from pymoo_hdte.drive.solve.free_angle import torus_of
 from pymoo_hdte.effects.effect import effect_named
+from pymoo_hdte.one_thread import ONE_THREAD
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,7 +80,7 @@ def expected_orders(campaign: Campaign, rules: Rules = RULES) -> list[float]:
     return _apart(wanted, campaign, _error_lines(campaign, rules), rules)
 
 
-@threadpool_limits.wrap(limits=1)
+@ONE_THREAD
 def examine_drive(campaign: Campaign, rules: Rules = RULES) -> DriveFinding:
     """Return the verdict on a campaign.
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from pymoo_hdte.one_thread import ONE_THREAD
 from pymoo_hdte.surrogate.sparse.axes import Axis
 from pymoo_hdte.surrogate.sparse.draws import (
     SpreadPoints,
@@ -136,6 +137,8 @@ class _Growth:
         self.points = np.concatenate([self.points, points])
         self.truth = np.concatenate([self.truth.reshape(-1, values.shape[1]), values])
 
+    # Not the function: a user's program keeps its threads.
+    @ONE_THREAD
     def judge(self) -> AdaptiveFit:
         """Fit the surrogate to the runs, and measure it."""
         good = np.isfinite(self.truth).all(axis=1)

@@ -3,9 +3,11 @@
 import chaospy
 import numpy as np
 import pytest
+from threadpoolctl import threadpool_info, threadpool_limits
 
 from pymoo_hdte.problems import Design
 from pymoo_hdte.problems.simulator.inputs import Inputs
+from pymoo_hdte.surrogate.sparse import adaptive
 from pymoo_hdte.surrogate.sparse import regression as module
 from pymoo_hdte.surrogate.sparse.adaptive import fit_adaptively
 from pymoo_hdte.surrogate.sparse.draws import SpreadPoints, draw_around, draw_designs
@@ -86,3 +88,24 @@ def test_a_polynomial_of_few_terms_is_found_to_rounding():
     assert fit.n_runs < 80
     cube = np.random.default_rng(7).uniform(-1.0, 1.0, (50, 3))
     assert fit.polynomial(cube) == pytest.approx(function(cube), rel=1e-9, abs=1e-9)
+
+
+def test_growth_fits_on_one_thread_and_leaves_the_function_its_own(monkeypatch):
+    # With two threads that wait for each other growth took five times as long.
+    threads = {"function": set(), "fit": set()}
+
+    def noted(what, call):
+        def noting(*given):
+            threads[what] |= {library["num_threads"] for library in threadpool_info()}
+            return call(*given)
+
+        return noting
+
+    def function(cube):
+        return np.exp(cube.sum(axis=1, keepdims=True))
+
+    monkeypatch.setattr(adaptive, "fitted", noted("fit", adaptive.fitted))
+    with threadpool_limits(2):
+        rng = np.random.default_rng(8)
+        adaptive.fit_adaptively(INPUTS.axes, noted("function", function), 0.1, 40, rng)
+    assert threads == {"function": {2}, "fit": {1}}

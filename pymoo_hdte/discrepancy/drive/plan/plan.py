@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from threadpoolctl import threadpool_limits
 
 from pymoo_hdte.discrepancy.drive.plan.changes import signatures_of, stated_orders
 from pymoo_hdte.discrepancy.drive.plan.choice import Aims, smallest_set
@@ -22,6 +21,7 @@ from pymoo_hdte.discrepancy.drive.plan.limits import PlanLimits
 from pymoo_hdte.discrepancy.drive.plan.signatures import Counts
 from pymoo_hdte.discrepancy.engine.rules import RULES, Rules
 from pymoo_hdte.drive import DriveModel
+from pymoo_hdte.one_thread import ONE_THREAD
 from pymoo_hdte.units import REVOLUTION_PER_MINUTE
 
 
@@ -110,7 +110,7 @@ class Plan:
         }
 
 
-@threadpool_limits.wrap(limits=1)
+@ONE_THREAD
 def plan_tests(
     model: DriveModel,
     limits: PlanLimits,
