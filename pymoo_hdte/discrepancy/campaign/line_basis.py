@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property, reduce
+from functools import cached_property, partial
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -91,19 +92,32 @@ class LineFit:
         return replace(self, whole=whole, triangle=triangle @ self.triangle)
 
     @cached_property
-    def projections(self) -> tuple[NDArray[np.float64], ...]:
-        """Parts in the basis of the channels, shape (p, 4), of bends, (p, 3), and of decays.
+    def projections(self) -> NDArray[np.float64]:
+        """Parts of the channels in the basis, shape (p, 4)."""
+        return self._projected(self.values)
 
-        The bends are (t - t_mid)^k / k! for k = 2, 3, 4. Decays, (p, 6), fall from one at the first
-        row, with the time constants `FADING`.
+    @cached_property
+    def bends(self) -> NDArray[np.float64]:
+        """Parts in the basis of (t - t_mid)^k / k! for k = 2, 3, 4, shape (p, 3)."""
+        return self._projected(partial(_bent, self.record))
+
+    @cached_property
+    def fading(self) -> NDArray[np.float64]:
+        """Parts in the basis of decays from one at the first row, shape (p, 6).
+
+        Their time constants are `FADING`.
         """
-        each = zip(*map(self._project, self.parts), strict=True)
-        return tuple(np.asarray(reduce(np.add, one)) for one in each)
+        constants = np.ptp(self.record.time) * np.array(FADING)
+        return self._projected(lambda part: decays(self.record, part, constants))
+
+    def _projected(self, signals: Callable[[slice], NDArray[np.float64]]) -> NDArray[np.float64]:
+        """Return the parts in the basis of signals, which are given for some rows, (b, k)."""
+        return np.sum([self.basis(part).T @ signals(part) for part in self.parts], axis=0)
 
     @property
     def coefficients(self) -> NDArray[np.float64]:
         """Of the columns, for each channel; the last are what the repair of jumps left, (p, 4)."""
-        return np.asarray(np.linalg.solve(self.triangle, self.projections[0]))
+        return np.asarray(np.linalg.solve(self.triangle, self.projections))
 
     def basis(self, part: slice) -> NDArray[np.float64]:
         """Return the orthonormal columns that the lines span, of some rows, shape (b, p)."""
@@ -125,31 +139,44 @@ class LineFit:
 
     def residual(self, part: slice, basis: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return what the lines leave of the channels in some rows, shape (b, 4)."""
-        return self.values(part) - basis @ self.projections[0]
+        return self.values(part) - basis @ self.projections
 
     @property
     def whole_residual(self) -> NDArray[np.float64]:
         """What the lines leave of the channels in all rows, shape (n, 4)."""
         return np.vstack([self.residual(part, self.basis(part)) for part in self.parts])
 
-    def _project(self, part: slice) -> tuple[NDArray[np.float64], ...]:
-        """Return what some rows add to the parts in the basis of channels, bends and decays."""
-        basis, constants = self.basis(part).T, np.ptp(self.record.time) * np.array(FADING)
-        fading = decays(self.record, part, constants)
-        return basis @ self.values(part), basis @ _bent(self.record, part), basis @ fading
-
 
 def _design(record: RunningRecord, orders: NDArray[np.float64], part: slice) -> NDArray[np.float64]:
     """Return the columns of the fit in some rows, (b, p), as `LineFit` has them."""
-    angle = np.outer(record.input_angle[part], orders)
+    waves = _waves(record.input_angle[part], orders)
     time = centred(record, part)
     settling = []
     if record.settling is not None:
         (ending,) = decays(record, part, np.array([record.settling])).T
         settling = [ending, ending * (record.time[part] - record.time[0]) / record.settling]
     steps = [record.time[part] >= jump.time for jump in record.jumps]
-    lines = np.cos(angle), -np.sin(angle)
-    return np.column_stack([np.ones_like(time), time, *lines, *settling, *steps])
+    lines = waves.real, -waves.imag
+    return np.vstack([np.ones_like(time), time, *lines, *settling, *steps]).T
+
+
+def _waves(angle: NDArray[np.float64], orders: NDArray[np.float64]) -> NDArray[np.complex128]:
+    """Return exp(i order angle) at angles (b,) for orders (m,), shape (m, b).
+
+    An order that is the sum of two others is their product: most are, as sums of lines are orders.
+    """
+    waves = np.empty((len(orders), len(angle)), dtype=complex)
+    places = dict[float, int]()
+    for place in np.argsort(orders).tolist():
+        order = float(orders[place])
+        parts = next(((one, order - one) for one in places if order - one in places), None)
+        if parts is None:
+            waves[place].real, waves[place].imag = np.cos(order * angle), np.sin(order * angle)
+        else:
+            one, other = (waves[places[part]] for part in parts)
+            np.multiply(one, other, out=waves[place])
+        places[order] = place
+    return waves
 
 
 def _orthonormal(design: NDArray[np.float64], triangle: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -154,8 +154,8 @@ def order_lines(
         phasors=phasors,
         covariance=covariance,
         row_covariance=noise,
-        bends=assigned(fit.projections[1]),
-        fading=assigned(fit.projections[2]),
+        bends=assigned(fit.bends),
+        fading=assigned(fit.fading),
     )
 
 

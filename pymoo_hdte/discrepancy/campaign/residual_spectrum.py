@@ -71,18 +71,17 @@ def residual_spectrum(
     """
     fit = LineFit.of(record, ratio, orders)
     highest = min(highest_order, nyquist_order(record))
-    multiples = np.arange(1, int(np.ceil(highest * ratio - 1e-9)))
-    whole = ratio * np.arange(1, int(np.ceil(highest - 1e-9)))
+    multiples = int(np.ceil(highest * ratio - 1e-9)) - 1
+    whole = ratio * np.arange(1.0, np.ceil(highest - 1e-9))
     whole = whole[np.abs(whole - whole.round()) > 1e-9]
-    lines = np.concatenate([multiples, whole]).astype(float)
     sigma = np.sqrt(np.diag(row_covariance(rig, ratio, record.samples_averaged)))
     sums = []
     for part in fit.parts:
         basis = fit.basis(part)
         rows = np.hstack([basis, fit.residual(part, basis) / sigma]).T
-        sums.append(_Sums.of(rows, record.input_angle[part] / ratio, lines))
+        sums.append(_Sums.of(rows, record.input_angle[part] / ratio, multiples, whole))
     separate, amplitudes = reduce(_Sums.plus, sums).amplitudes(len(record.time))
-    searched = lines[separate] / ratio
+    searched = np.concatenate([np.arange(1, multiples + 1), whole])[separate] / ratio
     rising = np.argsort(searched)
     return searched[rising], amplitudes[:, rising]
 
@@ -99,13 +98,27 @@ class _Sums:
 
     @classmethod
     def of(
-        cls, rows: NDArray[np.float64], angle: NDArray[np.float64], lines: NDArray[np.float64]
+        cls,
+        rows: NDArray[np.float64],
+        angle: NDArray[np.float64],
+        multiples: int,
+        others: NDArray[np.float64],
     ) -> _Sums:
-        """Sum over rows at angles (n,) with waves exp(i line angle)."""
-        # Type 3: neither the angles nor the lines need be evenly spaced.
-        transform = partial(finufft.nufft1d3, isign=1, eps=SUM_ERROR, nthreads=1)
-        products = transform(angle, np.ascontiguousarray(rows, dtype=complex), lines)
-        return cls(products, transform(angle, np.ones(len(angle), complex), 2.0 * lines))
+        """Sum over rows at angles (n,) with waves exp(i line angle).
+
+        Lines are 1, 2, .. up to ``multiples``, and then the others.
+        """
+        one = np.ones((1, len(angle)))
+        products = _whole_sums(rows, angle, multiples)
+        squares = _whole_sums(one, 2.0 * angle, multiples)
+        if others.size:
+            # Type 3: neither the angles nor the lines need be evenly spaced.
+            transform = partial(finufft.nufft1d3, isign=1, eps=SUM_ERROR, nthreads=1)
+            more = transform(angle, rows.astype(complex, order="C"), others)
+            products = np.hstack([products, more])
+            more = transform(angle, one.astype(complex), 2.0 * others)
+            squares = np.hstack([squares, more])
+        return cls(products, squares[0])
 
     def plus(self, more: _Sums) -> _Sums:
         """Return the sums over the rows of both."""
@@ -126,3 +139,19 @@ class _Sums:
         chi_square = 2.0 * (np.abs(products) ** 2 * power - np.real(products**2 * square.conj()))
         chi_square /= power**2 - np.abs(square) ** 2
         return separate, np.sqrt(chi_square / 2.0)
+
+
+def _whole_sums(
+    rows: NDArray[np.float64], angle: NDArray[np.float64], count: int
+) -> NDArray[np.complex128]:
+    """Return sums of real rows (q, n) with exp(i k angle), k = 1 .. count, shape (q, count).
+
+    Two rows in one transform: of real ones the sum at -k is the conjugate of that at k.
+    """
+    half = (len(rows) + 1) // 2
+    pairs = rows[:half].astype(complex, order="C")
+    pairs.imag[: len(rows) - half] = rows[half:]
+    sums = finufft.nufft1d1(angle, pairs, 2 * count + 1, isign=1, eps=SUM_ERROR, nthreads=1)
+    above, below = sums[..., count + 1 :], sums[..., :count][..., ::-1].conj()
+    found = np.vstack([above + below, -1j * (above - below)])[: len(rows)] / 2.0
+    return np.asarray(found, dtype=complex)
