@@ -166,14 +166,17 @@ def step(residual: Rows, lines: Lines, deviations: float, rules: Rules) -> Step 
         Least size in standard deviations of its own.
     rules : Rules
     """
-    if scatter(residual) == 0.0:
+    noise = scatter(residual)
+    if noise == 0.0:
         return None
-    found = [_step_in_windows(residual, half, deviations, rules) for half in WINDOWS]
-    found.append(_step_in_record(residual, lines, deviations, rules))
+    found = [_step_in_windows(residual, noise, half, deviations, rules) for half in WINDOWS]
+    found.append(_step_in_record(residual, noise, lines, deviations, rules))
     return max((one for one in found if one), key=lambda one: one.deviations, default=None)
 
 
-def _step_in_windows(residual: Rows, half: int, deviations: float, rules: Rules) -> Step | None:
+def _step_in_windows(
+    residual: Rows, noise: float, half: int, deviations: float, rules: Rules
+) -> Step | None:
     """Return the clearest jump in windows of ``half`` rows before and as many after."""
     if len(residual) < 2 * half * _WINDOWS_IN_RECORD:
         return None
@@ -182,14 +185,17 @@ def _step_in_windows(residual: Rows, half: int, deviations: float, rules: Rules)
     # Nearer to an end than this there are too few rows to tell a jump from a disturbance.
     edge = max(_LEAST_ROWS - half, 0)
     sizes[:edge] = sizes[len(sizes) - edge :] = 0.0
-    usual = max(deviation * scatter(residual), _DEVIATION * float(np.median(np.abs(sizes))))
-    peaks = _peaks(np.abs(sizes), rules.most_jumps + 1, 2 * half)
-    common = float(np.abs(sizes[peaks[-1]])) if len(peaks) > rules.most_jumps else 0.0
+    heights = np.abs(sizes)
+    if not heights.max() > deviations * deviation * noise:
+        return None
+    usual = max(deviation * noise, _DEVIATION * float(np.median(heights)))
+    peaks = _peaks(heights, rules.most_jumps + 1, 2 * half)
+    common = float(heights[peaks[-1]]) if len(peaks) > rules.most_jumps else 0.0
     size = float(sizes[peaks[0]])
     if not abs(size) > max(deviations * usual, rules.fault_prominence * common):
         return None
     row = int(peaks[0]) + half
-    if not _abrupt(residual, row, size, half):
+    if not _abrupt(residual, noise, row, size, half):
         return None
     return Step(row, size, abs(size) / usual)
 
@@ -204,9 +210,8 @@ def _peaks(heights: Rows, number: int, apart: int) -> list[int]:
     return found
 
 
-def _abrupt(residual: Rows, row: int, size: float, widest: int) -> bool:
+def _abrupt(residual: Rows, noise: float, row: int, size: float, widest: int) -> bool:
     """Return whether most of a jump happens from one row to the next, as far as noise shows it."""
-    noise = scatter(residual)
     most = min(widest, row, len(residual) - row)
     for half in {min(one, most) for one in (*WINDOWS, _WIDE)}:
         contrast, deviation = _contrast(half)
@@ -229,9 +234,10 @@ def _contrast(half: int) -> tuple[Rows, float]:
     return 2.0 * rest / power, 2.0 / np.sqrt(power)
 
 
-def _step_in_record(residual: Rows, lines: Lines, deviations: float, rules: Rules) -> Step | None:
+def _step_in_record(
+    residual: Rows, noise: float, lines: Lines, deviations: float, rules: Rules
+) -> Step | None:
     """Return the jump that explains most of a residual, if hardly anything else is left then."""
-    noise = scatter(residual)
     lengths = lines.lengths
     known = lengths > 1.0
     known[:_LEAST_ROWS] = known[len(known) - _LEAST_ROWS + 1 :] = False
@@ -239,15 +245,14 @@ def _step_in_record(residual: Rows, lines: Lines, deviations: float, rules: Rule
         return None
     strength = _strength(residual, lengths, known) / noise
     row = int(np.argmax(np.abs(strength)))
+    clear = abs(float(strength[row]))
+    if not clear > deviations:
+        return None
     size = float(strength[row] * noise / np.sqrt(lengths[row]))
     rest = residual - size * lines.left_of_step(row)
     left = float(np.abs(_strength(rest, lengths, known)).max()) / noise
-    clear = abs(float(strength[row]))
-    if clear > max(deviations, rules.fault_prominence * left) and _abrupt(
-        residual, row, size, _WIDE
-    ):
-        return Step(row, size, clear)
-    return None
+    alone = clear > rules.fault_prominence * left
+    return Step(row, size, clear) if alone and _abrupt(residual, noise, row, size, _WIDE) else None
 
 
 def _strength(residual: Rows, lengths: Rows, known: NDArray[np.bool_]) -> Rows:
