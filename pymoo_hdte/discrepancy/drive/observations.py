@@ -167,15 +167,18 @@ class Observations:
         coefficients = coefficients_of(self.campaign.believed, values, (*known, *effects), 1)
         stiffness = coefficients.stiffness * values["locked_stiffness"]
         coefficients = replace(coefficients, stiffness=stiffness)
-        sensor = np.column_stack([values["output_torque_gain"], values["output_torque_zero"]])
+        # Vectors with equal sensor errors have the same path of the torque.
+        equal: dict[tuple[float, float], list[int]] = {}
+        sensors = (values[f"output_torque_{one}"].tolist() for one in ("gain", "zero"))
+        for row, sensor in enumerate(zip(*sensors, strict=True)):
+            equal.setdefault(sensor, []).append(row)
         found = []
         for points in self.torsion:
             torsion = np.empty((len(vectors), len(points.angle)))
-            # Vectors with equal sensor errors have the same path of the torque.
-            for gain, zero in np.unique(sensor, axis=0):
-                rows = np.flatnonzero(np.all(sensor == (gain, zero), axis=1))
+            for (gain, zero), rows in equal.items():
+                some = coefficients if len(equal) == 1 else coefficients.rows(np.array(rows))
                 path = (points.path - zero) / (1.0 + gain)
-                torsion[rows] = mean_torsion(coefficients.rows(rows), path)[:, points.intervals]
+                torsion[rows] = mean_torsion(some, path)[:, points.intervals]
             found.append((torsion - points.angle) @ points.whitening.T)
         return np.hstack(found)
 

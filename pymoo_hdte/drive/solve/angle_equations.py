@@ -13,6 +13,7 @@ The mean of 1/w is that of the wanted speed, whose sign w has: a drive may turn 
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import dataclass
 from functools import cached_property
 from typing import cast
@@ -83,8 +84,14 @@ class AngleEquations:
 
     def rows(self, rows: NDArray[np.int_]) -> AngleEquations:
         """Return the equations of some of the rows."""
-        speed, load = self.speed[rows, 0], self.load[rows, 0]
-        return AngleEquations(self.coefficients.rows(rows), speed, load, self.motor, self.torus)
+        some, n = copy(self), len(self.speed)
+        vars(some).pop("_of_inertia", None)
+        # What has one row is the same for all.
+        for name, value in vars(some).items():
+            if isinstance(value, np.ndarray) and len(value) == n:
+                setattr(some, name, value[rows])
+        some.coefficients = self.coefficients.rows(rows)
+        return some
 
     def static_torsion(self) -> Values:
         """Return the mean torsion, shape (n,), that holds load and bearing friction at rest."""
@@ -194,11 +201,14 @@ class AngleEquations:
         kept, gained = zip(*(law.recall(along) for law in memories), strict=True)
         return self.torus.recall_matrix(np.concatenate(kept), np.concatenate(gained), places)
 
-    def residuals(self, motion: TorsionMotion) -> tuple[Phasors, Phasors, Phasors]:
+    def residuals(
+        self, motion: TorsionMotion, *others: Values
+    ) -> tuple[Phasors, Phasors, Phasors, list[Phasors]]:
         """Return the residuals of both equations, N.m, and the lead of the input, rad.
 
         The lead is alpha - Omega t, minus the integral of the speed that is missing. The mean of
-        the first equation is the motor's constant.
+        the first equation is the motor's constant. Beside these the harmonics of ``others``, values
+        on the grid (n, G).
         """
         delivered = self.delivered(motion)
         of_load = (
@@ -207,11 +217,12 @@ class AngleEquations:
             + delivered
             - motion.mesh_torque
         )
-        each = (self._of_input(motion, delivered), of_load, self.speed / motion.angular_speed)
+        slower = self.speed / motion.angular_speed
+        each = (self._of_input(motion, delivered), of_load, slower, *others)
         # In one call, as in `motion`.
-        of_input, of_output, slower = np.split(self.torus.phasors(np.concatenate(each)), len(each))
-        lead = -self.torus.integral(slower)
-        return of_input + self.motor.integral * lead, of_output, lead
+        found = self.torus.phasors(np.concatenate(each)).reshape(len(each), *self.static.shape)
+        lead = -self.torus.integral(found[2])
+        return found[0] + self.motor.integral * lead, found[1], lead, list(found[3:])
 
     def of_loose_loads(self, motion: TorsionMotion) -> Values | float:
         """Return the torque of loads that are not rigidly coupled, beyond that of the inertia.
@@ -245,11 +256,6 @@ class AngleEquations:
             + motion.mesh_torque * self._share_of_mesh
             - self.motor.proportional * (self.speed - motion.angular_speed)
         )
-
-    def loop_torque(self, motion: TorsionMotion, lead: Phasors) -> Phasors:
-        """Return the motor's torque without its constant; ``lead`` is that of the motion."""
-        slower = self.torus.phasors(self.speed - motion.angular_speed)
-        return self.motor.proportional * slower - self.motor.integral * lead
 
     @cached_property
     def _share_of_mesh(self) -> Values:

@@ -265,21 +265,22 @@ class _Solver:
         """Return the steady state as it is now."""
         equations = self.equations
         motion = equations.motion(self.torsion, self.energy)
-        torus, coefficients = equations.torus, equations.coefficients
-        inertia = np.reshape(coefficients.load_inertia, (-1, 1))
-        missing, _, lead = equations.residuals(motion)
-        motor_torque = equations.loop_torque(motion, lead)
+        inertia = np.reshape(equations.coefficients.load_inertia, (-1, 1))
+        coupling = (
+            equations.load + inertia * motion.output_acceleration + equations.of_loose_loads(motion)
+        )
+        slower = equations.speed - motion.angular_speed
+        missing, _, lead, others = equations.residuals(motion, slower, coupling)
+        # The motor's torque is that of its loop, with a constant.
+        loop = equations.motor
+        motor_torque = loop.proportional * others[0] - loop.integral * lead
         motor_torque[:, :1] += missing[:, :1].real
         return SteadyMotion(
-            torus=torus,
+            torus=equations.torus,
             transmission_error=equations.static + self.torsion,
             torsion=self.torsion,
             motor_torque=motor_torque,
-            coupling_torque=torus.phasors(
-                equations.load
-                + inertia * motion.output_acceleration
-                + equations.of_loose_loads(motion)
-            ),
+            coupling_torque=others[1],
             lead=lead,
             energy=motion.energy,
             converged=self.converged,

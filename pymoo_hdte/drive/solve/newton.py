@@ -51,7 +51,7 @@ class Place:
         operator = equations.input_operator
         loss = mean(motion.output_loss)
         self._impedance, coupling, share = equations.impedance(loss)
-        missing, of_output, _ = equations.residuals(motion)
+        missing, of_output, *_ = equations.residuals(motion)
         self._energy_change = -ratio * missing / operator
         self._energy_change[:, 0] = 0.0
         self._left = (of_output + coupling * self._energy_change) / share
@@ -177,8 +177,8 @@ def stacked(phasors: Phasors) -> NDArray[np.float64]:
 
 def unstacked(values: NDArray[np.float64]) -> Phasors:
     """Undo `stacked`."""
-    real, imaginary = np.split(values, 2, axis=-1)
-    return real + 1j * imaginary
+    half = values.shape[-1] // 2
+    return values[..., :half] + 1j * values[..., half:]
 
 
 def multiplication(factor: Phasors) -> NDArray[np.float64]:
