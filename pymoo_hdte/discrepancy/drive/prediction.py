@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -220,35 +221,45 @@ def _lines(
         np.zeros(len(conditions)) if one is None else one
         for one in (conditions.input_angle, conditions.travel)
     )
-    found = np.zeros((len(balance.lead), len(channels), len(orders)), dtype=complex)
-    for place, column, conjugate, beyond in _readings(kept, tuple(orders), ratio):
-        lines = np.stack([one[:, column] for one in channels], axis=1)
-        lines = lines.conj() if conjugate else lines
-        if beyond:
-            seen = np.exp(1j * beyond * angle) * np.sinc(beyond * travel / (2.0 * np.pi))
-            lines = lines * np.tile(seen, len(lines) // len(seen))[:, None]
-        found[..., place] += lines
-    return found
+    read = _readings(kept, tuple(orders), ratio)
+    lines = np.stack([one[:, read.columns] for one in channels], axis=1)
+    np.conjugate(lines, out=lines, where=read.conjugate)
+    if read.beyond.any():
+        beyond = np.multiply.outer(angle, read.beyond), np.multiply.outer(travel, read.beyond)
+        seen = np.exp(1j * beyond[0]) * np.sinc(beyond[1] / (2.0 * np.pi))
+        lines *= np.tile(seen, (len(lines) // len(seen), 1))[:, None]
+    return np.asarray(lines @ read.places)
+
+
+class _Readings(NamedTuple):
+    """Harmonics (k,) that are read: their columns, whether conjugate, and the orders beyond.
+
+    ``places`` (k, m) is one where a harmonic is read at an analysed order.
+    """
+
+    columns: NDArray[np.int_]
+    conjugate: NDArray[np.bool_]
+    beyond: NDArray[np.float64]
+    places: NDArray[np.float64]
 
 
 @lru_cache(maxsize=64)
-def _readings(
-    kept: tuple[float, ...], orders: tuple[float, ...], ratio: float
-) -> tuple[tuple[int, int, bool, float], ...]:
-    """Return for each line that is read: where, its harmonic, whether conjugate, order beyond.
+def _readings(kept: tuple[float, ...], orders: tuple[float, ...], ratio: float) -> _Readings:
+    """Return which lines are read where.
 
     A line is read at its own order, or at the nearest one that a record of one output turn cannot
     tell from it: errors of orders 2 and 2.02 beat at 0.02, which is 2/101 there. Over a longer
     record it turns against that order, and the less of it is seen. Lines as near to zero as that
     are in no analysed line, and drift in a record.
     """
-    found = []
-    for column, order in enumerate(kept):
-        place = int(np.argmin(np.abs(np.subtract(orders, abs(order)))))
-        beyond = abs(order) - orders[place]
-        if abs(beyond) * ratio < _UNRESOLVED:
-            found.append((place, column, order < 0.0, 0.0 if abs(beyond) < _SAME else beyond))
-    return tuple(found)
+    orders_there = np.array(kept)
+    nearest = np.abs(np.subtract.outer(np.abs(orders_there), orders)).argmin(axis=1)
+    beyond = np.abs(orders_there) - np.take(orders, nearest)
+    columns = np.flatnonzero(np.abs(beyond) * ratio < _UNRESOLVED)
+    beyond = np.where(np.abs(beyond) < _SAME, 0.0, beyond)[columns]
+    places = np.zeros((len(columns), len(orders)))
+    places[np.arange(len(columns)), nearest[columns]] = 1.0
+    return _Readings(columns, orders_there[columns] < 0.0, beyond, places)
 
 
 def _driving(balance: SteadyMotion, coefficients: Coefficients) -> NDArray[np.complex128]:

@@ -45,7 +45,8 @@ _PATIENCE = 15
 Of 353,000 cases that converged in twelve campaigns of the virtual rig, 21 waited for longer; of 180
 that were lost, three in four. Each step had a matrix of its own then.
 """
-_ROWS_AT_ONCE = 64
+_ROWS_AT_ONCE = 96
+"""Rows solved together: fewer cost calls, and more the cache of the processor; of little effect."""
 _SHRINKS = 0.1
 """Share of a step to which the next has to shrink for a nearby case's matrix to serve further."""
 
