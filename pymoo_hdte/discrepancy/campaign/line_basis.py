@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -97,18 +97,18 @@ class LineFit:
         return self._projected(self.values)
 
     @cached_property
-    def bends(self) -> NDArray[np.float64]:
-        """Parts in the basis of (t - t_mid)^k / k! for k = 2, 3, 4, shape (p, 3)."""
-        return self._projected(partial(_bent, self.record))
+    def courses(self) -> NDArray[np.float64]:
+        """Parts in the basis of slow courses of one, shape (p, 9).
 
-    @cached_property
-    def fading(self) -> NDArray[np.float64]:
-        """Parts in the basis of decays from one at the first row, shape (p, 6).
-
-        Their time constants are `FADING`.
+        First (t - t_mid)^k / k! for k = 2, 3, 4, then decays from the first row on with the time
+        constants `FADING`.
         """
         constants = np.ptp(self.record.time) * np.array(FADING)
-        return self._projected(lambda part: decays(self.record, part, constants))
+
+        def signals(part: slice) -> NDArray[np.float64]:
+            return np.hstack([_bent(self.record, part), decays(self.record, part, constants)])
+
+        return self._projected(signals)
 
     def _projected(self, signals: Callable[[slice], NDArray[np.float64]]) -> NDArray[np.float64]:
         """Return the parts in the basis of signals, which are given for some rows, (b, k)."""

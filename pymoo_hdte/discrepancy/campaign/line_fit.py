@@ -143,6 +143,7 @@ def order_lines(
         lines = (found[real_parts] + 1j * found[imaginary_parts]).T / gains
         return np.column_stack([found[0], lines])
 
+    courses = assigned(fit.courses)
     covariance = np.diag(noise)[:, None, None] * unit
     for jump in record.jumps:
         channel, share = _READ[jump.channel]
@@ -154,8 +155,8 @@ def order_lines(
         phasors=phasors,
         covariance=covariance,
         row_covariance=noise,
-        bends=assigned(fit.bends),
-        fading=assigned(fit.fading),
+        bends=courses[:3],
+        fading=courses[3:],
     )
 
 

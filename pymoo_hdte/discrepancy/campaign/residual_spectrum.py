@@ -21,7 +21,7 @@ LEAST_SEPARATION = 0.1
 """Least share of a line's power that is independent of the fitted lines."""
 
 SUM_ERROR = 1e-12
-"""Relative error of the sums over rows."""
+"""Relative error of the sums over rows, for two rows in one transform that of the larger."""
 
 
 def residual_spectrum(
@@ -71,7 +71,7 @@ def residual_spectrum(
     """
     fit = LineFit.of(record, ratio, orders)
     highest = min(highest_order, nyquist_order(record))
-    multiples = int(np.ceil(highest * ratio - 1e-9)) - 1
+    multiples = max(int(np.ceil(highest * ratio - 1e-9)) - 1, 0)
     whole = ratio * np.arange(1.0, np.ceil(highest - 1e-9))
     whole = whole[np.abs(whole - whole.round()) > 1e-9]
     sigma = np.sqrt(np.diag(row_covariance(rig, ratio, record.samples_averaged)))

@@ -168,15 +168,15 @@ class Observations:
         stiffness = coefficients.stiffness * values["locked_stiffness"]
         coefficients = replace(coefficients, stiffness=stiffness)
         # Vectors with equal sensor errors have the same path of the torque.
-        equal: dict[tuple[float, float], list[int]] = {}
+        of_sensors: dict[tuple[float, float], list[int]] = {}
         sensors = (values[f"output_torque_{one}"].tolist() for one in ("gain", "zero"))
         for row, sensor in enumerate(zip(*sensors, strict=True)):
-            equal.setdefault(sensor, []).append(row)
+            of_sensors.setdefault(sensor, []).append(row)
         found = []
         for points in self.torsion:
             torsion = np.empty((len(vectors), len(points.angle)))
-            for (gain, zero), rows in equal.items():
-                some = coefficients if len(equal) == 1 else coefficients.rows(np.array(rows))
+            for (gain, zero), rows in of_sensors.items():
+                some = coefficients if len(of_sensors) == 1 else coefficients.rows(np.array(rows))
                 path = (points.path - zero) / (1.0 + gain)
                 torsion[rows] = mean_torsion(some, path)[:, points.intervals]
             found.append((torsion - points.angle) @ points.whitening.T)

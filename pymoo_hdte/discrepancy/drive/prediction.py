@@ -215,7 +215,10 @@ def _lines(
     ratio: float,
     conditions: Conditions,
 ) -> NDArray[np.complex128]:
-    """Return the phasors of all channels at analysed orders, (n, 4, m), records innermost."""
+    """Return the phasors of all channels at analysed orders, (n, 4, m), records innermost.
+
+    A case that has diverged is NaN in all its harmonics, and so at all orders.
+    """
     kept = tuple(balance.torus.orders.tolist())
     angle, travel = (
         np.zeros(len(conditions)) if one is None else one
@@ -252,14 +255,17 @@ def _readings(kept: tuple[float, ...], orders: tuple[float, ...], ratio: float) 
     record it turns against that order, and the less of it is seen. Lines as near to zero as that
     are in no analysed line, and drift in a record.
     """
-    orders_there = np.array(kept)
-    nearest = np.abs(np.subtract.outer(np.abs(orders_there), orders)).argmin(axis=1)
-    beyond = np.abs(orders_there) - np.take(orders, nearest)
+    kept_orders = np.array(kept)
+    nearest = np.abs(np.subtract.outer(np.abs(kept_orders), orders)).argmin(axis=1)
+    beyond = np.abs(kept_orders) - np.take(orders, nearest)
     columns = np.flatnonzero(np.abs(beyond) * ratio < _UNRESOLVED)
     beyond = np.where(np.abs(beyond) < _SAME, 0.0, beyond)[columns]
     places = np.zeros((len(columns), len(orders)))
     places[np.arange(len(columns)), nearest[columns]] = 1.0
-    return _Readings(columns, orders_there[columns] < 0.0, beyond, places)
+    found = _Readings(columns, kept_orders[columns] < 0.0, beyond, places)
+    for one in found:
+        one.flags.writeable = False
+    return found
 
 
 def _driving(balance: SteadyMotion, coefficients: Coefficients) -> NDArray[np.complex128]:

@@ -27,6 +27,10 @@ from pymoo_hdte.drive.solve.torus import Matrices, Torus
 from pymoo_hdte.effects.law import Memory, PortState, Response
 
 _STATIC_STEPS = 8
+_BY_ROW = ("speed", "load", "static", "_static_slope", "_stiffness", "_backward")
+_ONE_ROW_OR_EACH = ("output_inertia", "output_damping")
+_MADE_WHEN_ASKED = ("_share_of_mesh", "rate", "input_operator")
+"""Values of `AngleEquations` by row; all its other cached ones are left out by `rows`."""
 
 Values = NDArray[np.float64]
 
@@ -84,13 +88,18 @@ class AngleEquations:
 
     def rows(self, rows: NDArray[np.int_]) -> AngleEquations:
         """Return the equations of some of the rows."""
-        some, n = copy(self), len(self.speed)
-        vars(some).pop("_of_inertia", None)
-        # What has one row is the same for all.
-        for name, value in vars(some).items():
-            if isinstance(value, np.ndarray) and len(value) == n:
-                setattr(some, name, value[rows])
+        some = copy(self)
         some.coefficients = self.coefficients.rows(rows)
+        for name in _ONE_ROW_OR_EACH:
+            value = getattr(self, name)
+            setattr(some, name, value if len(value) == 1 else value[rows])
+        for name in _BY_ROW:
+            setattr(some, name, getattr(self, name)[rows])
+        # What was asked for so far; the rest is made when it is.
+        for name in _MADE_WHEN_ASKED:
+            if name in vars(self):
+                setattr(some, name, getattr(self, name)[rows])
+        vars(some).pop("_of_inertia", None)
         return some
 
     def static_torsion(self) -> Values:

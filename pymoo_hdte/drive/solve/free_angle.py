@@ -46,7 +46,7 @@ Of 353,000 cases that converged in twelve campaigns of the virtual rig, 21 waite
 that were lost, three in four. Each step had a matrix of its own then.
 """
 _ROWS_AT_ONCE = 96
-"""Rows solved together: fewer cost calls, and more the cache of the processor; of little effect."""
+"""Fewer would take more calls, more would outgrow the processor's cache; the effect is small."""
 _SHRINKS = 0.1
 """Share of a step to which the next has to shrink for a nearby case's matrix to serve further."""
 

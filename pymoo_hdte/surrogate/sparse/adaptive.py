@@ -137,7 +137,7 @@ class _Growth:
         self.points = np.concatenate([self.points, points])
         self.truth = np.concatenate([self.truth.reshape(-1, values.shape[1]), values])
 
-    # Not the function: a user's program keeps its threads.
+    # Not `run`, which calls the user's function: that keeps its threads.
     @ONE_THREAD
     def judge(self) -> AdaptiveFit:
         """Fit the surrogate to the runs, and measure it."""

@@ -186,9 +186,10 @@ def _step_in_windows(
     edge = max(_LEAST_ROWS - half, 0)
     sizes[:edge] = sizes[len(sizes) - edge :] = 0.0
     heights = np.abs(sizes)
-    if not heights.max() > deviations * deviation * noise:
+    of_noise = deviation * noise
+    if not heights.max() > deviations * of_noise:
         return None
-    usual = max(deviation * noise, _DEVIATION * float(np.median(heights)))
+    usual = max(of_noise, _DEVIATION * float(np.median(heights)))
     peaks = _peaks(heights, rules.most_jumps + 1, 2 * half)
     common = float(heights[peaks[-1]]) if len(peaks) > rules.most_jumps else 0.0
     size = float(sizes[peaks[0]])
