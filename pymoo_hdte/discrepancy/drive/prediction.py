@@ -228,8 +228,8 @@ def _lines(
     lines = np.stack([one[:, read.columns] for one in channels], axis=1)
     np.conjugate(lines, out=lines, where=read.conjugate)
     if read.beyond.any():
-        beyond = np.multiply.outer(angle, read.beyond), np.multiply.outer(travel, read.beyond)
-        seen = np.exp(1j * beyond[0]) * np.sinc(beyond[1] / (2.0 * np.pi))
+        turned, passed = (np.outer(one, read.beyond) for one in (angle, travel))
+        seen = np.exp(1j * turned) * np.sinc(passed / (2.0 * np.pi))
         lines *= np.tile(seen, (len(lines) // len(seen), 1))[:, None]
     return np.asarray(lines @ read.places)
 

@@ -27,10 +27,11 @@ from pymoo_hdte.drive.solve.torus import Matrices, Torus
 from pymoo_hdte.effects.law import Memory, PortState, Response
 
 _STATIC_STEPS = 8
-_BY_ROW = ("speed", "load", "static", "_static_slope", "_stiffness", "_backward")
-_ONE_ROW_OR_EACH = ("output_inertia", "output_damping")
-_MADE_WHEN_ASKED = ("_share_of_mesh", "rate", "input_operator")
-"""Values of `AngleEquations` by row; all its other cached ones are left out by `rows`."""
+_BY_ROW = (
+    "speed", "load", "output_inertia", "output_damping", "static", "_static_slope", "_stiffness",
+    "_backward", "_share_of_mesh", "rate", "input_operator",
+)  # fmt: skip
+"""What `AngleEquations` has by row, the last three once they are asked for."""
 
 Values = NDArray[np.float64]
 
@@ -72,8 +73,10 @@ class AngleEquations:
     ) -> None:
         self.coefficients, self.motor, self.torus = coefficients, motor, torus
         self.speed, self.load = speed[:, None], load[:, None]
-        self.output_inertia = np.reshape(coefficients.output_inertia, (-1, 1))
-        self.output_damping = np.reshape(coefficients.output_damping, (-1, 1))
+        self.output_inertia, self.output_damping = (
+            np.broadcast_to(np.reshape(one, (-1, 1)), self.speed.shape)
+            for one in (coefficients.output_inertia, coefficients.output_damping)
+        )
         self.static = np.zeros((len(speed), len(torus.orders)), dtype=complex)
         for order, phasor in zip(
             coefficients.error_orders, coefficients.error_phasors.T, strict=True
@@ -90,15 +93,7 @@ class AngleEquations:
         """Return the equations of some of the rows."""
         some = copy(self)
         some.coefficients = self.coefficients.rows(rows)
-        for name in _ONE_ROW_OR_EACH:
-            value = getattr(self, name)
-            setattr(some, name, value if len(value) == 1 else value[rows])
-        for name in _BY_ROW:
-            setattr(some, name, getattr(self, name)[rows])
-        # What was asked for so far; the rest is made when it is.
-        for name in _MADE_WHEN_ASKED:
-            if name in vars(self):
-                setattr(some, name, getattr(self, name)[rows])
+        vars(some).update((name, vars(self)[name][rows]) for name in _BY_ROW if name in vars(self))
         vars(some).pop("_of_inertia", None)
         return some
 
