@@ -40,6 +40,8 @@ class Parameter:
         Whether a prediction is close to linear in it: part of a line, or a level.
     open_above : bool
         Whether larger values predict nearly the same: ``upper`` is then no limit of the law.
+    phase_of : str
+        Name of the amplitude of the line whose phase it is; empty for other unknowns.
     """
 
     name: str
@@ -50,6 +52,7 @@ class Parameter:
     prior: float = np.inf
     linear: bool = False
     open_above: bool = False
+    phase_of: str = ""
 
     @property
     def line(self) -> str:

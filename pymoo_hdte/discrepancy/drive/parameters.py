@@ -107,9 +107,10 @@ def base_parameters(
         _within(name, getattr(believed, name), believed.tolerance_of(name)) for name in MECHANICAL
     ]
     for line, amplitude in enumerate(believed.error_amplitudes):
-        found.append(_within(f"error_amplitude_{line}", amplitude, believed.error_tolerance))
-        phase = phases[line]
-        found.append(Parameter(f"error_phase_{line}", phase, phase - 9.0, phase + 9.0, 0.1))
+        strength = _within(f"error_amplitude_{line}", amplitude, believed.error_tolerance)
+        name, phase = f"error_phase_{line}", phases[line]
+        turned = Parameter(name, phase, phase - 9.0, phase + 9.0, 0.1, phase_of=strength.name)
+        found += [strength, turned]
     for name, value in known_values(believed.effects).items():
         if name in believed.tolerances:
             found.append(_within(name, value, believed.tolerances[name]))

@@ -13,6 +13,7 @@ from pymoo_hdte.discrepancy.engine.fitting import Evidence, Fit, Vector, fit
 from pymoo_hdte.discrepancy.engine.hypothesis import (
     Hypothesis,
     alike,
+    contains,
     hypothesis_of,
     is_bounded,
     label_of,
@@ -215,10 +216,18 @@ class FittedSets:
             if self._resumed:
                 best = fit(self.data, one.candidates, one.fit)
             else:
+                self._finish_special_cases(one)
                 best = best_fit(self.data, one, starts, self._by_label.values())
             self._by_label[label] = hypothesis_of(best, self.excess)
             self._finished.add(label)
         return self._by_label[label]
+
+    def _finish_special_cases(self, one: Hypothesis) -> None:
+        """Fit special cases of a set to the end that may come as near: it has to do better."""
+        for other in list(self._by_label.values()):
+            special = contains(one, other) and len(other.fit.values) < len(one.fit.values)
+            if special and self.may_come_as_near(other, one):
+                self.finished(other)
 
     def resume(self, known: Sequence[Hypothesis], go_on: bool = False) -> None:
         """Fit sets from the values that another search has found on nearly the same data.

@@ -206,6 +206,7 @@ class Residuals(Protocol):
     start: Vector
     lower: Vector
     upper: Vector
+    lines: NDArray[np.int_]
 
     def residuals(self, values: Vector) -> Vector:
         """Return residuals at values (n_parameters,)."""
@@ -295,6 +296,9 @@ class Unknowns:
         self.lower, self.upper = layout.array("lower"), layout.array("upper")
         self.prior = layout.array("prior")
         self.bounded = np.isfinite(self.prior)
+        place = {one.name: k for k, one in enumerate(base)}
+        lines = [(place[one.phase_of], place[one.name]) for one in base if one.phase_of]
+        self.lines = np.array(lines, dtype=np.int_).reshape(-1, 2)
 
     def steps(self, values: Vector) -> Vector:
         """Return steps of difference quotients; an effect's strength cannot fall below zero."""

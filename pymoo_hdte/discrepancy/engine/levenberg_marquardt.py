@@ -7,6 +7,10 @@ and Parker, Computational Statistics 10, 1995). A parameter at a bound therefore
 step nor has to leave its bound first, which a trust region inside the bounds needs many steps for;
 and unknowns in which residuals are linear (gains, zeros, levels, parts of lines) are solved for
 exactly in every step.
+
+A line is given by amplitude and phase, since its amplitude is bounded, and residuals are close to
+linear in its cosine and sine parts. A step therefore leads straight on in the plane of the two:
+along a valley in which a phase is hardly determined a step in polar coordinates leaves the valley.
 """
 
 from __future__ import annotations
@@ -62,11 +66,15 @@ class Minimum(NamedTuple):
 
 
 class Differentiable(Protocol):
-    """Residuals of bounded unknowns, with derivatives."""
+    """Residuals of bounded unknowns, with derivatives; places (n_lines, 2) of lines among these.
+
+    The place of the amplitude of a line and that of its phase.
+    """
 
     scale: Vector
     lower: Vector
     upper: Vector
+    lines: NDArray[np.int_]
 
     def residuals(self, values: Vector) -> Vector:
         """Return residuals (n,) at values (n_unknowns,)."""
@@ -130,11 +138,8 @@ def minimum(
             SETTLED + settled * before
         )
         if found is not None:
-            moved = (found.values - values) / problem.scale
             if not slow and found.share > _TRUSTED:
-                error = found.residuals - residuals - jacobian @ moved
-                jacobian = jacobian + np.outer(error, moved / (moved @ moved))
-                fresh = False
+                jacobian, fresh = _updated(problem, values, residuals, jacobian, found), False
             elif not (slow and fresh and confirming):
                 jacobian, fresh = problem.jacobian(found.values), True
             values, residuals, damping = found.values, found.residuals, found.damping
@@ -151,12 +156,65 @@ def minimum(
     return Minimum(values, residuals, jacobian)
 
 
+def way(problem: Differentiable, values: Vector, to: Vector) -> Vector:
+    """Return the step (n_unknowns,) that leads from values to others, in units of their scale.
+
+    Of a line it is the straight one in the plane of its parts: along and across it at ``values``.
+    """
+    amplitude, phase = problem.lines.T
+    found, turn = to - values, to[phase] - values[phase]
+    found[amplitude] = to[amplitude] * np.cos(turn) - values[amplitude]
+    found[phase] = to[amplitude] * np.sin(turn) / _not_zero(values[amplitude])
+    return np.asarray(found / problem.scale)
+
+
+def _moved(problem: Differentiable, values: Vector, step: Vector) -> Vector:
+    """Return values (n_unknowns,) to which a step leads, or the nearest within the bounds."""
+    to, (amplitude, phase) = values + step * problem.scale, problem.lines.T
+    along, across = to[amplitude], values[amplitude] * (to[phase] - values[phase])
+    to[amplitude] = np.hypot(along, across)
+    to[phase] = values[phase] + np.arctan2(across, along)
+    return np.clip(to, problem.lower, problem.upper)
+
+
+def _turned(problem: Differentiable, values: Vector, to: Vector, jacobian: Matrix) -> Matrix:
+    """Return derivatives at ``to`` if residuals are linear in the parts of lines, as at values."""
+    (amplitude, phase), found = problem.lines.T, jacobian.copy()
+    turn = to[phase] - values[phase]
+    along = jacobian[:, amplitude] / problem.scale[amplitude]
+    across = jacobian[:, phase] / problem.scale[phase] / _not_zero(values[amplitude])
+    found[:, amplitude] = (np.cos(turn) * along + np.sin(turn) * across) * problem.scale[amplitude]
+    found[:, phase] = (np.cos(turn) * across - np.sin(turn) * along) * problem.scale[phase]
+    found[:, phase] *= to[amplitude]
+    return found
+
+
+def _not_zero(amplitudes: Vector) -> Vector:
+    # Derivatives by the phase of a line of no amplitude are zero, whatever they are divided by.
+    return np.where(amplitudes == 0.0, 1.0, amplitudes)
+
+
+def _updated(
+    problem: Differentiable, values: Vector, residuals: Vector, jacobian: Matrix, found: _Step
+) -> Matrix:
+    """Return derivatives where a step has ended, from those at values and what the step showed.
+
+    Broyden's update (Mathematics of Computation 19, 1965).
+    """
+    step = way(problem, values, found.values)
+    error = found.residuals - residuals - jacobian @ step
+    shown = jacobian + np.outer(error, step / (step @ step))
+    return _turned(problem, values, found.values, shown)
+
+
 def _arrived(
     problem: Differentiable, values: Vector, residuals: Vector, jacobian: Matrix, at: Minimum
 ) -> bool:
     """Tell whether values are at a known minimum as far as residuals show it, and no better."""
-    way = (values - at.values) / problem.scale
-    changes = (each @ way for each in (at.jacobian, jacobian))
+    changes = (
+        at.jacobian @ way(problem, at.values, values),
+        jacobian @ way(problem, values, at.values),
+    )
     better = residuals @ residuals < at.residuals @ at.residuals
     most = SAME * max(float(residuals @ residuals) / len(residuals), 1.0)
     return not better and all(change @ change <= most for change in changes)
@@ -203,7 +261,7 @@ def _step(
     for _ in range(_ATTEMPTS):
         matrix = np.vstack([triangle, np.diag(np.sqrt(damping) * size)])
         step = lsq_linear(matrix, right, (lower, upper), method="bvls").x
-        moved = np.clip(values + step * problem.scale, problem.lower, problem.upper)
+        moved = _moved(problem, values, step)
         promised = along @ along - np.sum((along + triangle @ step) ** 2)
         if promised <= SETTLED / 10.0:
             return None

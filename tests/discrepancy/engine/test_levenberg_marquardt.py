@@ -18,6 +18,7 @@ class TwoMinima:
 
     scale = np.ones(2)
     lower, upper = np.full(2, -5.0), np.full(2, 5.0)
+    lines = np.empty((0, 2), dtype=int)
 
     def __init__(self):
         self.asked = Counter()
@@ -30,6 +31,37 @@ class TwoMinima:
     def jacobian(self, values):
         self.asked["jacobian"] += 1
         return np.array([[2.0 * WEIGHT * values[0], 0.0], [1.0, 1.0], [0.0, 1.0]])
+
+
+class Plane:
+    """Residuals linear in the parts of a line, given by amplitude and phase, and in one unknown.
+
+    The line and the unknown do nearly the same: along a valley only the last residuals change.
+    """
+
+    scale = np.array([1.0, 0.1, 1.0])
+    lower, upper = np.array([0.1, -9.0, -9.0]), np.array([9.0, 9.0, 9.0])
+    weights = np.array([[1e3, 0.0, -1e3], [0.0, 1e3, -2e3], [0.3, 0.0, 0.0], [0.0, 0.5, 0.0]])
+
+    def __init__(self, best, straight=True):
+        self.best, self.derived = np.array(best), 0
+        self.lines = np.array([[0, 1]] if straight else [], dtype=int).reshape(-1, 2)
+
+    @staticmethod
+    def parts(values):
+        amplitude, phase, other = values
+        return np.array([amplitude * np.cos(phase), amplitude * np.sin(phase), other])
+
+    def residuals(self, values):
+        return self.weights @ (self.parts(values) - self.best)
+
+    def jacobian(self, values):
+        self.derived += 1
+        amplitude, phase, _ = values
+        by_parts = np.eye(3)
+        by_parts[:2, 0] = np.cos(phase), np.sin(phase)
+        by_parts[:2, 1] = -amplitude * np.sin(phase), amplitude * np.cos(phase)
+        return self.weights @ by_parts * self.scale
 
 
 def found(start, known=(), hopeless=np.inf):
@@ -113,3 +145,37 @@ def test_a_search_that_leaves_little_goes_on():
 def test_a_search_is_hopeless_once_two_promises_are_hardly_better(promised, ends):
     """The first two are those of hysteresis, which was right."""
     assert is_hopeless(promised, 20.0) == ends
+
+
+@pytest.mark.parametrize("start", [(2.0, 0.0, 2.0), (0.4, 1.4, 0.4), (3.0, -0.3, -1.0)])
+def test_a_step_leads_straight_on_in_the_plane_of_a_line(start):
+    """Where residuals are linear in it they are known from one place, but for the damping."""
+    problem = Plane((1.0, 2.0, 1.0))
+    ended = minimum(problem, np.array(start), 40)
+    assert ended.residuals @ ended.residuals < SETTLED
+    # At the start, and where the search has settled or the damping was too strong.
+    assert problem.derived <= 3
+    in_polar = Plane((1.0, 2.0, 1.0), straight=False)
+    minimum(in_polar, np.array(start), 40)
+    assert in_polar.derived > problem.derived
+
+
+def test_a_step_in_the_plane_of_a_line_stays_within_the_bounds_of_its_amplitude():
+    """With 1 as the least amplitude the best one, 0.5, is reached along it, at its best phase."""
+    problem = Plane((0.3, 0.4, 0.0))
+    problem.lower = np.array([1.0, -9.0, -9.0])
+    problem.weights = np.diag([10.0, 10.0, 1.0])
+    ended = minimum(problem, np.array([2.0, -0.4, 0.0]), 40)
+    assert ended.values == pytest.approx([1.0, np.arctan2(0.4, 0.3), 0.0], abs=NEAR / 10.0)
+
+
+def test_a_search_in_the_plane_of_a_line_ends_at_a_known_minimum():
+    problem = Plane((1.0, 2.0, 1.0))
+    problem.weights = np.vstack([problem.weights, [0.0, 0.0, 3.0]])
+    low = minimum(problem, np.array([2.0, 0.0, 2.0]), 40)
+    problem.derived = 0
+    again = minimum(problem, np.array([3.0, -0.3, -1.0]), 40, known=[low])
+    assert problem.derived == 1
+    assert again.residuals @ again.residuals == pytest.approx(
+        low.residuals @ low.residuals, abs=0.1
+    )

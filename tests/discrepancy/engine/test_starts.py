@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from pymoo_hdte.discrepancy.engine.candidate import Candidate
+from pymoo_hdte.discrepancy.engine.fitted_sets import FittedSets
 from pymoo_hdte.discrepancy.engine.fitting import Unknowns, fit
 from pymoo_hdte.discrepancy.engine.hypothesis import hypothesis_of
 from pymoo_hdte.discrepancy.engine.rules import RULES
@@ -26,6 +27,7 @@ class Wave:
     )
     candidates = (SimpleNamespace(parameters=parameters[1:]),)
     scale = np.ones(3)
+    lines = np.empty((0, 2), dtype=int)
     start, lower, upper = np.array([[one.start, one.lower, one.upper] for one in parameters]).T
 
     def __init__(self):
@@ -89,16 +91,19 @@ class Fold:
     candidates = ()
     parameters = (Parameter("zero", 0.0, -10.0, 10.0, 1.0),)
     scale, start, lower, upper = np.ones(1), np.zeros(1), np.array([-10.0]), np.array([10.0])
+    lines = np.empty((0, 2), dtype=int)
     SIZE, BELIEVED = 3.0, -1.0
 
     def __init__(self):
-        self.derived = []
+        self.tried, self.derived = [], []
 
     def residuals(self, values):
+        self.tried.append(values[0])
         return np.array([abs(values[0]) - self.SIZE, 0.5 * (values[0] - self.BELIEVED)])
 
     def jacobian(self, values):
-        self.derived.append(values[0])
+        # Where, and which place was tried last.
+        self.derived.append((values[0], self.tried[-1]))
         return np.array([[np.sign(values[0])], [0.5]])
 
 
@@ -112,7 +117,9 @@ def test_a_start_beyond_a_kink_is_followed_by_the_derivatives_that_foretell_most
     best = best_fit(data, one, [np.array([-2.0])], ())
     assert best.values == pytest.approx([(-Fold.SIZE + 0.25 * Fold.BELIEVED) / 1.25], abs=0.01)
     assert best.chi_square < above.chi_square
-    assert -2.0 not in problem.derived
+    # Derivatives from above the kink lead nowhere, and were tried first.
+    assert (-2.0, -2.0) not in problem.derived
+    assert -2.0 in dict(problem.derived)
 
 
 class Falling(Unknowns):
@@ -150,7 +157,17 @@ def friction(name, *starts):
     return Candidate(f"{name}_friction", "input", UNKNOWNS[: len(starts[0])], starts, tuple, "")
 
 
-@pytest.mark.parametrize(
+COULOMB = friction("coulomb", (LEVEL,))
+STRIBECK = friction("stribeck", *((LEVEL, 1.5, fading) for fading in (5.0, 10.0, 20.0)))
+
+
+def falling(excesses):
+    return SimpleNamespace(
+        objective=lambda candidates: Falling(candidates, excesses), rules=RULES, base=()
+    )
+
+
+TWO_ENDS = pytest.mark.parametrize(
     ("excesses", "begin", "end"),
     [
         ({1.0: 1.5, 10.0: -0.6, 100.0: 0.8}, 1.0, 100.0),
@@ -158,17 +175,31 @@ def friction(name, *starts):
         ({1.0: 2.5, 10.0: -0.8}, 100.0, 1.0),
     ],
 )
+
+
+@TWO_ENDS
 def test_a_law_no_better_than_its_special_case_is_tried_from_the_other_bound_of_its_shape(
     excesses, begin, end
 ):
     """From the law's own starts, between the bounds, the excess vanishes."""
-    coulomb = friction("coulomb", (LEVEL,))
-    law = friction("stribeck", *((LEVEL, 1.5, fading) for fading in (5.0, 10.0, 20.0)))
-    data = SimpleNamespace(
-        objective=lambda candidates: Falling(candidates, excesses), rules=RULES, base=()
-    )
-    one = hypothesis_of(fit(data, (law,), np.array([LEVEL, 0.1, begin])), 0.0)
+    data = falling(excesses)
+    one = hypothesis_of(fit(data, (STRIBECK,), np.array([LEVEL, 0.1, begin])), 0.0)
     assert one.fit.values[2] == pytest.approx(begin)
-    best = best_fit(data, one, (), [hypothesis_of(fit(data, (coulomb,)), 0.0)])
+    best = best_fit(data, one, (), [hypothesis_of(fit(data, (COULOMB,)), 0.0)])
     assert best.values[2] == pytest.approx(end)
     assert best.chi_square < one.fit.chi_square - 1.0
+
+
+@TWO_ENDS
+def test_a_law_is_held_against_its_special_case_once_that_is_fitted_to_the_end(
+    excesses, begin, end
+):
+    """A special case that is only ranked leaves more than the law, which need not be better."""
+    sets = FittedSets.__new__(FittedSets)
+    sets.data, sets.excess, sets.degrees_of_freedom = falling(excesses), 0.0, len(Falling.speeds)
+    sets._by_label, sets._finished, sets._resumed = {}, set(), False
+    far = LEVEL + 3.0
+    coulomb = sets.fitted((COULOMB,), np.array([far]), steps=0)
+    law = sets.fitted((STRIBECK,), np.array([far, 0.1, begin]), steps=0)
+    assert coulomb.fit.chi_square > 1e3
+    assert sets.finished(law).fit.values[2] == pytest.approx(end)
