@@ -24,8 +24,8 @@ from pymoo_hdte.discrepancy.drive.parameters import base_parameters
 from pymoo_hdte.discrepancy.drive.steady_states import SCREENING
 from pymoo_hdte.discrepancy.drive.torsion_curve import torsion_points
 from pymoo_hdte.discrepancy.engine.candidate import Candidate
-from pymoo_hdte.discrepancy.engine.excess import Excess
-from pymoo_hdte.discrepancy.engine.fitting import Fit, Response, Vote
+from pymoo_hdte.discrepancy.engine.excess import Excess, Vote
+from pymoo_hdte.discrepancy.engine.fitting import Fit, Response
 from pymoo_hdte.discrepancy.engine.rules import RULES, Rules
 from pymoo_hdte.drive import DriveEffect
 from pymoo_hdte.effects.unknowns import Parameter

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from scipy.stats import chi2, norm
 
 from pymoo_hdte.discrepancy.engine.candidate import Candidate
-from pymoo_hdte.discrepancy.engine.fitting import Fit, Vote
+from pymoo_hdte.discrepancy.engine.excess import Vote
+from pymoo_hdte.discrepancy.engine.fitting import Fit
 from pymoo_hdte.discrepancy.engine.hypothesis import (
     Hypothesis,
     bounded_unknowns,

@@ -1,4 +1,4 @@
-"""Chi-square of a fit beyond its degrees of freedom, by record and part of the data.
+"""Chi-square of a fit beyond its degrees of freedom, and that of records which no fit has seen.
 
 Each part of the data is judged separately: the misfit of a sweep at rest may be a thousand times
 that of the transmission error, and an effect that explains only the one must not count as the cause
@@ -63,3 +63,39 @@ class Excess:
         parts = np.flatnonzero(rows >= 0)
         chi_square[rows[parts], parts] = degrees_of_freedom[rows[parts], parts] = 0.0
         return Excess(chi_square, degrees_of_freedom)
+
+
+@dataclass(frozen=True)
+class Vote:
+    """What records kept out of a fit say of a change of the model.
+
+    Attributes
+    ----------
+    before, after : float
+        Their chi-square without and with it.
+    change : float
+        Square of the change of their whitened prediction: what a true change removes of chi-square,
+        with a standard deviation of twice its root.
+    """
+
+    before: float
+    after: float
+    change: float
+
+    def counts(self, rules: Rules) -> bool:
+        """Tell whether the change is large enough in these records to be seen."""
+        return self.change >= rules.vote_change
+
+    def denies(self, rules: Rules, misfit: float) -> bool:
+        """Tell whether the change removes nothing of their error, or less than a true one would.
+
+        By chance a true one removes two standard deviations less, in units of what a fit's
+        residuals are beside their noise (``misfit``), and in another form of its law not all of it:
+        what stands for something else may remove next to nothing. A prediction that diverges, so
+        that its change has no size, is denied where it diverges with the change.
+        """
+        least = 0.0
+        if np.isfinite(self.change):
+            by_chance = self.change - (rules.vote_change * self.change * misfit) ** 0.5
+            least = max(min(by_chance, rules.vote_share * self.change), 0.0)
+        return self.before - self.after <= least

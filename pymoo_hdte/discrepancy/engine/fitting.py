@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pymoo_hdte.discrepancy.engine.candidate import Candidate, Layout
-from pymoo_hdte.discrepancy.engine.excess import Excess
+from pymoo_hdte.discrepancy.engine.excess import Excess, Vote
 from pymoo_hdte.discrepancy.engine.levenberg_marquardt import SETTLED_SHARE, Minimum, minimum
 from pymoo_hdte.discrepancy.engine.rules import Rules
 from pymoo_hdte.effects.unknowns import Parameter
@@ -159,42 +159,6 @@ def fit(
     begin = start.minimum if isinstance(start, Fit) else start
     found = minimum(objective, begin, most, settled, ends, hopeless)
     return Fit(objective.candidates, objective.parameters, *found)
-
-
-@dataclass(frozen=True)
-class Vote:
-    """What records kept out of a fit say of a change of the model.
-
-    Attributes
-    ----------
-    before, after : float
-        Their chi-square without and with it.
-    change : float
-        Square of the change of their whitened prediction: what a true change removes of chi-square,
-        with a standard deviation of twice its root.
-    """
-
-    before: float
-    after: float
-    change: float
-
-    def counts(self, rules: Rules) -> bool:
-        """Tell whether the change is large enough in these records to be seen."""
-        return self.change >= rules.vote_change
-
-    def denies(self, rules: Rules, misfit: float) -> bool:
-        """Tell whether the change removes nothing of their error, or less than a true one would.
-
-        By chance a true one removes two standard deviations less, in units of what a fit's
-        residuals are beside their noise (``misfit``), and in another form of its law not all of it:
-        what stands for something else may remove next to nothing. A prediction that diverges, so
-        that its change has no size, is denied where it diverges with the change.
-        """
-        least = 0.0
-        if np.isfinite(self.change):
-            by_chance = self.change - (rules.vote_change * self.change * misfit) ** 0.5
-            least = max(min(by_chance, rules.vote_share * self.change), 0.0)
-        return self.before - self.after <= least
 
 
 class Residuals(Protocol):

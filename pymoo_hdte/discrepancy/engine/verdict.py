@@ -25,7 +25,8 @@ from pymoo_hdte.discrepancy.engine.doubts import (
     other_forms,
 )
 from pymoo_hdte.discrepancy.engine.equivalents import Answer, answer_of, chosen_of, distinct
-from pymoo_hdte.discrepancy.engine.fitting import Evidence, Fit, Vote, fit
+from pymoo_hdte.discrepancy.engine.excess import Vote
+from pymoo_hdte.discrepancy.engine.fitting import Evidence, Fit, fit
 from pymoo_hdte.discrepancy.engine.hypothesis import Hypothesis, down_to_noise
 from pymoo_hdte.discrepancy.engine.rules import RULES, Rules
 from pymoo_hdte.discrepancy.engine.screening import screen

@@ -8,7 +8,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pymoo_hdte.discrepancy.engine.fitting import Fit, Vote
+from pymoo_hdte.discrepancy.engine.excess import Vote
+from pymoo_hdte.discrepancy.engine.fitting import Fit
 from pymoo_hdte.discrepancy.engine.verdict import Verdict
 from pymoo_hdte.discrepancy.mechanism.analysis import MechanismFinding
 from pymoo_hdte.discrepancy.mechanism.evidence import MeasuredData, measured_data

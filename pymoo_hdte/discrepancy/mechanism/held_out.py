@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pymoo_hdte.discrepancy.engine.fitting import Fit, Vote
+from pymoo_hdte.discrepancy.engine.excess import Vote
+from pymoo_hdte.discrepancy.engine.fitting import Fit
 from pymoo_hdte.discrepancy.engine.verdict import Verdict
 from pymoo_hdte.discrepancy.mechanism.evidence import MeasuredData
 from pymoo_hdte.discrepancy.mechanism.rest import fitted_values

@@ -14,7 +14,8 @@ from pymoo_hdte.discrepancy.drive.forms.corrections import (
 )
 from pymoo_hdte.discrepancy.engine import doubts, verdict
 from pymoo_hdte.discrepancy.engine.any_form import AnyForm
-from pymoo_hdte.discrepancy.engine.fitting import Vote, fit
+from pymoo_hdte.discrepancy.engine.excess import Vote
+from pymoo_hdte.discrepancy.engine.fitting import fit
 from pymoo_hdte.discrepancy.engine.hypothesis import down_to_noise, hypothesis_of
 from pymoo_hdte.discrepancy.engine.rules import RULES
 from pymoo_hdte.discrepancy.engine.screening import screen

@@ -9,8 +9,8 @@ import pytest
 from pymoo_hdte.discrepancy.engine import choice
 from pymoo_hdte.discrepancy.engine.candidate import Candidate, Layout
 from pymoo_hdte.discrepancy.engine.doubts import doubts_of
+from pymoo_hdte.discrepancy.engine.excess import Vote
 from pymoo_hdte.discrepancy.engine.fitted_sets import FittedSets
-from pymoo_hdte.discrepancy.engine.fitting import Vote
 from pymoo_hdte.discrepancy.engine.hypothesis import Hypothesis, alike, contains, label_of
 from pymoo_hdte.discrepancy.engine.rules import RULES
 from pymoo_hdte.discrepancy.engine.search import Search
