@@ -1,8 +1,9 @@
 """Unknowns of an effect: their bounds and sizes, and lines, each described by two of them.
 
 Amplitude and phase of a line are searched as its cosine and sine parts, in which a prediction is
-close to linear. A periodic effect includes its harmonics: a ripple of order 6 with a little of
-order 12 is one effect and not two.
+close to linear; only lines whose amplitude has a tolerance are unknown by amplitude and phase. A
+periodic effect includes its harmonics: a ripple of order 6 with a little of order 12 is one effect
+and not two.
 """
 
 from __future__ import annotations

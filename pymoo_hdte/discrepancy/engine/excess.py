@@ -1,8 +1,8 @@
-"""Chi-square of a fit beyond its degrees of freedom, and that of records which no fit has seen.
+"""Chi-square beyond degrees of freedom, by record and part, and that of records kept out of fits.
 
-Each part of the data is judged separately: the misfit of a sweep at rest may be a thousand times
-that of the transmission error, and an effect that explains only the one must not count as the cause
-of the other.
+In a fit each part of the data is judged separately: the misfit of a sweep at rest may be a thousand
+times that of the transmission error, and an effect that explains only the one must not count as the
+cause of the other.
 """
 
 from __future__ import annotations

@@ -213,6 +213,7 @@ class FittedSets:
         """Return a set fitted to the end: from its values and, unless resumed, other starts."""
         label = label_of(one.candidates)
         if label not in self._finished or starts:
+            known = self._resumed or label in self._finished
             if self._resumed:
                 best = fit(self.data, one.candidates, one.fit)
             else:
@@ -220,14 +221,23 @@ class FittedSets:
                 best = best_fit(self.data, one, starts, self._by_label.values())
             self._by_label[label] = hypothesis_of(best, self.excess)
             self._finished.add(label)
+            if not known:
+                self._reopen(self._by_label[label])
         return self._by_label[label]
 
     def _finish_special_cases(self, one: Hypothesis) -> None:
-        """Fit special cases of a set to the end that may come as near: it has to do better."""
+        """Fit special cases to the end that may come as near as a set, for `best_fit` to know."""
         for other in list(self._by_label.values()):
-            special = contains(one, other) and len(other.fit.values) < len(one.fit.values)
-            if special and self.may_come_as_near(other, one):
+            if is_special_case(other, one) and self.may_come_as_near(other, one):
                 self.finished(other)
+
+    def _reopen(self, special: Hypothesis) -> None:
+        """Let laws be fitted to the end again that do no better than this special case of them."""
+        most = special.fit.chi_square - self.data.rules.evidence_distance
+        for label in list(self._finished):
+            law = self._by_label[label]
+            if is_special_case(special, law) and law.fit.chi_square > most:
+                self._finished.discard(label)
 
     def resume(self, known: Sequence[Hypothesis], go_on: bool = False) -> None:
         """Fit sets from the values that another search has found on nearly the same data.
@@ -275,6 +285,11 @@ class FittedSets:
             # Forms that leave the same are alike however far apart by evidence.
             near = max(near, rules.form_share**2 * best.removed)
         return one.bic - best.bic < rules.refit_margin * near
+
+
+def is_special_case(one: Hypothesis, law: Hypothesis) -> bool:
+    """Tell whether a law with more unknowns contains a set."""
+    return contains(law, one) and len(one.fit.values) < len(law.fit.values)
 
 
 def may_be_together(effects: Effects) -> bool:

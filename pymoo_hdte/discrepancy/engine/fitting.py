@@ -36,10 +36,8 @@ class Fit:
     parameters : tuple of Parameter
         Base first, then those of the candidates.
     values : ndarray, shape (n_parameters,)
-    residuals : ndarray, shape (n_residuals,)
-        Whitened: of running records, of sweeps, of priors.
-    jacobian : ndarray, shape (n_residuals, n_parameters)
-        Of the residuals, by parameters in units of their scale.
+    residuals, jacobian : ndarray, shape (n_residuals,) and (n_residuals, n_parameters)
+        Whitened: of running records, of sweeps, of priors; by parameters in units of their scale.
     """
 
     candidates: tuple[Candidate, ...]
@@ -153,10 +151,9 @@ def fit(
     """
     objective = data.objective(candidates)
     most = data.rules.fit_evaluations if steps is None else steps
-    ends = [one.minimum for one in known]
-    if start is None:
-        start = objective.start
+    start = objective.start if start is None else start
     begin = start.minimum if isinstance(start, Fit) else start
+    ends = [one.minimum for one in known]
     found = minimum(objective, begin, most, settled, ends, hopeless)
     return Fit(objective.candidates, objective.parameters, *found)
 
@@ -246,6 +243,7 @@ class Unknowns:
     Parameters
     ----------
     base : sequence of Parameter
+        Lines of known tolerance by amplitude and phase, whose places are ``lines``, (n_lines, 2).
     candidates : sequence of Candidate
     """
 

@@ -66,9 +66,13 @@ class Minimum(NamedTuple):
 
 
 class Differentiable(Protocol):
-    """Residuals of bounded unknowns, with derivatives; places (n_lines, 2) of lines among these.
+    """Residuals of bounded unknowns, with derivatives.
 
-    The place of the amplitude of a line and that of its phase.
+    Attributes
+    ----------
+    scale, lower, upper : ndarray, shape (n_unknowns,)
+    lines : ndarray of int, shape (n_lines, 2)
+        Places of the amplitude and of the phase of each line among the unknowns.
     """
 
     scale: Vector
@@ -100,7 +104,7 @@ def minimum(
     problem : Differentiable
     start : ndarray, shape (n_unknowns,), or Minimum
         Moved to the nearest bound where it is outside. With a minimum its derivatives serve for the
-        first step: another search of the same problem found them, there or elsewhere.
+        first step: another search of the same problem found them, there or, `turned`, elsewhere.
     steps : int
         Most steps with derivatives of their own; several times as many if derivatives are updated.
     settled : float
@@ -159,7 +163,8 @@ def minimum(
 def way(problem: Differentiable, values: Vector, to: Vector) -> Vector:
     """Return the step (n_unknowns,) that leads from values to others, in units of their scale.
 
-    Of a line it is the straight one in the plane of its parts: along and across it at ``values``.
+    Of a line it is the straight one in the plane of its parts: along it as it is at ``values``, and
+    across it, divided by its amplitude there. From no amplitude there is no way across.
     """
     amplitude, phase = problem.lines.T
     found, turn = to - values, to[phase] - values[phase]
@@ -168,8 +173,8 @@ def way(problem: Differentiable, values: Vector, to: Vector) -> Vector:
     return np.asarray(found / problem.scale)
 
 
-def _moved(problem: Differentiable, values: Vector, step: Vector) -> Vector:
-    """Return values (n_unknowns,) to which a step leads, or the nearest within the bounds."""
+def moved(problem: Differentiable, values: Vector, step: Vector) -> Vector:
+    """Return values (n_unknowns,) to which a step leads, as of `way`, moved to their bounds."""
     to, (amplitude, phase) = values + step * problem.scale, problem.lines.T
     along, across = to[amplitude], values[amplitude] * (to[phase] - values[phase])
     to[amplitude] = np.hypot(along, across)
@@ -177,8 +182,11 @@ def _moved(problem: Differentiable, values: Vector, step: Vector) -> Vector:
     return np.clip(to, problem.lower, problem.upper)
 
 
-def _turned(problem: Differentiable, values: Vector, to: Vector, jacobian: Matrix) -> Matrix:
-    """Return derivatives at ``to`` if residuals are linear in the parts of lines, as at values."""
+def turned(problem: Differentiable, values: Vector, to: Vector, jacobian: Matrix) -> Matrix:
+    """Return derivatives (n, n_unknowns) at ``to`` of what has those given at ``values``.
+
+    For residuals that are linear in the parts of lines and in all other unknowns.
+    """
     (amplitude, phase), found = problem.lines.T, jacobian.copy()
     turn = to[phase] - values[phase]
     along = jacobian[:, amplitude] / problem.scale[amplitude]
@@ -190,7 +198,7 @@ def _turned(problem: Differentiable, values: Vector, to: Vector, jacobian: Matri
 
 
 def _not_zero(amplitudes: Vector) -> Vector:
-    # Derivatives by the phase of a line of no amplitude are zero, whatever they are divided by.
+    # Across a line of no amplitude steps and derivatives are zero, whatever they are divided by.
     return np.where(amplitudes == 0.0, 1.0, amplitudes)
 
 
@@ -199,12 +207,12 @@ def _updated(
 ) -> Matrix:
     """Return derivatives where a step has ended, from those at values and what the step showed.
 
-    Broyden's update (Mathematics of Computation 19, 1965).
+    Broyden's update (Mathematics of Computation 19, 1965), of those at values, then turned.
     """
     step = way(problem, values, found.values)
     error = found.residuals - residuals - jacobian @ step
     shown = jacobian + np.outer(error, step / (step @ step))
-    return _turned(problem, values, found.values, shown)
+    return turned(problem, values, found.values, shown)
 
 
 def _arrived(
@@ -261,16 +269,16 @@ def _step(
     for _ in range(_ATTEMPTS):
         matrix = np.vstack([triangle, np.diag(np.sqrt(damping) * size)])
         step = lsq_linear(matrix, right, (lower, upper), method="bvls").x
-        moved = _moved(problem, values, step)
         promised = along @ along - np.sum((along + triangle @ step) ** 2)
         if promised <= SETTLED / 10.0:
             return None
-        there = problem.residuals(moved)
+        to = moved(problem, values, step)
+        there = problem.residuals(to)
         gain = before - there @ there
         if gain > 0.0:
             share = float(gain / promised)
             factor = max(1.0 - (2.0 * share - 1.0) ** 3, _LEAST_FACTOR)
-            return _Step(moved, there, max(factor * damping, _LEAST_DAMPING), share)
+            return _Step(to, there, max(factor * damping, _LEAST_DAMPING), share)
         growth *= 2.0
         damping *= growth
     return None

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from pymoo_hdte.discrepancy.engine.candidate import Candidate, Layout
 from pymoo_hdte.discrepancy.engine.fitting import Evidence, Fit, fit
 from pymoo_hdte.discrepancy.engine.hypothesis import Hypothesis, contains
-from pymoo_hdte.discrepancy.engine.levenberg_marquardt import SAME, way
+from pymoo_hdte.discrepancy.engine.levenberg_marquardt import SAME, turned, way
 from pymoo_hdte.discrepancy.engine.rules import Rules
 from pymoo_hdte.discrepancy.engine.screening import basis_of
 from pymoo_hdte.effects.unknowns import Parameter
@@ -65,11 +65,12 @@ def _fit_from(data: Evidence, fits: Sequence[Fit], start: Vector) -> Fit | None:
     """
     best = _least(fits)
     problem = data.objective(best.candidates)
-    begin = replace(best, values=np.clip(start, problem.lower, problem.upper))
-    step = way(problem, best.values, begin.values)
+    to = np.clip(start, problem.lower, problem.upper)
+    begin = replace(best, values=to, jacobian=turned(problem, best.values, to, best.jacobian))
+    step = way(problem, best.values, to)
     changes = best.jacobian * step
     foretold = changes.sum(axis=1)
-    beyond = problem.residuals(begin.values) - best.residuals - foretold
+    beyond = problem.residuals(to) - best.residuals - foretold
     reshaped = step[best.n_base :].any()
     by_derivatives = changes[:, best.n_base :].sum(axis=1) if reshaped else foretold
     if beyond @ beyond <= max(by_derivatives @ by_derivatives, SAME * best.misfit):

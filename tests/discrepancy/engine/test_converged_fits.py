@@ -140,7 +140,7 @@ def hold(data, found, share):
 
 
 def of_blind_single(index):
-    """A campaign of the blind rig with one effect, made of a root that no blind case is made of."""
+    """A campaign of the blind rig with one effect, from a seed that no blind case has."""
     hidden = hiding(Case("single", index, 34))
     return campaign_of(hidden, hidden.session)
 
@@ -164,6 +164,7 @@ def test_fits_leave_the_same_however_many_rows_are_solved_at_once(campaign, monk
         verdict, rules = analysis.verdict, analysis.finding.data.rules
         left.append({label_of(one.candidates): one.chi_square for one in compared(verdict, rules)})
         names.append([one.label for one in (verdict.chosen, *verdict.equivalent)])
+    assert all(each.keys() == left[0].keys() for each in left)
     for label in left[0]:
         assert np.ptp([each[label] for each in left]) < SAME, label
     assert all(each == names[0] for each in names)

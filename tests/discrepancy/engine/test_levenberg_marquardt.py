@@ -4,9 +4,23 @@ from collections import Counter
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from virtual_rig_cases import BELIEVED, RIG
 
-from pymoo_hdte.discrepancy.engine.fitting import Fit
-from pymoo_hdte.discrepancy.engine.levenberg_marquardt import SETTLED, is_hopeless, minimum
+from pymoo_hdte.discrepancy.drive.parameters import base_parameters
+from pymoo_hdte.discrepancy.engine.fitting import Fit, Unknowns
+from pymoo_hdte.discrepancy.engine.levenberg_marquardt import (
+    SETTLED,
+    Minimum,
+    _arrived,
+    is_hopeless,
+    minimum,
+    moved,
+    turned,
+    way,
+)
+from pymoo_hdte.effects.unknowns import Parameter
 
 WEIGHT = 100.0
 NEAR = np.sqrt(SETTLED)
@@ -160,13 +174,56 @@ def test_a_step_leads_straight_on_in_the_plane_of_a_line(start):
     assert in_polar.derived > problem.derived
 
 
-def test_a_step_in_the_plane_of_a_line_stays_within_the_bounds_of_its_amplitude():
-    """With 1 as the least amplitude the best one, 0.5, is reached along it, at its best phase."""
-    problem = Plane((0.3, 0.4, 0.0))
-    problem.lower = np.array([1.0, -9.0, -9.0])
+@given(
+    start=st.tuples(st.floats(0.5, 3.0), st.floats(-3.0, 3.0)),
+    end=st.tuples(st.floats(0.5, 3.0), st.floats(-1.4, 1.4)),
+)
+def test_a_step_leads_to_where_its_way_begins_and_takes_derivatives_along(start, end):
+    """Residuals that are linear in the parts of a line change by derivatives times the way."""
+    problem = Plane((1.0, 2.0, 1.0))
+    here, there = np.array([*start, 0.0]), np.array([end[0], start[1] + end[1], 1.0])
+    step = way(problem, here, there)
+    assert moved(problem, here, step) == pytest.approx(there)
+    foretold = problem.residuals(here) + problem.jacobian(here) @ step
+    assert foretold == pytest.approx(problem.residuals(there), abs=1e-8)
+    taken = turned(problem, here, there, problem.jacobian(here))
+    assert taken == pytest.approx(problem.jacobian(there), abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("start", "lower", "upper", "best", "ends"),
+    [
+        # The least amplitude is reached along the line, the largest across it.
+        ((2.0, -0.4), 1.0, 9.0, (0.3, 0.4), (1.0, np.arctan2(0.4, 0.3))),
+        ((0.5, 0.0), 0.1, 1.0, (1.2, 1.6), (1.0, np.arctan2(1.6, 1.2))),
+        # A line that was believed not to be there has no direction yet.
+        ((0.0, 0.0), 0.0, 9.0, (0.3, 0.4), (0.5, np.arctan2(0.4, 0.3))),
+    ],
+)
+def test_a_step_in_the_plane_of_a_line_stays_within_its_amplitudes(start, lower, upper, best, ends):
+    problem, tried = Plane((*best, 0.0)), []
+    problem.lower, problem.upper = np.array([lower, -9.0, -9.0]), np.array([upper, 9.0, 9.0])
     problem.weights = np.diag([10.0, 10.0, 1.0])
-    ended = minimum(problem, np.array([2.0, -0.4, 0.0]), 40)
-    assert ended.values == pytest.approx([1.0, np.arctan2(0.4, 0.3), 0.0], abs=NEAR / 10.0)
+    residuals = problem.residuals
+    problem.residuals = lambda values: (tried.append(values[0]), residuals(values))[1]
+    ended = minimum(problem, np.array([*start, 0.0]), 40)
+    assert ended.values == pytest.approx([*ends, 0.0], abs=NEAR / 10.0)
+    assert lower <= min(tried)
+    assert max(tried) <= upper
+
+
+@pytest.mark.parametrize(("of_known", "of_search"), [(1.0, 1.0), (1.0, 100.0), (100.0, 1.0)])
+def test_a_search_arrives_along_a_straight_way_that_neither_derivative_sees(of_known, of_search):
+    """Half a right angle apart, along a direction in which residuals hardly change."""
+    problem, derived = Plane((0.0, 0.0, 0.0)), [of_known, of_search]
+    problem.weights = np.diag([1.0, 0.01, 1.0])
+    here, there = np.array([1.0, 0.0, 0.0]), np.array([2.0**0.5, np.pi / 4.0, 0.0])
+    for at, values in ((here, there), (there, here)):
+        # A little lower than where the search is.
+        known = Minimum(at, 0.9 * problem.residuals(at), of_known * problem.jacobian(at))
+        residuals, jacobian = problem.residuals(values), of_search * problem.jacobian(values)
+        arrived = _arrived(problem, values, residuals, jacobian, known)
+        assert arrived == (derived == [1.0, 1.0])
 
 
 def test_a_search_in_the_plane_of_a_line_ends_at_a_known_minimum():
@@ -179,3 +236,35 @@ def test_a_search_in_the_plane_of_a_line_ends_at_a_known_minimum():
     assert again.residuals @ again.residuals == pytest.approx(
         low.residuals @ low.residuals, abs=0.1
     )
+
+
+def test_derivatives_of_a_line_elsewhere_serve_once_they_are_turned():
+    """No further derivatives are needed where residuals are linear in its parts."""
+    problem = Plane((1.0, 2.0, 1.0))
+    problem.weights = np.vstack([problem.weights, [0.0, 0.0, 3.0]])
+    low = minimum(problem, np.array([2.0, 0.0, 2.0]), 40)
+    start = np.array([1.0, low.values[1] - 1.0, 0.0])
+    begun = Minimum(
+        start, problem.residuals(start), turned(problem, low.values, start, low.jacobian)
+    )
+    problem.derived = 0
+    again = minimum(problem, begun, 40, known=[low])
+    assert problem.derived == 0
+    assert again.residuals @ again.residuals == pytest.approx(
+        low.residuals @ low.residuals, abs=0.1
+    )
+
+
+def test_lines_are_found_among_the_unknowns_by_the_amplitude_that_a_phase_is_of():
+    level = Parameter("level", 0.0, -1.0, 1.0, 1.0)
+    phases = [Parameter(f"phase_{k}", 0.0, -9.0, 9.0, 0.1, phase_of=f"size_{k}") for k in (0, 1)]
+    sizes = [Parameter(f"size_{k}", 1.0, 0.5, 2.0, 1.0) for k in (0, 1)]
+    assert Unknowns((level, *sizes, *phases), ()).lines.tolist() == [[1, 3], [2, 4]]
+    assert Unknowns((level,), ()).lines.shape == (0, 2)
+
+
+def test_each_line_of_the_error_of_a_drive_has_its_amplitude_and_its_phase():
+    base = base_parameters(BELIEVED, RIG, np.zeros(len(BELIEVED.error_orders)), 0.0)
+    found = [(base[size].name, base[phase].name) for size, phase in Unknowns(base, ()).lines]
+    lines = range(len(BELIEVED.error_orders))
+    assert found == [(f"error_amplitude_{line}", f"error_phase_{line}") for line in lines]

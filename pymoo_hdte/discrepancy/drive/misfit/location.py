@@ -39,6 +39,7 @@ from pymoo_hdte.discrepancy.drive.observations import (
 from pymoo_hdte.discrepancy.engine.candidate import Layout
 from pymoo_hdte.discrepancy.engine.fitting import Fit, fit
 from pymoo_hdte.discrepancy.engine.hypothesis import adequate
+from pymoo_hdte.discrepancy.engine.levenberg_marquardt import moved
 from pymoo_hdte.discrepancy.engine.rules import Rules
 from pymoo_hdte.drive import DriveEffect
 from pymoo_hdte.units import REVOLUTION_PER_MINUTE
@@ -235,7 +236,7 @@ def _robust_step(data: Data, fitted: Fit) -> Values:
         right = -np.concatenate([weakened.whiten(difference), others])
         # Values at a bound may exceed it by rounding.
         step = lsq_linear(matrix, right, (np.minimum(lower, 0.0), np.maximum(upper, 0.0))).x
-    return np.clip(fitted.values + step * objective.scale, objective.lower, objective.upper)
+    return moved(objective, fitted.values, step)
 
 
 def _misfit(data: Data, fitted: Fit) -> tuple[Values, float | None]:
