@@ -107,10 +107,10 @@ def base_parameters(
         _within(name, getattr(believed, name), believed.tolerance_of(name)) for name in MECHANICAL
     ]
     for line, amplitude in enumerate(believed.error_amplitudes):
-        size = _within(f"error_amplitude_{line}", amplitude, believed.error_tolerance)
+        length = _within(f"error_amplitude_{line}", amplitude, believed.error_tolerance)
         name, phase = f"error_phase_{line}", phases[line]
         within = phase - 9.0, phase + 9.0
-        found += [size, Parameter(name, phase, *within, 0.1, phase_of=size.name)]
+        found += [length, Parameter(name, phase, *within, 0.1, phase_of=length.name)]
     for name, value in known_values(believed.effects).items():
         if name in believed.tolerances:
             found.append(_within(name, value, believed.tolerances[name]))
