@@ -71,6 +71,16 @@ def test_derivatives_do_not_depend_on_the_way_there():
     assert np.all(errors < 5e-3 * np.abs(from_rest).max(axis=0))
 
 
+def test_derivatives_by_the_phase_of_a_weak_line_are_as_exact():
+    """A step so small that it changes a line by what Newton's method leaves hid a way down."""
+    objective = Objective(known_data(FEW), ())
+    found = objective.jacobian(objective.start)
+    expected = central_differences(objective, objective.start, 2e-3)
+    for place in objective.lines.ravel():
+        error = np.linalg.norm(found[:, place] - expected[:, place])
+        assert error < 1e-3 * np.linalg.norm(expected[:, place]), objective.parameters[place].name
+
+
 @pytest.mark.parametrize("place", [0, -1])
 def test_a_fit_begins_where_its_derivatives_foretell(swept, place):
     """Of the stiffness, and of a strength at its upper bound, from where the step goes down."""
