@@ -57,11 +57,11 @@ def _fit_from(data: Evidence, fits: Sequence[Fit], start: Vector) -> Fit | None:
     """Return a fit from a start; None where it is not expected to end lower than the best one.
 
     The derivatives of the best one serve for the first steps where they foretell the residuals at
-    the start: where what else changes there is no larger. So a start that leads back costs a few
-    evaluations, and one beyond a kink of a law, as of a friction whose load changes sign, ends
-    lower. Where effects have other values, what their own unknowns do counts: a law that has
-    vanished foretells nothing of a new shape. From there a fit takes its own derivatives, unless
-    what is not foretold could remove nothing of what the best one leaves.
+    the start: where what else changes there is no larger, or counts for nothing. So a start that
+    leads back costs a few evaluations, and one beyond a kink of a law, as of a friction whose load
+    changes sign, ends lower. Where effects have other values, what their own unknowns do counts: a
+    law that has vanished foretells nothing of a new shape. From there a fit takes its own
+    derivatives, unless what is not foretold could remove nothing of what the best one leaves.
     """
     best = _least(fits)
     problem = data.objective(best.candidates)
