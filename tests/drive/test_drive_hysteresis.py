@@ -9,7 +9,8 @@ from scipy.optimize import least_squares
 from pymoo_hdte.drive import LawAtPort, SpeedLoop, harmonic_balance, preset
 from pymoo_hdte.drive.solve.angle_equations import AngleEquations
 from pymoo_hdte.drive.solve.free_angle import torus_of
-from pymoo_hdte.drive.solve.newton import Place, stacked, unstacked
+from pymoo_hdte.drive.solve.linear_systems import stacked, unstacked
+from pymoo_hdte.drive.solve.newton import Place
 from pymoo_hdte.effects.bouc_wen import BoucWen
 from pymoo_hdte.effects.effect import effect_named
 from pymoo_hdte.effects.hysteresis import MaxwellSlip
@@ -62,7 +63,7 @@ def test_slope_and_memory_together_are_the_derivative_of_the_torque(direction, e
     step = 1e-11
     numerical = (torque(torsion + step * change) - torque(torsion - step * change)) / (2.0 * step)
     slope = torus.product_matrix(equations.motion(torsion, energy).mesh_slope)
-    memory = equations.recall_matrix(torsion)
+    memory = torus.recall_matrix(equations.recollection(torsion))
 
     def along(matrix):
         return unstacked(np.einsum("nij,nj->ni", matrix, stacked(change)))
@@ -87,7 +88,9 @@ def test_the_mean_torque_of_a_loop_is_that_of_its_small_motion(exponent, ripple)
     energy = np.zeros_like(there)
     energy[:, 0] = still**2 / 2.0
     motion = equations.motion(there, energy)
-    of_mean = torus.product_matrix(motion.mesh_slope) + equations.recall_matrix(there)
+    of_mean = torus.product_matrix(motion.mesh_slope) + torus.recall_matrix(
+        equations.recollection(there)
+    )
     stiffness = coefficients.stiffness[0]
     assert of_mean[0, 0, 0] == pytest.approx(stiffness, abs=1e-3 * force / torsion)
     mean = torus.phasors(motion.mesh_torque)[0, 0].real
@@ -141,8 +144,8 @@ def test_matrices_of_nearby_cases_lead_to_the_same_states(monkeypatch):
     rows = np.array([*range(69, -1, -1), *range(70), 3, 3, 66])
     nearby = replace(coefficients.rows(rows), stiffness=1.001 * coefficients.stiffness[rows])
     made = []
-    matrix = Place.matrix
-    monkeypatch.setattr(Place, "matrix", lambda at, of: made.append(len(of)) or matrix(at, of))
+    systems = Place.systems
+    monkeypatch.setattr(Place, "systems", lambda at, of: made.append(len(of)) or systems(at, of))
 
     def found(near):
         made.clear()

@@ -22,8 +22,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pymoo_hdte.drive.solve.coefficients import Coefficients
+from pymoo_hdte.drive.solve.recursion import Recollection
 from pymoo_hdte.drive.solve.steady_motion import Phasors, SpeedLoop
-from pymoo_hdte.drive.solve.torus import Matrices, Torus
+from pymoo_hdte.drive.solve.torus import Torus
 from pymoo_hdte.effects.law import Memory, PortState, Response
 
 _STATIC_STEPS = 8
@@ -188,22 +189,19 @@ class AngleEquations:
         second = np.where(self._backward[:, None], second[:, ::-1], second)
         return self.torus.back(np.hstack([second, second]))
 
-    @property
-    def remembers(self) -> bool:
-        """Tell whether a law has memory: its torque depends on the torsion elsewhere."""
-        return any(law.states for _, law in self.coefficients.laws)
-
-    def recall_matrix(self, torsion: Phasors) -> Matrices:
+    def recollection(self, torsion: Phasors) -> Recollection | None:
         """Return how the mesh torque depends on the torsion elsewhere, by laws with memory.
 
-        Shape (n, 2 H, 2 H), to be added to what ``mesh_slope`` gives.
+        To be added to what ``mesh_slope`` gives; None without such a law.
         """
         memories = [cast(Memory, law) for _, law in self.coefficients.laws if law.states]
+        if not memories:
+            return None
         along = self._path(self.torus.signal(torsion))
         every = np.tile(np.arange(self.torus.size, dtype=float), (len(along), 1))
         places = self._path(every)[:, : self.torus.size].astype(int)
         kept, gained = zip(*(law.recall(along) for law in memories), strict=True)
-        return self.torus.recall_matrix(np.concatenate(kept), np.concatenate(gained), places)
+        return Recollection(np.concatenate(kept), np.concatenate(gained), places)
 
     def residuals(
         self, motion: TorsionMotion, *others: Values

@@ -19,21 +19,17 @@ from numpy.typing import NDArray
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.drive.solve.angle_equations import AngleEquations, Values
 from pymoo_hdte.drive.solve.coefficients import Coefficients
+from pymoo_hdte.drive.solve.fundamentals import fundamental_orders, largest_multiples
+from pymoo_hdte.drive.solve.linear_systems import LinearSystem
 from pymoo_hdte.drive.solve.newton import Place, nearer
 from pymoo_hdte.drive.solve.steady_motion import (
     BY_CASE,
     CONSTANT_TORQUE,
-    Factors,
     SpeedLoop,
     SteadyMotion,
     Tangents,
 )
-from pymoo_hdte.drive.solve.torus import (
-    Torus,
-    fundamental_orders,
-    largest_multiples,
-    shared_torus,
-)
+from pymoo_hdte.drive.solve.torus import Torus, shared_torus
 
 HIGHEST = 8
 """Least number of harmonics of the input turn that are kept."""
@@ -139,20 +135,20 @@ def harmonic_balance(
         solver = _Solver(equations, None if start is None else start.rows(rows))
         # A row that diverges is marked as not converged; its values are meaningless.
         with np.errstate(over="ignore", invalid="ignore"):
-            solver.solve(tolerance, steps, _factors(start, rows, len(equations.speed)))
+            solver.solve(tolerance, steps, _systems(start, rows, len(equations.speed)))
         solvers.append(solver)
     parts = [solver.result() for solver in solvers]
     values = [np.concatenate([getattr(part, name) for part in parts]) for name in BY_CASE]
-    kept = Tangents(_Solved(solvers).factored, np.arange(n)) if tangents else None
+    kept = Tangents(_Solved(solvers).systems, np.arange(n)) if tangents else None
     return SteadyMotion(torus, *values, tangents=kept)
 
 
-def _factors(start: SteadyMotion | None, rows: slice, count: int) -> list[Factors | None]:
-    """Return the factored matrix of the case from which each row begins; None without one."""
+def _systems(start: SteadyMotion | None, rows: slice, count: int) -> list[LinearSystem | None]:
+    """Return the linear system of the case from which each row begins; None without one."""
     if start is None or start.tangents is None:
         return [None] * count
     ended = start.converged[rows]
-    found = iter(start.tangents.rows(rows).rows(ended).factors())
+    found = iter(start.tangents.rows(rows).rows(ended).systems())
     return [next(found) if good else None for good in ended]
 
 
@@ -205,10 +201,10 @@ class _Solver:
                 self.torsion = np.where(kept, near.torsion, self.torsion)
                 self.energy = np.where(kept, near.energy, self.energy)
 
-    def solve(self, tolerance: float, steps: int, factors: list[Factors | None]) -> None:
+    def solve(self, tolerance: float, steps: int, systems: list[LinearSystem | None]) -> None:
         """Iterate until the torsion converges; rows that do not are marked.
 
-        Steps are taken with the matrices of nearby cases, ``factors``, as long as they shrink fast.
+        Steps are taken with the ``systems`` of nearby cases as long as they shrink fast.
         """
         equations, left = self.equations, np.arange(len(self.torsion))
         size = np.abs(self.torsion[:, :1]) + np.abs(equations.static).sum(axis=1)[:, None] + 1e-9
@@ -216,13 +212,13 @@ class _Solver:
         before, least = np.full(len(left), np.inf), np.full(len(left), np.inf)
         distance, waited = at.distance[:, 0], np.zeros(len(left), dtype=int)
         for _ in range(steps):
-            own = np.array([one is None for one in factors], dtype=bool)
+            own = np.array([one is None for one in systems], dtype=bool)
             missing = np.flatnonzero(own)
-            for row, one in zip(missing, at.factors(missing), strict=True):
-                factors[row] = one
+            for row, one in zip(missing, at.systems(missing), strict=True):
+                systems[row] = one
             # A friction may wind up the drive by many times what holds it at the start.
             most = np.maximum(size[left], np.abs(at.torsion[:, :1]))
-            change, energy_change = at.newton_step(most, factors)
+            change, energy_change = at.newton_step(most, systems)
             longest = np.abs(change).max(axis=1)
             shrinks = longest <= _SHRINKS * before
             # With the matrix of another place a short step alone does not tell that it has arrived.
@@ -241,7 +237,7 @@ class _Solver:
             distance, was = at.distance[:, 0], distance
             nearer_by_far = distance <= _SHRINKS * was
             serves = np.where(own, nearer_by_far, shrinks)
-            factors = [one if ok else None for one, ok in zip(factors, serves, strict=True)]
+            systems = [one if ok else None for one, ok in zip(systems, serves, strict=True)]
             halved = distance <= least / 2.0
             least = np.where(halved, distance, least)
             waited = np.where(halved, 0, waited + 1)
@@ -252,15 +248,15 @@ class _Solver:
             # half of the rows have settled, only the others are iterated further.
             if np.any(lost) or 2 * np.sum(settled) >= len(left):
                 kept = np.flatnonzero(~(settled | lost))
-                left, before, factors = left[kept], before[kept], [factors[one] for one in kept]
+                left, before, systems = left[kept], before[kept], [systems[one] for one in kept]
                 least, waited, distance = least[kept], waited[kept], distance[kept]
                 equations = self.equations.rows(left)
                 at = at.rows(equations, kept)
 
-    def factors(self, rows: NDArray[np.int_]) -> list[Factors | None]:
-        """Return the factored matrices of Newton's method of some rows as they are now."""
+    def systems(self, rows: NDArray[np.int_]) -> list[LinearSystem | None]:
+        """Return the linear systems of Newton's method of some rows as they are now."""
         equations = self.equations.rows(rows)
-        return Place(equations, self.torsion[rows], self.energy[rows]).factors(np.arange(len(rows)))
+        return Place(equations, self.torsion[rows], self.energy[rows]).systems(np.arange(len(rows)))
 
     def result(self) -> SteadyMotion:
         """Return the steady state as it is now."""
@@ -294,13 +290,13 @@ class _Solved:
 
     solvers: Sequence[_Solver]
 
-    def factored(self, places: NDArray[np.int_]) -> Sequence[Factors | None]:
-        """Return the factored matrices (2 H, 2 H) at some rows, in rising order."""
+    def systems(self, places: NDArray[np.int_]) -> Sequence[LinearSystem | None]:
+        """Return the linear systems at some rows, in rising order."""
         of_blocks = places // _ROWS_AT_ONCE
         found = [
             one
             for block, solver in enumerate(self.solvers)
             if np.any(of_blocks == block)
-            for one in solver.factors(places[of_blocks == block] % _ROWS_AT_ONCE)
+            for one in solver.systems(places[of_blocks == block] % _ROWS_AT_ONCE)
         ]
         return [None] * len(places) if None in found else found

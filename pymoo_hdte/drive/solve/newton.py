@@ -11,16 +11,27 @@ from collections.abc import Sequence
 from copy import copy
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
 
 from pymoo_hdte.drive.solve.angle_equations import AngleEquations, Values, mean
-from pymoo_hdte.drive.solve.steady_motion import Factors, Phasors
-
-Matrix = NDArray[np.float64]
+from pymoo_hdte.drive.solve.linear_systems import (
+    Iterated,
+    Linearised,
+    LinearSystem,
+    factored,
+    stacked,
+    unstacked,
+)
+from pymoo_hdte.drive.solve.steady_motion import Phasors
 
 _NEARLY_CONSTANT = 0.02
 """Relative variation of the mesh stiffness up to which a step uses its mean."""
+_OF_A_MATRIX = 150
+"""Most harmonics of several beats for which steps are taken with whole matrices.
+
+With 128 of one beat a solution took as long or longer without, with 230 of two a quarter to two
+thirds of the time, with 1607 of three a twentieth.
+"""
 _PARTS = 0.5 ** np.arange(1, 5)
 """Parts of a step that are tried; with 1/16 as the least the fewest of 756 cases were lost."""
 
@@ -84,14 +95,14 @@ class Place:
         return Place(self.equations, self.torsion + change, self.energy + energy_change)
 
     def newton_step(
-        self, size: Values, factors: Sequence[Factors | None]
+        self, size: Values, systems: Sequence[LinearSystem | None]
     ) -> tuple[Phasors, Phasors]:
         """Return a step of torsion and E together, at most ``size`` (n, 1) of the torsion.
 
-        It is taken with the given factors of a matrix for each row, or, where these are None, by
-        each harmonic for itself.
+        It is taken with the given linear system of each row, or, where this is None, by each
+        harmonic for itself.
         """
-        change = self._torsion_change(factors)
+        change = self._torsion_change(systems)
         # Where a law removes the stiffness, a full step may be far too long.
         longest = np.abs(change).max(axis=1, keepdims=True)
         change *= np.minimum(1.0, size / np.maximum(longest, 1e-300))
@@ -104,48 +115,34 @@ class Place:
         energy_change *= np.minimum(1.0, slowest / np.maximum(largest, 1e-300))
         return change, energy_change
 
-    def _torsion_change(self, factors: Sequence[Factors | None]) -> Phasors:
+    def _torsion_change(self, systems: Sequence[LinearSystem | None]) -> Phasors:
         """Return the change of the torsion by the linearised mesh, its memory included."""
         found = stacked(self._left / (self._level + self._viscous))
         real = stacked(self._left)
         # The mean has no imaginary part.
         real[:, self._left.shape[1]] = 0.0
-        for row, one in enumerate(factors):
+        for row, one in enumerate(systems):
             if one is not None:
-                found[row] = scipy.linalg.lapack.dgetrs(*one, real[row])[0]
+                found[row] = one.solve(real[row])
         return unstacked(found)
 
-    def factors(self, rows: NDArray[np.int_]) -> list[Factors | None]:
-        """Return the factors of the `matrix` of some rows; None where there is none."""
-        matrices = self.matrix(rows) if rows.size else None
-        return [None] * len(rows) if matrices is None else [factored(one) for one in matrices]
+    def systems(self, rows: NDArray[np.int_]) -> list[LinearSystem | None]:
+        """Return the linear systems of steps of some rows; None where there is none.
 
-    def matrix(self, rows: NDArray[np.int_]) -> Matrix | None:
-        """Return the derivative (m, 2 H, 2 H) of what is left of some rows by their torsion.
-
-        None where the mesh is so nearly linear that each harmonic answers for itself.
+        Where the mesh is so nearly linear that each harmonic answers for itself, none is needed.
         """
-        equations = self.equations
-        if equations.remembers:
-            of_rows = equations if len(rows) == len(self.torsion) else equations.rows(rows)
-            recall = of_rows.recall_matrix(self.torsion[rows])
-        slope, level = self._mesh_slope[rows], self._level[rows]
+        equations, slope, level = self.equations, self._mesh_slope[rows], self._level[rows]
+        of_rows = equations if len(rows) == len(self.torsion) else equations.rows(rows)
+        recollection = of_rows.recollection(self.torsion[rows]) if rows.size else None
         varies = np.abs(slope - level) > _NEARLY_CONSTANT * np.abs(level)
-        if not (equations.remembers or np.any(varies)):
-            return None
-        matrix = equations.torus.product_matrix(slope) + multiplication(self._viscous[rows])
-        if equations.remembers:
-            matrix += recall
-        # The mean has no imaginary part: an equation for it must not be missing.
-        empty = len(equations.torus.orders)
-        matrix[:, empty, empty] = np.abs(matrix[:, 0, 0])
-        return matrix
-
-
-def factored(matrix: Matrix) -> Factors:
-    """Return the factors of a matrix (m, m); a singular one leads its row to no number."""
-    triangles, pivots, _ = scipy.linalg.lapack.dgetrf(matrix)
-    return triangles, pivots
+        if not (recollection or np.any(varies)):
+            return [None] * len(rows)
+        torus = equations.torus
+        linearised = Linearised(torus, slope, self._viscous[rows], recollection)
+        if len(torus.orders) <= _OF_A_MATRIX or len(torus.of_core) == len(torus.orders):
+            return [factored(one) for one in linearised.matrix()]
+        cores = linearised.core().matrix()
+        return [Iterated(linearised.row(n), factored(one)) for n, one in enumerate(cores)]
 
 
 def nearer(at: Place, change: Phasors, energy_change: Phasors, settled: NDArray[np.bool_]) -> Place:
@@ -167,25 +164,3 @@ def nearer(at: Place, change: Phasors, energy_change: Phasors, settled: NDArray[
     each = np.arange(short.size)
     taken = less.any(axis=0) | (distance[choice, each] < there.distance[short, 0])
     return there.replaced(short[taken], tried, (choice * short.size + each)[taken])
-
-
-def stacked(phasors: Phasors) -> NDArray[np.float64]:
-    """Return real and imaginary parts side by side, shape (n, 2 H)."""
-    return np.concatenate([phasors.real, phasors.imag], axis=-1)
-
-
-def unstacked(values: NDArray[np.float64]) -> Phasors:
-    """Undo `stacked`."""
-    half = values.shape[-1] // 2
-    return values[..., :half] + 1j * values[..., half:]
-
-
-def multiplication(factor: Phasors) -> NDArray[np.float64]:
-    """Return the real matrices, (n, 2 H, 2 H), that multiply each harmonic by its ``factor``."""
-    n, size = factor.shape
-    matrix = np.zeros((n, 2 * size, 2 * size))
-    place = np.arange(size)
-    matrix[:, place, place] = matrix[:, place + size, place + size] = factor.real
-    matrix[:, place, place + size] = -factor.imag
-    matrix[:, place + size, place] = factor.imag
-    return matrix

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -9,6 +11,32 @@ from pymoo_hdte.compilation import compiled
 
 Values = NDArray[np.float64]
 Places = NDArray[np.int_]
+
+
+class Recollection(NamedTuple):
+    """How forces of n rows depend on a signal elsewhere on a path that recurs, of G points.
+
+    Attributes
+    ----------
+    kept, gained : ndarray, shape (k, n, 2 G)
+        Of each of k parts, at each step of two passages.
+    places : ndarray of int, shape (n, G)
+        Points of a passage in its order.
+    """
+
+    kept: Values
+    gained: Values
+    places: Places
+
+    def rows(self, rows: slice) -> Recollection:
+        """Return those of some of the rows."""
+        return Recollection(self.kept[:, rows], self.gained[:, rows], self.places[rows])
+
+    def of_signals(self, signals: Values, row: int = 0) -> Values:
+        """Return the forces (G, m) of a row by each of m signals (G, m), as of `recall`."""
+        found = np.zeros(signals.shape)
+        recall(self.kept[:, row], self.gained[:, row], self.places[row], signals, found)
+        return found
 
 
 @compiled

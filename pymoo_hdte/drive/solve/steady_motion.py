@@ -8,12 +8,11 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from pymoo_hdte.drive.solve.linear_systems import LinearSystem
 from pymoo_hdte.drive.solve.order_spectrum import OrderSpectrum
 from pymoo_hdte.drive.solve.torus import Torus
 
 Phasors = NDArray[np.complex128]
-Factors = tuple[NDArray[np.float64], NDArray[np.int_]]
-"""A matrix of Newton's method as the product of triangles, and the order of its rows."""
 
 
 @dataclass(frozen=True)
@@ -49,30 +48,29 @@ CONSTANT_TORQUE = SpeedLoop()
 
 @dataclass(frozen=True, eq=False)
 class Tangents:
-    """Factored matrices of Newton's method at steady states, computed when first asked for.
+    """Linear systems of Newton's method at steady states, computed when first asked for.
 
     Attributes
     ----------
-    factored : callable
-        From places (m,) of solved cases to the factors of the matrix (2 H, 2 H) of each; None where
-        the step needs no matrix.
+    solved : callable
+        From places (m,) of solved cases to the linear system of each; None where a step needs none.
     places : ndarray of int, shape (n,)
         Of each row among the solved cases.
     """
 
-    factored: Callable[[NDArray[np.int_]], Sequence[Factors | None]]
+    solved: Callable[[NDArray[np.int_]], Sequence[LinearSystem | None]]
     places: NDArray[np.int_]
-    _known: dict[int, Factors | None] = field(default_factory=dict)
+    _known: dict[int, LinearSystem | None] = field(default_factory=dict)
 
     def rows(self, rows: NDArray[np.int_] | NDArray[np.bool_] | slice) -> Tangents:
         """Return those of some of the rows, which share what is computed."""
-        return Tangents(self.factored, self.places[rows], self._known)
+        return Tangents(self.solved, self.places[rows], self._known)
 
-    def factors(self) -> list[Factors | None]:
-        """Return the factors of the matrix (2 H, 2 H) of each row."""
+    def systems(self) -> list[LinearSystem | None]:
+        """Return the linear system of each row."""
         new = np.array(sorted({*self.places.tolist()} - self._known.keys()), dtype=int)
         if new.size:
-            self._known.update(zip(new.tolist(), self.factored(new), strict=True))
+            self._known.update(zip(new.tolist(), self.solved(new), strict=True))
         return [self._known[place] for place in self.places.tolist()]
 
     @classmethod
@@ -87,19 +85,19 @@ class Tangents:
         Returns
         -------
         Tangents
-            Of n_1 + n_2 + ... rows; each part computes its own factors.
+            Of n_1 + n_2 + ... rows; each part computes its own systems.
         """
         ends = np.cumsum([0, *(len(part.places) for part in parts)])
 
-        def factored(places: NDArray[np.int_]) -> list[Factors | None]:
+        def solved(places: NDArray[np.int_]) -> list[LinearSystem | None]:
             """Ask each part for its own; places rise."""
-            found: list[Factors | None] = []
+            found: list[LinearSystem | None] = []
             for part, first, last in zip(parts, ends[:-1], ends[1:], strict=True):
                 own = places[(first <= places) & (places < last)] - first
-                found += part.rows(own).factors()
+                found += part.rows(own).systems()
             return found
 
-        return cls(factored, np.arange(ends[-1]))
+        return cls(solved, np.arange(ends[-1]))
 
 
 @dataclass(frozen=True)

@@ -16,70 +16,10 @@ from numpy.typing import NDArray
 from scipy import fft
 
 from pymoo_hdte.checks import InvalidInput
-from pymoo_hdte.drive.solve.recursion import recall
+from pymoo_hdte.drive.solve.fundamentals import TOLERANCE, multiples_of
+from pymoo_hdte.drive.solve.recursion import Recollection
 
 Matrices = NDArray[np.float64]
-
-_TOLERANCE = 1e-8
-_MULTIPLES = (4, 16)
-"""An order whose fraction is at most this multiple of a known one needs no angle of its own.
-The second where a torus is smaller with it: for a crest with many harmonics of the output turn."""
-
-
-def fundamental_orders(orders: Sequence[float]) -> tuple[float, ...]:
-    """Return 1 and the fractions from which all ``orders`` are whole multiples and sums.
-
-    Those from which most of the others follow are taken, for each needs an angle of its own. The
-    harmonics of 0.5644, for instance, lie at the fractions 0.4356, 0.1287 and 0.3069 of a turn,
-    of which the second and third are multiples of the first, up to whole turns.
-    """
-    found = [_fundamentals(tuple(orders), most) for most in _MULTIPLES]
-    sizes = [[2 * one + 1 for one in largest_multiples(each, orders)[1:]] for each in found]
-    return found[int(np.argmin([np.prod(one) for one in sizes]))]
-
-
-@lru_cache(maxsize=1024)
-def _fundamentals(orders: tuple[float, ...], most: int) -> tuple[float, ...]:
-    """Return `fundamental_orders` with multiples up to ``most``; each prediction asks for them."""
-    left = sorted({round(abs(order - np.rint(order)), 9) for order in orders} - {0.0})
-    found: list[float] = []
-    while left:
-        # Of equally good ones the smallest.
-        follow = {one: [_follows(other, one, most) for other in left] for one in left}
-        best = max(left, key=lambda one: (sum(follow[one]), -one))
-        found.append(best)
-        left = [other for other, done in zip(left, follow[best], strict=True) if not done]
-    return (1.0, *sorted(found))
-
-
-def _follows(fraction: float, known: float, most: int) -> bool:
-    """Tell whether a fraction is a multiple of a known one, up to whole turns and sign."""
-    multiples = known * np.arange(1, most + 1)
-    return bool(np.any(np.abs(np.abs(multiples - np.rint(multiples)) - fraction) < _TOLERANCE))
-
-
-@lru_cache(maxsize=1024)
-def multiples_of(fundamentals: tuple[float, ...], order: float) -> NDArray[np.int_]:
-    """Return the smallest whole multiples of the fundamentals, 1 first, that sum to ``order``."""
-    n, (near, far) = len(fundamentals) - 1, _MULTIPLES
-    sums = np.indices((2 * near + 1,) * n).reshape(n, (2 * near + 1) ** n).T - near
-    # What follows a fraction in a large multiple is a multiple of that one alone.
-    for parts in (sums, np.kron(np.arange(-far, far + 1)[:, None], np.eye(n, dtype=int))):
-        rest = order - parts @ np.array(fundamentals[1:])
-        fits = np.flatnonzero(np.abs(rest - np.rint(rest)) < _TOLERANCE)
-        if len(fits):
-            best = fits[np.argmin(np.abs(parts[fits]).sum(axis=1))]
-            found = np.array([int(np.rint(rest[best])), *parts[best]])
-            # All callers share it.
-            found.flags.writeable = False
-            return found
-    raise InvalidInput("order", order, f"a sum of multiples of {tuple(fundamentals)}")
-
-
-def largest_multiples(fundamentals: tuple[float, ...], orders: Sequence[float]) -> list[int]:
-    """Return the largest multiple of each fundamental in any of the ``orders``."""
-    found = np.array([multiples_of(fundamentals, order) for order in orders], dtype=int)
-    return [int(one) for one in np.abs(found.reshape(-1, len(fundamentals))).max(0, initial=0)]
 
 
 @lru_cache(maxsize=8)
@@ -97,6 +37,8 @@ class Torus:
         Orders of the angles, in cycles per input turn; the first is 1.
     highest : sequence of int
         Largest multiple of each that is kept.
+    at_once : int, optional
+        Most angles beside the first of which a kept harmonic has a multiple; by default all.
 
     Attributes
     ----------
@@ -107,13 +49,16 @@ class Torus:
         Number G of grid points.
     """
 
-    def __init__(self, fundamentals: Sequence[float], highest: Sequence[int]) -> None:
+    def __init__(
+        self, fundamentals: Sequence[float], highest: Sequence[int], at_once: int | None = None
+    ) -> None:
         self.fundamentals = tuple(fundamentals)
         self.highest = tuple(highest)
         if len(self.fundamentals) != len(self.highest) or self.fundamentals[0] != 1.0:
             raise InvalidInput("fundamentals", fundamentals, "1 first, and one highest for each")
         every = product(*(range(-most, most + 1) for most in self.highest))
-        half = [k for k in every if k > (0,) * len(k)]
+        most = len(self.highest) if at_once is None else at_once
+        half = [k for k in every if k > (0,) * len(k) and np.count_nonzero(k[1:]) <= most]
         self._multiples = np.array([(0,) * len(self.highest), *half])
         self.orders = self._multiples @ np.array(self.fundamentals)
         # Four points a cycle of the highest harmonic: squares are free of aliasing, and cubes of
@@ -123,15 +68,12 @@ class Torus:
         self._shape = mesh[0].shape
         self._phases = np.array([axis.ravel() for axis in mesh])
         self.size = self._phases.shape[1]
-        lines = self._multiples
-        self._differences = self._flat(lines[:, None] - lines)
-        self._sums = self._flat(lines[:, None] + lines)
         # A product of the first angle and all others: a signal is summed over the others first.
         # Of a line and its conjugate one is kept, so that the first multiple is never negative
         # and half of those with multiple 0 are missing.
         self._turns = self.highest[0] + 1
-        self._beats = int(np.prod([2 * most + 1 for most in self.highest[1:]]))
-        self._missing = (self._beats - 1) // 2
+        self._missing = sum(k[0] == 0 for k in half)
+        self._beats = 2 * self._missing + 1
         # Points of the other angles at each of the first.
         self._points = self.size // self._shape[0]
         self._axes = tuple(range(1, 1 + len(self._shape)))
@@ -139,6 +81,22 @@ class Torus:
         self._rate = 1j * self.orders
         self._moving = self.orders != 0.0
         self._divisor = np.where(self._moving, self._rate, 1.0)
+
+    @cached_property
+    def core(self) -> Torus:
+        """The same grid with the harmonics of one angle beside the first at a time."""
+        return Torus(self.fundamentals, self.highest, 1)
+
+    @cached_property
+    def of_core(self) -> NDArray[np.int_]:
+        """Indices of the harmonics of the `core`."""
+        return np.flatnonzero(np.count_nonzero(self._multiples[:, 1:], axis=1) <= 1)
+
+    @cached_property
+    def _pairs(self) -> tuple[NDArray[np.int_], NDArray[np.int_]]:
+        """Places of differences and of sums of two harmonics in a transform, each (H, H)."""
+        lines = self._multiples
+        return self._flat(lines[:, None] - lines), self._flat(lines[:, None] + lines)
 
     @cached_property
     def _of_beats(self) -> Matrices:
@@ -204,7 +162,7 @@ class Torus:
 
     def _searched(self, order: float) -> tuple[int, bool] | None:
         for sign in (1.0, -1.0):
-            places = np.flatnonzero(np.abs(self.orders - sign * order) < _TOLERANCE)
+            places = np.flatnonzero(np.abs(self.orders - sign * order) < TOLERANCE)
             if places.size:
                 return int(places[0]), sign < 0.0
         return None
@@ -261,7 +219,7 @@ class Torus:
         """
         spectrum = fft.fftn(factor.reshape(-1, *self._shape), axes=self._axes, norm="forward")
         flat = spectrum.reshape(len(factor), self.size)
-        below, above = flat[:, self._differences], flat[:, self._sums]
+        below, above = (flat[:, places] for places in self._pairs)
         size = len(self.orders)
         matrix = np.empty((len(factor), 2 * size, 2 * size))
         matrix[:, :size, :size] = below.real + above.real
@@ -272,22 +230,14 @@ class Torus:
         matrix[:, 0] *= 0.5
         return matrix
 
-    def recall_matrix(
-        self, kept: Matrices, gained: Matrices, places: NDArray[np.int_]
-    ) -> NDArray[np.float64]:
-        """Return the real matrices by which a sum of recursions depends on the signal elsewhere.
+    def recall_matrix(self, recollection: Recollection) -> NDArray[np.float64]:
+        """Return the real matrices by which forces depend on the signal elsewhere.
 
-        Parts ``kept`` and ``gained`` (k, n, 2 G) along a `path` are those of `recall`; ``places``
-        (n, G) are the points of the grid that it passes. Matrices act as those of `product_matrix`.
+        Of n rows, along a `path`. Matrices act as those of `product_matrix`.
         """
-        n, size = places.shape
-        half = len(self.orders)
-        found = np.empty((n, 2 * half, 2 * half))
-        for row in range(n):
-            elsewhere = np.zeros((size, 2 * half))
-            recall(kept[:, row], gained[:, row], places[row], self._synthesis, elsewhere)
-            found[row] = self._stacked_harmonics(elsewhere)
-        return found
+        each = range(len(recollection.places))
+        rows = (recollection.of_signals(self._synthesis, row) for row in each)
+        return np.stack([self._stacked_harmonics(elsewhere) for elsewhere in rows])
 
     def _stacked_harmonics(self, columns: Matrices) -> Matrices:
         """Return the harmonics (2 H, m), real parts first, of m signals on the grid, (G, m)."""

@@ -1,0 +1,102 @@
+"""Steps of Newton's method without matrices, for many harmonics of several beats."""
+
+import tracemalloc
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pymoo_hdte.drive import LawAtPort, harmonic_balance, preset
+from pymoo_hdte.drive.solve import newton
+from pymoo_hdte.drive.solve.free_angle import torus_of
+from pymoo_hdte.drive.solve.linear_systems import Iterated, Linearised, factored
+from pymoo_hdte.drive.solve.recursion import Recollection
+from pymoo_hdte.drive.solve.torus import Torus
+from pymoo_hdte.effects.bouc_wen import BoucWen
+from pymoo_hdte.effects.friction import CoulombFriction, PeriodicFriction
+
+LOOP = LawAtPort("bouc_wen_hysteresis", "mesh", BoucWen(3.0, 2e-4))
+TURNING = tuple(
+    LawAtPort("position_dependent_friction", "output", PeriodicFriction(order, 0.1, 1.0 / order))
+    for order in (1.0, 2.0, 3.0)
+)
+FRICTION = (LawAtPort("coulomb_friction", "output", CoulombFriction(3.0)), *TURNING)
+
+
+def linearised(torus, rng, remembers):
+    n, size = 2, torus.size
+    slope = 1.0 + 0.3 * rng.standard_normal((n, size))
+    viscous = 0.2j * torus.orders * np.ones((n, 1))
+    if not remembers:
+        return Linearised(torus, slope, viscous, None)
+    kept = rng.uniform(0.5, 0.9, (3, n, 2 * size))
+    gained = 0.1 * rng.standard_normal(kept.shape)
+    places = np.array([rng.permutation(size) for _ in range(n)])
+    return Linearised(torus, slope, viscous, Recollection(kept, gained, places))
+
+
+def drives(n, *effects):
+    """Return n drives whose error has a third line that repeats with nothing else."""
+    model = preset("calibrated")
+    model = replace(model, effects=(*model.effects, *effects))
+    found = model.coefficients(np.tile(model.nominal, (n, 1)))
+    orders = np.append(found.error_orders, 1.35)
+    phasors = np.hstack([found.error_phasors, np.full((n, 1), 2e-5 + 0j)])
+    return replace(found, error_orders=orders, error_phasors=phasors)
+
+
+@pytest.mark.parametrize("remembers", [False, True])
+def test_what_is_iterated_solves_the_equations_of_the_matrix(remembers, rng):
+    torus = Torus((1.0, 0.02, 0.35), (3, 2, 1))
+    system = linearised(torus, rng, remembers)
+    right = rng.standard_normal(2 * len(torus.orders))
+    # The mean has no imaginary part.
+    right[len(torus.orders)] = 0.0
+    for row, (matrix, core) in enumerate(zip(system.matrix(), system.core().matrix(), strict=True)):
+        found = Iterated(system.row(row), factored(core)).solve(right)
+        assert np.linalg.norm(matrix @ found - right) < 2e-5 * np.linalg.norm(right)
+
+
+def test_what_is_not_finite_has_no_solution(rng):
+    system = linearised(Torus((1.0, 0.02, 0.35), (2, 1, 1)), rng, remembers=False).row(0)
+    right = np.full(2 * len(system.torus.orders), np.nan)
+    assert np.isnan(Iterated(system, factored(system.core().matrix()[0])).solve(right)).all()
+
+
+def test_a_core_is_what_a_matrix_says_of_its_harmonics(rng):
+    system = linearised(Torus((1.0, 0.02, 0.35), (3, 2, 1)), rng, remembers=True)
+    torus, core = system.torus, system.core()
+    np.testing.assert_array_equal(core.torus.orders, torus.orders[torus.of_core])
+    assert len(torus.of_core) == 3 + (2 + 1) * 7 + 1
+    both = np.concatenate([torus.of_core, torus.of_core + len(torus.orders)])
+    expected = system.matrix()[:, both[:, None], both]
+    np.testing.assert_allclose(core.matrix(), expected, atol=1e-12 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("effects", [FRICTION, (LOOP, *FRICTION)])
+def test_a_steady_state_does_not_depend_on_how_its_steps_are_found(effects, monkeypatch):
+    model = preset("calibrated")
+    coefficients = replace(model, effects=(*model.effects, *effects)).coefficients(
+        np.tile(model.nominal, (3, 1))
+    )
+    load = np.array([20.0, 40.0, 60.0])
+    found = harmonic_balance(coefficients, load_torque=load)
+    assert len(found.torus.orders) > newton._OF_A_MATRIX
+    monkeypatch.setattr(newton, "_OF_A_MATRIX", np.inf)
+    expected = harmonic_balance(coefficients, load_torque=load)
+    assert found.converged.all()
+    assert expected.converged.all()
+    difference = np.abs(found.torsion - expected.torsion).max()
+    assert difference < 1e-10 * np.abs(expected.torsion).max()
+
+
+def test_three_beats_at_once_leave_most_of_the_memory_free():
+    """Matrices of 24 rows with 689 harmonics and what they are made of took 1.2 GB."""
+    coefficients = drives(24, LOOP, *FRICTION)
+    torus = torus_of(coefficients)
+    assert len(torus.orders) == 689
+    tracemalloc.start()
+    harmonic_balance(coefficients, steps=2)
+    largest = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert largest < 3e8
