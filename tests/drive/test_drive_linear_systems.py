@@ -49,18 +49,50 @@ def drives(n, *effects):
 def test_what_is_iterated_solves_the_equations_of_the_matrix(remembers, rng):
     torus = Torus((1.0, 0.02, 0.35), (3, 2, 1))
     system = linearised(torus, rng, remembers)
+    cores = system.core().matrix()
     right = rng.standard_normal(2 * len(torus.orders))
     # The mean has no imaginary part.
     right[len(torus.orders)] = 0.0
-    for row, (matrix, core) in enumerate(zip(system.matrix(), system.core().matrix(), strict=True)):
-        found = Iterated(system.row(row), factored(core)).solve(right)
+    for row, matrix in enumerate(system.matrix()):
+        one = Iterated(system.row(row), factored(cores[row]))
+        assert one._times(right) == pytest.approx(matrix @ right, abs=1e-12 * np.abs(right).max())
+        found = one.solve(right)
         assert np.linalg.norm(matrix @ found - right) < 2e-5 * np.linalg.norm(right)
+
+
+def test_what_stays_within_the_core_is_solved_at_once(monkeypatch):
+    """A stiffness that varies with the input angle alone leads to no other beat."""
+    torus = Torus((1.0, 0.02, 0.35), (3, 2, 1))
+    slope = 1.0 + 0.95 * np.sign(np.cos(torus.phase(1.0) + 0.1))[None]
+    system = Linearised(torus, slope, 0.2j * torus.orders[None], None)
+    right = np.zeros(2 * len(torus.orders))
+    right[torus.of_core] = np.cos(torus.of_core)
+    times, products = Iterated._times, []
+    monkeypatch.setattr(
+        Iterated, "_times", lambda one, values: products.append(1) or times(one, values)
+    )
+    found = Iterated(system, factored(system.core().matrix()[0])).solve(right)
+    assert system.matrix()[0] @ found == pytest.approx(right, abs=1e-6)
+    assert len(products) < 5
+
+
+def test_where_an_iteration_does_not_end_the_whole_matrix_serves(rng):
+    """A mesh that pushes at some places and pulls at others, without order."""
+    system = linearised(Torus((1.0, 0.02, 0.35), (3, 2, 1)), rng, remembers=True)
+    system = system._replace(slope=20.0 * rng.standard_normal(system.slope.shape)).row(0)
+    right = rng.standard_normal(2 * len(system.torus.orders))
+    right[len(system.torus.orders)] = 0.0
+    found = Iterated(system, factored(system.core().matrix()[0])).solve(right)
+    assert system.matrix()[0] @ found == pytest.approx(right, abs=1e-9)
 
 
 def test_what_is_not_finite_has_no_solution(rng):
     system = linearised(Torus((1.0, 0.02, 0.35), (2, 1, 1)), rng, remembers=False).row(0)
-    right = np.full(2 * len(system.torus.orders), np.nan)
-    assert np.isnan(Iterated(system, factored(system.core().matrix()[0])).solve(right)).all()
+    one = Iterated(system, factored(system.core().matrix()[0]))
+    for value in (np.nan, 1e200):
+        with np.errstate(over="ignore"):
+            found = one.solve(np.full(2 * len(system.torus.orders), value))
+        assert np.isnan(found).all()
 
 
 def test_a_core_is_what_a_matrix_says_of_its_harmonics(rng):

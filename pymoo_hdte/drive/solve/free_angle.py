@@ -44,7 +44,7 @@ that were lost, three in four. Each step had a matrix of its own then.
 _ROWS_AT_ONCE = 64
 """Rows solved together; of little effect on the time."""
 _SHRINKS = 0.1
-"""Share of a step to which the next has to shrink for a nearby case's matrix to serve further."""
+"""Share of a step to which the next has to shrink for a nearby case's system to serve further."""
 
 
 def torus_of(coefficients: Coefficients) -> Torus:
@@ -221,7 +221,7 @@ class _Solver:
             change, energy_change = at.newton_step(most, systems)
             longest = np.abs(change).max(axis=1)
             shrinks = longest <= _SHRINKS * before
-            # With the matrix of another place a short step alone does not tell that it has arrived.
+            # With the system of another place a short step alone does not tell that it has arrived.
             settled = (longest <= tolerance * size[left, 0]) & (shrinks | own)
             # The speed may answer more than the torsion, as to a strong ripple at a low speed.
             slower = np.abs(energy_change).max(axis=1)

@@ -1,4 +1,4 @@
-"""Linear systems of Newton's method: a factored matrix, or an iteration that needs none.
+"""Linear systems of Newton's method: a factored matrix, or an iteration led by a smaller one.
 
 A system stands for the derivative of what a balance leaves by the harmonics of the torsion.
 """
@@ -104,18 +104,29 @@ class Iterated:
 
     def __init__(self, row: Linearised, core: Factored) -> None:
         self._row, self._core = row, core
-        self._mean = float(np.mean(row.slope)) + row.viscous[0]
-        self._of_core = np.concatenate([row.torus.of_core, row.torus.of_core + len(self._mean)])
+        self._alone = float(np.mean(row.slope)) + row.viscous[0]
+        self._core_places = np.concatenate(
+            [row.torus.of_core, row.torus.of_core + len(self._alone)]
+        )
+        self._whole: Factored | None = None
 
     def solve(self, right: Vector) -> Vector:
-        """Return the unknowns (2 H,) for a right side (2 H,)."""
-        if not np.all(np.isfinite(right)):
+        """Return the unknowns (2 H,) for a right side (2 H,) without imaginary part of the mean.
+
+        By the whole matrix where the iteration does not end: a poor step could be taken for one
+        that has arrived.
+        """
+        if not np.isfinite(np.linalg.norm(right)):
             return np.full_like(right, np.nan)
-        size, (kept, most) = len(right), _MOST
-        whole = LinearOperator((size, size), matvec=self._times, dtype=float)
-        near = LinearOperator((size, size), matvec=self._near, dtype=float)
-        found, _ = gmres(whole, right, rtol=_LEFT, restart=kept, maxiter=most, M=near)
-        return np.asarray(found)
+        if self._whole is None:
+            size, (kept, most) = len(right), _MOST
+            whole = LinearOperator((size, size), matvec=self._times, dtype=float)
+            near = LinearOperator((size, size), matvec=self._near, dtype=float)
+            found, failed = gmres(whole, right, rtol=_LEFT, restart=kept, maxiter=most, M=near)
+            if not failed:
+                return np.asarray(found)
+            self._whole = factored(self._row.matrix()[0])
+        return self._whole.solve(right)
 
     def _times(self, values: Vector) -> Vector:
         """Return the product of the derivative and values (2 H,)."""
@@ -125,15 +136,12 @@ class Iterated:
         torque = row.slope * signal
         if row.recollection is not None:
             torque += row.recollection.of_signals(signal.T).T
-        found = torus.phasors(torque) + row.viscous * phasors
-        # As in the matrix: the mean has no imaginary part.
-        found.imag[:, 0] = np.abs(self._mean[0]) * phasors.imag[:, 0]
-        return stacked(found)[0]
+        return stacked(torus.phasors(torque) + row.viscous * phasors)[0]
 
     def _near(self, values: Vector) -> Vector:
         """Return about what `solve` returns."""
-        found = stacked(unstacked(values) / self._mean)
-        found[self._of_core] = self._core.solve(values[self._of_core])
+        found = stacked(unstacked(values) / self._alone)
+        found[self._core_places] = self._core.solve(values[self._core_places])
         return found
 
 

@@ -131,11 +131,13 @@ class Place:
 
         Where the mesh is so nearly linear that each harmonic answers for itself, none is needed.
         """
+        if not rows.size:
+            return []
         equations, slope, level = self.equations, self._mesh_slope[rows], self._level[rows]
         of_rows = equations if len(rows) == len(self.torsion) else equations.rows(rows)
-        recollection = of_rows.recollection(self.torsion[rows]) if rows.size else None
+        recollection = of_rows.recollection(self.torsion[rows])
         varies = np.abs(slope - level) > _NEARLY_CONSTANT * np.abs(level)
-        if not (recollection or np.any(varies)):
+        if recollection is None and not np.any(varies):
             return [None] * len(rows)
         torus = equations.torus
         linearised = Linearised(torus, slope, self._viscous[rows], recollection)

@@ -122,7 +122,7 @@ class SteadyMotion:
     converged : ndarray of bool, shape (n,)
         Whether the balance of the case was found; if not, its other values mean nothing.
     tangents : Tangents, optional
-        By which nearby cases are found without matrices of their own.
+        By which nearby cases are found without systems of their own.
 
     Examples
     --------
