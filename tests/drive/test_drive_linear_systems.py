@@ -112,10 +112,13 @@ def test_a_steady_state_does_not_depend_on_how_its_steps_are_found(effects, monk
         np.tile(model.nominal, (3, 1))
     )
     load = np.array([20.0, 40.0, 60.0])
-    found = harmonic_balance(coefficients, load_torque=load)
-    assert len(found.torus.orders) > newton._OF_A_MATRIX
-    monkeypatch.setattr(newton, "_OF_A_MATRIX", np.inf)
     expected = harmonic_balance(coefficients, load_torque=load)
+    monkeypatch.setattr(newton, "_OF_A_MATRIX", 0)
+    solved = []
+    solve = Iterated.solve
+    monkeypatch.setattr(Iterated, "solve", lambda *one: solved.append(1) or solve(*one))
+    found = harmonic_balance(coefficients, load_torque=load)
+    assert solved
     assert found.converged.all()
     assert expected.converged.all()
     difference = np.abs(found.torsion - expected.torsion).max()
