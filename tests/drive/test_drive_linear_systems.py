@@ -36,12 +36,15 @@ def linearised(torus, rng, remembers):
 
 
 def drives(n, *effects):
-    """Return n drives whose error has a third line that repeats with nothing else."""
     model = preset("calibrated")
     model = replace(model, effects=(*model.effects, *effects))
-    found = model.coefficients(np.tile(model.nominal, (n, 1)))
+    return model.coefficients(np.tile(model.nominal, (n, 1)))
+
+
+def with_another_beat(found):
+    """Return drives whose error has one more line, which repeats with nothing else."""
     orders = np.append(found.error_orders, 1.35)
-    phasors = np.hstack([found.error_phasors, np.full((n, 1), 2e-5 + 0j)])
+    phasors = np.pad(found.error_phasors, ((0, 0), (0, 1)), constant_values=2e-5)
     return replace(found, error_orders=orders, error_phasors=phasors)
 
 
@@ -107,10 +110,7 @@ def test_a_core_is_what_a_matrix_says_of_its_harmonics(rng):
 
 @pytest.mark.parametrize("effects", [FRICTION, (LOOP, *FRICTION)])
 def test_a_steady_state_does_not_depend_on_how_its_steps_are_found(effects, monkeypatch):
-    model = preset("calibrated")
-    coefficients = replace(model, effects=(*model.effects, *effects)).coefficients(
-        np.tile(model.nominal, (3, 1))
-    )
+    coefficients = drives(3, *effects)
     load = np.array([20.0, 40.0, 60.0])
     expected = harmonic_balance(coefficients, load_torque=load)
     monkeypatch.setattr(newton, "_OF_A_MATRIX", 0)
@@ -127,7 +127,7 @@ def test_a_steady_state_does_not_depend_on_how_its_steps_are_found(effects, monk
 
 def test_three_beats_at_once_leave_most_of_the_memory_free():
     """Matrices of 24 rows with 689 harmonics and what they are made of took 1.2 GB."""
-    coefficients = drives(24, LOOP, *FRICTION)
+    coefficients = with_another_beat(drives(24, LOOP, *FRICTION))
     torus = torus_of(coefficients)
     assert len(torus.orders) == 689
     tracemalloc.start()

@@ -189,14 +189,17 @@ class AngleEquations:
         second = np.where(self._backward[:, None], second[:, ::-1], second)
         return self.torus.back(np.hstack([second, second]))
 
-    def recollection(self, torsion: Phasors) -> Recollection | None:
+    @property
+    def remembers(self) -> bool:
+        """Tell whether a law has memory: its torque depends on the torsion elsewhere."""
+        return any(law.states for _, law in self.coefficients.laws)
+
+    def recollection(self, torsion: Phasors) -> Recollection:
         """Return how the mesh torque depends on the torsion elsewhere, by laws with memory.
 
-        To be added to what ``mesh_slope`` gives; None without such a law.
+        To be added to what ``mesh_slope`` gives.
         """
         memories = [cast(Memory, law) for _, law in self.coefficients.laws if law.states]
-        if not memories:
-            return None
         along = self._path(self.torus.signal(torsion))
         every = np.tile(np.arange(self.torus.size, dtype=float), (len(along), 1))
         places = self._path(every)[:, : self.torus.size].astype(int)

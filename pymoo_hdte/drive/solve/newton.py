@@ -134,8 +134,10 @@ class Place:
         if not rows.size:
             return []
         equations, slope, level = self.equations, self._mesh_slope[rows], self._level[rows]
-        of_rows = equations if len(rows) == len(self.torsion) else equations.rows(rows)
-        recollection = of_rows.recollection(self.torsion[rows])
+        recollection = None
+        if equations.remembers:
+            of_rows = equations if len(rows) == len(self.torsion) else equations.rows(rows)
+            recollection = of_rows.recollection(self.torsion[rows])
         varies = np.abs(slope - level) > _NEARLY_CONSTANT * np.abs(level)
         if recollection is None and not np.any(varies):
             return [None] * len(rows)

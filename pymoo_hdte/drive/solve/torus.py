@@ -235,9 +235,12 @@ class Torus:
 
         Of n rows, along a `path`. Matrices act as those of `product_matrix`.
         """
-        each = range(len(recollection.places))
-        rows = (recollection.of_signals(self._synthesis, row) for row in each)
-        return np.stack([self._stacked_harmonics(elsewhere) for elsewhere in rows])
+        n, size = len(recollection.places), 2 * len(self.orders)
+        found = np.empty((n, size, size))
+        for row in range(n):
+            elsewhere = recollection.of_signals(self._synthesis, row)
+            found[row] = self._stacked_harmonics(elsewhere)
+        return found
 
     def _stacked_harmonics(self, columns: Matrices) -> Matrices:
         """Return the harmonics (2 H, m), real parts first, of m signals on the grid, (G, m)."""
