@@ -13,7 +13,7 @@ from experiments.comparison.figures import BLUE, GREEN, GREY, ORANGE, grid
 from experiments.paper.models import models_of
 from experiments.published_values import TABLE_8
 from experiments.runner.registry import Context
-from experiments.runner.result import FAILS, Column, Finding, Picture, Result, Table
+from experiments.runner.result import OF_MODELS, Column, Finding, Picture, Result, Table
 from pymoo_hdte.drive import (
     PARAMETERS,
     PRESETS,
@@ -57,7 +57,7 @@ def run(context: Context) -> Result:
         ),
         models=models_of("published"),
         tables=(orders, _designs(designs)),
-        first_page={FAILS: _of_the_first_page(designs[0])},
+        first_page={OF_MODELS: _of_the_first_page(designs[0])},
         pictures=(
             Picture(
                 "gain",

@@ -26,7 +26,7 @@ from experiments.paper.models import FITTED, models_of
 from experiments.published_values import REEVALUATION_LIMITS, TABLE_8
 from experiments.runner.registry import Context
 from experiments.runner.result import (
-    FAILS,
+    OF_MODELS,
     Cell,
     Column,
     Finding,
@@ -78,7 +78,7 @@ def run(context: Context) -> Result:
             ),
         ),
         notes=(influence_note(ours[1]),),
-        first_page={FAILS: dominated(MODEL)},
+        first_page={OF_MODELS: dominated(MODEL)},
     )
 
 

@@ -10,7 +10,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from experiments.runner.catalogue import EXPERIMENTS
 from experiments.runner.provenance import report_fingerprint
-from experiments.runner.result import FAILS, HOLDS, NEW, Finding
+from experiments.runner.result import FIRST_PAGE, Finding
 from experiments.runner.store import TIMES, StoredPicture, StoredResult, load, write_atomically
 from pymoo_hdte.checks import InvalidInput
 
@@ -78,7 +78,7 @@ def write_report(out: Path, notice: str = "") -> Path:
     ]
     write_atomically(out / COMPARISONS, _page(COMPARISONS, common, up="", verdicts=verdicts))
     first = {
-        "sentences": {about: _parts(results, about) for about in (HOLDS, FAILS, NEW)},
+        "sentences": {about: _parts(results, about) for about in FIRST_PAGE},
         "shown": _shown_first(results),
         "verdicts": verdicts,
         "models": list(models),

@@ -26,8 +26,9 @@ class Finding:
     """One sentence that sets our numbers against the paper's, and whether the two agree.
 
     A ``check`` sets them against a demand of our own instead, and says whether it holds. Where the
-    model was ``fitted`` to the paper's numbers, giving them back is no agreement. What ``answers``
-    the question of its experiment is repeated at the top of the page.
+    model was ``fitted`` to the paper's numbers, giving them back is no agreement. What stands
+    ``within_paper`` sets printed numbers against each other and needs no drive model of ours. What
+    ``answers`` the question of its experiment is repeated at the top of the page.
     """
 
     agrees: bool
@@ -35,6 +36,7 @@ class Finding:
     check: bool = False
     fitted: bool = False
     answers: bool = False
+    within_paper: bool = False
 
     def __post_init__(self) -> None:
         if self.check and self.fitted:
@@ -130,8 +132,12 @@ class Picture:
     leading: bool = False
 
 
-HOLDS, FAILS, NEW = "What holds", "What does not", "What is new"
-"""The three sentences of the report's first page, of which experiments give the parts."""
+WITHIN_PAPER = "The paper against itself"
+AT_EVERY_BUDGET = "Table 7 at every budget"
+OF_MODELS = "What models of the drive say"
+NEW = "What is new"
+FIRST_PAGE = (WITHIN_PAPER, AT_EVERY_BUDGET, OF_MODELS, NEW)
+"""Sections of the report's first page, in its order: what needs no model of ours comes first."""
 
 
 @dataclass(frozen=True)
@@ -154,7 +160,7 @@ class Result:
     tables, pictures, notes
         What was found.
     first_page
-        Parts of the sentences `HOLDS`, `FAILS` and `NEW`, each beginning in lower case.
+        Parts of the sections of `FIRST_PAGE`, each beginning in lower case.
     shown_first
         Name of the picture that the first page shows, if any.
     """
@@ -171,9 +177,9 @@ class Result:
     shown_first: str = ""
 
     def __post_init__(self) -> None:
-        unknown = set(self.first_page) - {HOLDS, FAILS, NEW}
+        unknown = set(self.first_page) - set(FIRST_PAGE)
         if unknown:
-            raise ValueError(f"no sentence of the first page: {', '.join(sorted(unknown))}")
+            raise ValueError(f"no section of the first page: {', '.join(sorted(unknown))}")
         if not self.answer:
             found = (one for table in self.tables for one in table.findings if one.answers)
             object.__setattr__(self, "answer", " ".join(one.sentence for one in found))

@@ -3,7 +3,15 @@
 import numpy as np
 from matplotlib.figure import Figure
 
-from experiments.runner.result import FAILS, HOLDS, Column, Finding, Picture, Result, Table
+from experiments.runner.result import (
+    OF_MODELS,
+    WITHIN_PAPER,
+    Column,
+    Finding,
+    Picture,
+    Result,
+    Table,
+)
 
 HOSTILE = "<script>alert('x')</script>"
 
@@ -43,6 +51,6 @@ def example() -> Result:
         pictures=(Picture("line", "A line.", line_plot()),),
         notes=("A note.",),
         models={"calibrated": "What it is."},
-        first_page={HOLDS: "this holds", FAILS: "that does not"},
+        first_page={WITHIN_PAPER: "this holds", OF_MODELS: "that does not"},
         shown_first="line",
     )

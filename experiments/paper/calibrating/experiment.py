@@ -21,7 +21,7 @@ from experiments.paper.calibrating.tables import (
 )
 from experiments.runner.committed import committed_file, stored_outcome
 from experiments.runner.registry import Context
-from experiments.runner.result import HOLDS, Picture, Result
+from experiments.runner.result import OF_MODELS, Picture, Result
 from experiments.runner.store import write_atomically
 
 OUTCOMES = "calibration.csv"
@@ -72,7 +72,7 @@ def run(context: Context) -> Result:
             ),
         ),
         notes=tuple(unexplained(best)),
-        first_page={HOLDS: first},
+        first_page={OF_MODELS: first},
     )
 
 

@@ -38,7 +38,7 @@ from experiments.paper.inference.tables import (
 from experiments.paper.inference.verdicts import chosen_fits
 from experiments.runner.committed import committed_file, stored_outcome
 from experiments.runner.registry import Context, require
-from experiments.runner.result import FAILS, Picture, Result
+from experiments.runner.result import OF_MODELS, Picture, Result
 from experiments.runner.store import write_atomically
 
 NAME = "inference"
@@ -112,7 +112,7 @@ def run(context: Context) -> Result:
                 curves(profiled),
             ),
         ),
-        first_page={FAILS: of_the_first_page(fits)},
+        first_page={OF_MODELS: of_the_first_page(fits)},
     )
 
 

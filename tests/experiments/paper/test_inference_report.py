@@ -24,7 +24,7 @@ from experiments.paper.inference.verdicts import (
 from experiments.runner.campaign import Campaign
 from experiments.runner.committed import committed_file
 from experiments.runner.registry import Context
-from experiments.runner.result import FAILS, significant
+from experiments.runner.result import OF_MODELS, significant
 
 
 @pytest.fixture(scope="module")
@@ -59,7 +59,7 @@ def test_the_report_says_what_the_fits_say(tmp_path, fits):
     assert f"{len(meeting)} give" in result.answer
     # A model that is fitted to two targets is one model.
     assert len({one.rung for one in fits}) == searched
-    assert f"of {searched} fitted drive models" in result.first_page[FAILS]
+    assert f"of {searched} fitted drive models" in result.first_page[OF_MODELS]
     assert (not both) == (f"None of {searched} drive models gives both" in result.answer)
     least = min(meeting, key=lambda one: one.bic)
     assert f"by {significant(least.evaluation.depths.max(), 2)} widths" in result.answer

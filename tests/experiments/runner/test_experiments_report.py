@@ -22,7 +22,15 @@ from experiments.runner.catalogue import EXPERIMENTS
 from experiments.runner.committed import read_origin, read_rows, stored_outcome, table_with_origin
 from experiments.runner.registry import Context, Experiment
 from experiments.runner.report import check_page, write_report
-from experiments.runner.result import FAILS, HOLDS, Column, Finding, Result, Table, significant
+from experiments.runner.result import (
+    OF_MODELS,
+    WITHIN_PAPER,
+    Column,
+    Finding,
+    Result,
+    Table,
+    significant,
+)
 from experiments.runner.store import load, png_bytes, save
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.io.text_table import csv_text
@@ -254,11 +262,11 @@ def test_pages_are_well_formed_and_escape_what_they_show(out):
     assert "&lt;script&gt;" in (out / "table7" / "index.html").read_text()
 
 
-def test_the_first_page_has_three_sentences_pictures_and_a_card_for_each_result(out):
+def test_the_first_page_has_sections_pictures_and_a_card_for_each_result(out):
     first = write_report(out).read_text()
     sentences, cards = first.split('<ul class="cards">')
     found = re.findall(r"<h2>([^<]+)</h2>\s*<ul>\s*<li><a [^>]+>([^<]+)</a></li>", sentences)
-    assert found == [(HOLDS, "This holds."), (FAILS, "That does not.")]
+    assert found == [(WITHIN_PAPER, "This holds."), (OF_MODELS, "That does not.")]
     assert "python -m experiments" in sentences
     assert re.findall(r'<img src="([^"]*)"', sentences) == ["table7/line.png"]
     (card,) = cards.split("<li>")[1:]
