@@ -15,6 +15,7 @@ from experiments.anytime.job import AnytimeRun
 from experiments.anytime.measures import MEASURES, RETURNED, measure
 from experiments.anytime.moments import COMMON, EXACT, FRESH
 from experiments.comparison.references import true_front
+from experiments.comparison.runs import AS_PRINTED, VELOCITIES
 from experiments.published_values import TABLE_7
 from experiments.runner.campaign import Campaign
 from experiments.runner.committed import committed_file, read_rows, rounded, table_with_origin
@@ -29,11 +30,21 @@ DIGITS = 4
 """Digits kept of an indicator; the paper prints three or four."""
 
 
-class Part(NamedTuple):
-    """Algorithms on one drive model with one kind of moments, seeds from 1."""
+class Contested(NamedTuple):
+    """What algorithms are compared on: drive model, kind of moments, first velocities of swarms.
+
+    NSGA-II has no velocities; its runs stand beside those of the swarms under either law.
+    """
 
     model: str
     moments: str
+    velocity: str
+
+
+class Part(NamedTuple):
+    """Algorithms compared on the same problem with the same law of velocities, seeds from 1."""
+
+    contested: Contested
     algorithms: tuple[str, ...]
     seeds: int
 
@@ -48,20 +59,22 @@ class Extent(NamedTuple):
 
 FULL = Extent(
     parts=(
-        Part("calibrated", EXACT, EVERYONE, 20),
-        Part("resonant", EXACT, EVERYONE, 20),
-        Part("calibrated", COMMON, OF_TABLE_7, 20),
+        *(
+            Part(Contested(model, EXACT, velocity), EVERYONE, 50)
+            for model, velocity in product(("calibrated", "resonant"), VELOCITIES)
+        ),
+        *(Part(Contested("calibrated", COMMON, law), OF_TABLE_7, 50) for law in VELOCITIES),
         # Every evaluation costs a thousand of the surrogate: fewer seeds.
-        Part("calibrated", FRESH, OF_TABLE_7, 6),
+        Part(Contested("calibrated", FRESH, AS_PRINTED), OF_TABLE_7, 6),
     ),
     populations=(10, 20, 50, 100),
     budgets=(100, 200, 500, 1000, 2000, 5000, 10_000),
 )
 QUICK = Extent(
     parts=(
-        Part("calibrated", EXACT, EVERYONE, 7),
-        Part("calibrated", COMMON, OF_TABLE_7, 7),
-        Part("calibrated", FRESH, OF_TABLE_7, 7),
+        *(Part(Contested("calibrated", EXACT, law), EVERYONE, 7) for law in VELOCITIES),
+        Part(Contested("calibrated", COMMON, AS_PRINTED), OF_TABLE_7, 7),
+        Part(Contested("calibrated", FRESH, AS_PRINTED), OF_TABLE_7, 7),
     ),
     populations=(10, 20),
     budgets=(100, 200, 500),
@@ -73,10 +86,16 @@ class Case(NamedTuple):
 
     model: str
     moments: str
+    velocity: str
     counted: str
     population: int
     evaluations: int
     algorithm: str
+
+    @property
+    def contested(self) -> Contested:
+        """What it is compared on."""
+        return Contested(self.model, self.moments, self.velocity)
 
 
 @dataclass(frozen=True)
@@ -88,24 +107,24 @@ class Scores:
     values : dict of ndarray, shape (seeds, measures)
         By case, in the order of the seeds.
     seconds : dict of float
-        Median of a run over all budgets, by model, moments, population and algorithm.
+        Median of a run over all budgets, by model, moments, velocity, population and algorithm.
     """
 
     values: dict[Case, NDArray[np.float64]]
-    seconds: dict[tuple[str, str, int, str], float]
+    seconds: dict[tuple[str, str, str, int, str], float]
 
     def of(self, case: Case, name: str) -> NDArray[np.float64]:
         """Return one of the `MEASURES` of every run, shape (seeds,)."""
         return self.values[case][:, MEASURES.index(name)]
 
-    def problems(self) -> list[tuple[str, str]]:
-        """Drive models and kinds of moments, in the order of the table."""
-        return list(dict.fromkeys((case.model, case.moments) for case in self.values))
+    def contested(self) -> list[Contested]:
+        """Return what algorithms were compared on, in the order of the table."""
+        return list(dict.fromkeys(case.contested for case in self.values))
 
-    def algorithms(self, model: str, moments: str) -> list[str]:
-        """Names of the algorithms that ran on a problem."""
-        found = (c.algorithm for c in self.values if (c.model, c.moments) == (model, moments))
-        return list(dict.fromkeys(found))
+    def algorithms(self, contested: Contested) -> list[str]:
+        """Names of the algorithms that were compared there."""
+        names = (case.algorithm for case in self.values if case.contested == contested)
+        return list(dict.fromkeys(names))
 
     def populations(self) -> list[int]:
         """All sizes of the population, ascending."""
@@ -142,15 +161,15 @@ def run_scores(campaign: Campaign, extent: Extent) -> Scores:
     seconds = {}
     for part in extent.parts:
         jobs = _jobs(part, extent)
-        runs = dict(zip(jobs, campaign.run(jobs, f"{part.model}, {part.moments}"), strict=True))
+        runs = dict(zip(jobs, campaign.run(jobs, ", ".join(part.contested)), strict=True))
         for population, algorithm in product(extent.populations, part.algorithms):
             times = [r.seconds for j, r in runs.items() if _is(j, population, algorithm)]
-            seconds[part.model, part.moments, population, algorithm] = float(np.median(times))
+            seconds[*part.contested, population, algorithm] = float(np.median(times))
         for population, budget in product(extent.populations, extent.budgets):
             chosen = {(j.algorithm, j.seed): r for j, r in runs.items() if _is(j, population)}
-            found = measure(chosen, budget, population, true_front(part.model))
+            found = measure(chosen, budget, population, true_front(part.contested.model))
             for counted, algorithm in dict.fromkeys(key[:2] for key in found):
-                case = Case(part.model, part.moments, counted, population, budget, algorithm)
+                case = Case(*part.contested, counted, population, budget, algorithm)
                 rows = [found[counted, algorithm, 1 + seed] for seed in range(part.seeds)]
                 values[case] = np.vectorize(rounded)(np.array(rows), DIGITS)
     return Scores(values, seconds)
@@ -158,8 +177,17 @@ def run_scores(campaign: Campaign, extent: Extent) -> Scores:
 
 def _jobs(part: Part, extent: Extent) -> list[AnytimeRun]:
     entries = product(range(1, part.seeds + 1), part.algorithms, extent.populations)
+    model, moments, velocity = part.contested
     return [
-        AnytimeRun(part.model, part.moments, algorithm, population, seed, extent.budgets)
+        AnytimeRun(
+            model,
+            moments,
+            algorithm,
+            population,
+            seed,
+            extent.budgets,
+            AS_PRINTED if algorithm == "NSGA-II" else velocity,
+        )
         for seed, algorithm, population in entries
     ]
 
@@ -181,7 +209,7 @@ def format_scores(scores: Scores) -> str:
 def format_seconds(scores: Scores) -> str:
     """Return the CSV text of the seconds."""
     rows = ([*key, f"{value:.3g}"] for key, value in scores.seconds.items())
-    return csv_text(["model", "moments", "population", "algorithm", "seconds"], rows)
+    return csv_text([*Contested._fields, "population", "algorithm", "seconds"], rows)
 
 
 def read_scores(path: Path, seconds_path: Path) -> Scores:
@@ -190,9 +218,7 @@ def read_scores(path: Path, seconds_path: Path) -> Scores:
     for row in read_rows(path):
         found.setdefault(_case(row), []).append([float(row[name]) for name in MEASURES])
     seconds = {
-        (row["model"], row["moments"], int(row["population"]), row["algorithm"]): float(
-            row["seconds"]
-        )
+        (*_contested(row), int(row["population"]), row["algorithm"]): float(row["seconds"])
         for row in read_rows(seconds_path)
     }
     return Scores({case: np.array(rows) for case, rows in found.items()}, seconds)
@@ -200,17 +226,21 @@ def read_scores(path: Path, seconds_path: Path) -> Scores:
 
 def _case(row: dict[str, str]) -> Case:
     numbers = int(row["population"]), int(row["evaluations"])
-    return Case(row["model"], row["moments"], row["counted"], *numbers, row["algorithm"])
+    return Case(*_contested(row), row["counted"], *numbers, row["algorithm"])
+
+
+def _contested(row: dict[str, str]) -> Contested:
+    return Contested(*(row[name] for name in Contested._fields))
 
 
 def cases(
-    scores: Scores, model: str, moments: str, algorithms: Sequence[str], counted: str = RETURNED
+    scores: Scores, contested: Contested, algorithms: Sequence[str], counted: str = RETURNED
 ) -> Iterable[tuple[int, int, list[Case]]]:
-    """Yield every population and budget with the cases of some algorithms on a problem.
+    """Yield every population and budget with the cases of some algorithms compared there.
 
     Those at which nothing was counted this way are left out.
     """
     for population, budget in product(scores.populations(), scores.budgets()):
-        found = [Case(model, moments, counted, population, budget, name) for name in algorithms]
+        found = [Case(*contested, counted, population, budget, name) for name in algorithms]
         if all(case in scores.values for case in found):
             yield population, budget, found

@@ -8,10 +8,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.anytime.data import Scores, cases
+from experiments.anytime.data import Contested, Scores, cases
 from experiments.anytime.intervals import a12_intervals
 from experiments.anytime.measures import NORMALISED, RAW, RETURNED, TRUE, Scale
-from experiments.anytime.moments import EXACT
 from experiments.comparison.paired import SIGNIFICANT
 from experiments.comparison.statistics import holm, wilcoxon_p
 
@@ -50,7 +49,7 @@ class Duel(NamedTuple):
 
 def duels(
     scores: Scores,
-    model: str,
+    contested: Contested,
     ours: str,
     rivals: Sequence[str],
     indicator: str,
@@ -58,10 +57,10 @@ def duels(
 ) -> list[Duel]:
     """Set ``ours`` against each rival at every population and budget by one of `COMPARED`.
 
-    Moments are exact; ``counted`` says which designs of a set are.
+    ``counted`` says which designs of a set are.
     """
     where, first, second = [], [], []
-    for population, budget, (own, *others) in cases(scores, model, EXACT, [ours, *rivals], counted):
+    for population, budget, (own, *others) in cases(scores, contested, [ours, *rivals], counted):
         for other in others:
             where.append((population, budget, other.algorithm))
             first.append(scores.of(own, COMPARED[indicator]))

@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
-from experiments.anytime.data import Scores, cases
+from experiments.anytime.data import Contested, Scores, cases
 from experiments.anytime.duels import COMPARED
 from experiments.anytime.intervals import mean_intervals
 from experiments.anytime.readings import Reading
@@ -22,7 +22,7 @@ PRINTED = ("igd", "spacing")
 
 
 def over_budget(
-    scores: Scores, model: str, moments: str, algorithms: Sequence[str], *, printed: bool
+    scores: Scores, contested: Contested, algorithms: Sequence[str], *, printed: bool
 ) -> Figure:
     """Draw mean IGD, Spacing and hypervolume with their 95 % intervals over the evaluations.
 
@@ -33,7 +33,7 @@ def over_budget(
     for row, indicator in zip(axes, LABELS, strict=True):
         for axis, population in zip(row, populations, strict=True):
             for algorithm in algorithms:
-                _curve(axis, scores, (model, moments, population, algorithm), indicator)
+                _curve(axis, scores, contested, population, algorithm, indicator)
                 if printed and indicator in PRINTED:
                     value = getattr(TABLE_7[algorithm], indicator)
                     colour = ALGORITHM_STYLES[algorithm][0]
@@ -51,11 +51,17 @@ def over_budget(
     return figure
 
 
-def _curve(axis: Axes, scores: Scores, case: tuple[str, str, int, str], indicator: str) -> None:
-    model, moments, population, algorithm = case
+def _curve(
+    axis: Axes,
+    scores: Scores,
+    contested: Contested,
+    population: int,
+    algorithm: str,
+    indicator: str,
+) -> None:
     points = {
         budget: scores.of(one, COMPARED[indicator])
-        for size, budget, (one,) in cases(scores, model, moments, [algorithm])
+        for size, budget, (one,) in cases(scores, contested, [algorithm])
         if size == population
     }
     budgets = list(points)

@@ -12,8 +12,15 @@ from pymoo.core.problem import Problem
 
 from experiments.anytime.moments import problem_with
 from experiments.comparison.indicators import front_among
-from experiments.comparison.runs import ALGORITHMS, FINAL_SIZE, robust_problem
+from experiments.comparison.runs import (
+    ALGORITHMS,
+    AS_PRINTED,
+    FINAL_SIZE,
+    VELOCITIES,
+    robust_problem,
+)
 from experiments.runner.campaign import Run
+from pymoo_hdte.algorithms import ParticleSwarm
 from pymoo_hdte.algorithms.crowding import least_crowded
 
 UNSCHEDULED = ("NSGA-II", "A-MOPSO")
@@ -27,7 +34,7 @@ class AnytimeRun:
 
     An algorithm that follows a schedule begins anew for every budget, because a run of 200
     evaluations is not the beginning of one of 10,000. The budgets ascend and are multiples of the
-    population.
+    population. ``velocity`` is one of `VELOCITIES`; what is no swarm has none.
     """
 
     model: str
@@ -36,12 +43,14 @@ class AnytimeRun:
     population: int
     seed: int
     budgets: tuple[int, ...]
+    velocity: str = AS_PRINTED
 
     @property
     def key(self) -> str:
         """All settings in one name."""
         budgets = "_".join(map(str, self.budgets))
-        problem = f"{self.model}_{self.moments}"
+        law = "_first_step" if self.velocity != AS_PRINTED else ""
+        problem = f"{self.model}_{self.moments}{law}"
         return f"{problem}_{self.algorithm}_pop{self.population}_{budgets}_seed{self.seed}"
 
     def execute(self) -> Run:
@@ -69,6 +78,8 @@ class AnytimeRun:
         """Yield the designs and objectives that one run holds at each of its budgets."""
         problem: Problem = problem_with(self.model, self.moments, self.seed)
         algorithm = ALGORITHMS[self.algorithm](self.population, FINAL_SIZE)
+        if isinstance(algorithm, ParticleSwarm):
+            algorithm.initial_velocity = VELOCITIES[self.velocity]()
         algorithm.setup(problem, termination=("n_eval", budgets[-1]), seed=self.seed)
         for budget in budgets:
             while algorithm.evaluator.n_eval < budget:

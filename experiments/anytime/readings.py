@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.anytime.data import OF_TABLE_7, Case, Scores
+from experiments.anytime.data import OF_TABLE_7, Case, Contested, Scores
 from experiments.anytime.intervals import mean_of_known, paired_interval
 from experiments.anytime.measures import EQUAL, RETURNED, SCALES, Scale
 from experiments.published_values import TABLE_7
@@ -23,7 +23,7 @@ class Reading(NamedTuple):
 
     Attributes
     ----------
-    model, moments, scale, counted, population, evaluations
+    contested, scale, counted, population, evaluations
         The way.
     runs : ndarray, shape (3, 2, seeds)
         IGD and Spacing of NSGA-II, MOPSO and AMP-MOPSO.
@@ -37,8 +37,7 @@ class Reading(NamedTuple):
         ask for the unit.
     """
 
-    model: str
-    moments: str
+    contested: Contested
     scale: Scale
     counted: str
     population: int
@@ -69,29 +68,28 @@ def readings(scores: Scores) -> list[Reading]:
     return sorted((one for one in found if np.isfinite(one.factor)), key=lambda one: one.factor)
 
 
-def _ways(scores: Scores) -> Iterable[tuple[str, str, str, int, int, Scale]]:
+def _ways(scores: Scores) -> Iterable[tuple[Contested, str, int, int, Scale]]:
     settings = product(
-        scores.problems(), (RETURNED, EQUAL), scores.populations(), scores.budgets(), SCALES
+        scores.contested(), (RETURNED, EQUAL), scores.populations(), scores.budgets(), SCALES
     )
-    for (model, moments), counted, population, budget, scale in settings:
-        if Case(model, moments, counted, population, budget, OF_TABLE_7[0]) in scores.values:
-            yield model, moments, counted, population, budget, scale
+    for contested, counted, population, budget, scale in settings:
+        if Case(*contested, counted, population, budget, OF_TABLE_7[0]) in scores.values:
+            yield contested, counted, population, budget, scale
 
 
 def _reading(
     scores: Scores,
-    model: str,
-    moments: str,
+    contested: Contested,
     counted: str,
     population: int,
     budget: int,
     scale: Scale,
 ) -> Reading:
     measures = [f"{indicator}_{scale.suffix}" for indicator in ("igd", "spacing")]
-    who = [Case(model, moments, counted, population, budget, name) for name in OF_TABLE_7]
+    who = [Case(*contested, counted, population, budget, name) for name in OF_TABLE_7]
     runs = np.array([[scores.of(case, measure) for measure in measures] for case in who])
     means = mean_of_known(runs)
-    way = model, moments, scale, counted, population, budget
+    way = contested, scale, counted, population, budget
     return Reading(*way, runs, means, *factors(means))
 
 

@@ -7,8 +7,9 @@ from itertools import groupby
 
 import numpy as np
 
-from experiments.anytime.data import Case, Scores
+from experiments.anytime.data import Case, Contested, Scores
 from experiments.anytime.duels import COMPARED, Duel
+from experiments.anytime.leads import leads_sentence
 from experiments.anytime.measures import EQUAL, RETURNED
 from experiments.anytime.moments import EXACT
 from experiments.anytime.readings import Reading
@@ -19,13 +20,15 @@ from experiments.anytime.tables import (
     STATED,
     Contest,
     Contests,
+    drawn,
     standing,
     stated_place,
 )
+from experiments.comparison.runs import AS_PRINTED
 from experiments.runner.result import AT_EVERY_BUDGET, Finding, significant
 
-MODEL = "calibrated"
-"""Drive model that the first sentence of the report speaks of."""
+SPOKEN_OF = Contested("calibrated", EXACT, AS_PRINTED)
+"""What the first sentence of the report speaks of."""
 
 
 def advantage_findings(found: Contests) -> Iterator[Finding]:
@@ -37,8 +40,9 @@ def advantage_findings(found: Contests) -> Iterator[Finding]:
         word = standing(at_stated)
         yield Finding(
             word == "ahead of both",
-            f"On {contest.model}, {OURS} is ahead of both rivals in {NAMES[contest.indicator]} "
-            f"beyond chance {settings_ahead(entries) or 'nowhere'}; at the stated 100 x 100 it is "
+            f"On {contest.contested.model} with velocities drawn {drawn(contest.contested)}, "
+            f"{OURS} is ahead of both rivals in {NAMES[contest.indicator]} beyond chance "
+            f"{settings_ahead(entries) or 'nowhere'}; at the stated 100 x 100 it is "
             f"{_level(word)}.",
         )
 
@@ -108,7 +112,7 @@ def _lead(scores: Scores, one: Reading, counted: str) -> float:
     """Return how many times AMP-MOPSO's mean IGD NSGA-II's is; NaN if that was not counted."""
     means = []
     for algorithm in ("NSGA-II", OURS):
-        case = Case(one.model, one.moments, counted, one.population, one.evaluations, algorithm)
+        case = Case(*one.contested, counted, one.population, one.evaluations, algorithm)
         if case not in scores.values:
             return np.nan
         means.append(scores.of(case, f"igd_{one.scale.suffix}").mean())
@@ -118,48 +122,41 @@ def _lead(scores: Scores, one: Reading, counted: str) -> float:
 def _setting(one: Reading) -> str:
     unit = "in arcsec" if one.scale.unit == "arcsec" else one.scale.unit
     return (
-        f"{one.population} particles after {one.evaluations:,} evaluations ({one.model}, "
-        f"{one.moments} moments, against the {one.scale.reference}, {unit})"
+        f"{one.population} particles after {one.evaluations:,} evaluations "
+        f"({one.contested.model}, {one.contested.moments} moments, velocities drawn "
+        f"{drawn(one.contested)}, against the {one.scale.reference}, {unit})"
     )
 
 
 def opening(scores: Scores, found: Contests, ranked: Sequence[Reading]) -> str:
-    """Return the first sentences of the report; empty where the stated setting was not run."""
-    entries, place = found.get(Contest(MODEL, "igd"), []), stated_place(ranked)
+    """Return the first sentences of the report, about the stated setting where it was run."""
+    entries, place = found.get(Contest(SPOKEN_OF, "igd"), []), stated_place(ranked)
     at_stated = _of_stated(entries)
     if not at_stated or place is None:
-        return ""
+        return f"O{leads_sentence(scores)[1:]}."
     igd, spacing = (
-        settings_ahead(found[Contest(MODEL, indicator)]) or "nowhere"
+        settings_ahead(found[Contest(SPOKEN_OF, indicator)]) or "nowhere"
         for indicator in ("igd", "spacing")
     )
     best, stated = ranked[0], ranked[place]
     return (
         f"Of the paper's Table 7, {OURS}'s advantage over both MOPSO and NSGA-II holds, on "
-        f"{MODEL}, in IGD {igd}, and in Spacing {spacing}. At the stated 100 x 100 evaluations "
-        f"{_at_stated(scores, standing(at_stated))} The printed numbers come closest with "
-        f"{best.population} particles after {best.evaluations:,} evaluations (off by a factor of "
-        f"{significant(best.factor, 2)}, against {significant(stated.factor, 2)} at 100 x 100)."
+        f"{SPOKEN_OF.model}, in IGD {igd}, and in Spacing {spacing}. At the stated 100 x 100 "
+        f"evaluations {_at_stated(scores, standing(at_stated))} The printed numbers come closest "
+        f"with {best.population} particles after {best.evaluations:,} evaluations (off by a factor "
+        f"of {significant(best.factor, 2)}, against {significant(stated.factor, 2)} at 100 x 100)."
     )
 
 
 def first_page(scores: Scores, found: Contests) -> dict[str, str]:
     """Return what holds of Table 7, and what does not, as a part of the first page."""
-    entries = found.get(Contest(MODEL, "igd"), [])
+    entries = found.get(Contest(SPOKEN_OF, "igd"), [])
     at_stated = _of_stated(entries)
     if not at_stated:
         return {}
-    parts = []
-    ahead = settings_ahead(entries)
-    if ahead:
-        parts.append(f"{OURS} is ahead of MOPSO and NSGA-II in IGD, on {MODEL}, {ahead}")
-    word = standing(at_stated)
-    if word != "ahead of both":
-        parts.append(
-            f"at the stated 100 x 100 evaluations {OURS} is {_level(word)}, where "
-            f"{_near_each_other(scores)}"
-        )
-    return {AT_EVERY_BUDGET: "; ".join(parts)}
+    stated = f"at the stated 100 x 100 evaluations {OURS} is {_level(standing(at_stated))}"
+    near = _near_each_other(scores)
+    return {AT_EVERY_BUDGET: f"{stated}, where {near}; {leads_sentence(scores)}"}
 
 
 def _level(word: str) -> str:
@@ -174,7 +171,7 @@ def _at_stated(scores: Scores, word: str) -> str:
 
 def _near_each_other(scores: Scores) -> str:
     runs = [
-        scores.of(Case(MODEL, EXACT, RETURNED, *STATED, name), COMPARED["igd"])
+        scores.of(Case(*SPOKEN_OF, RETURNED, *STATED, name), COMPARED["igd"])
         for name in (OURS, *RIVALS)
     ]
     means = [run.mean() for run in runs]

@@ -8,12 +8,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from experiments.anytime.data import OF_TABLE_7, Scores
+from experiments.anytime.data import OF_TABLE_7, Case, Contested, Scores
 from experiments.anytime.duels import COMPARED, Duel, duels
 from experiments.anytime.intervals import mean_intervals
-from experiments.anytime.measures import EQUAL, RETURNED
-from experiments.anytime.moments import EXACT
+from experiments.anytime.measures import EQUAL, NORMALISED, RETURNED, TRUE, Scale
+from experiments.anytime.moments import EXACT, N_SAMPLES
 from experiments.anytime.readings import PRINTED, Reading
+from experiments.comparison.runs import AS_PRINTED
 from experiments.published_values import TABLE_7
 from experiments.runner.result import Cell, Column, Finding, Table
 
@@ -24,12 +25,17 @@ STATED = 100, 10_000
 NAMES = {"igd": "IGD", "spacing": "Spacing", "hypervolume": "hypervolume"}
 SHOWN = 12
 """Readings that the page lists, besides the closest at the stated setting."""
+SCALE = Scale(TRUE, NORMALISED)
+"""How Table 7's page measures."""
+WHERE = Column("problem"), Column("first velocities")
+CONTESTED = WHERE[0], Column("moments"), WHERE[1]
+"""Columns that say what algorithms were compared on, with exact moments and in general."""
 
 
 class Contest(NamedTuple):
-    """On which drive model and by which measure AMP-MOPSO meets the rivals of Table 7."""
+    """On what and by which measure AMP-MOPSO meets the rivals of Table 7."""
 
-    model: str
+    contested: Contested
     indicator: str
     counted: str = RETURNED
 
@@ -43,23 +49,35 @@ Contests = dict[Contest, list[Duel]]
 
 
 def contests(scores: Scores) -> Contests:
-    """Return the duels on every drive model with exact moments.
+    """Return the duels on every drive model, with exact moments and either law of velocities.
 
     By IGD, which more designs make smaller, also with no more designs than the population.
     """
     asked = [
-        Contest(model, *what)
-        for model in models(scores)
+        Contest(contested, *what)
+        for contested in exactly(scores)
         for what in (("igd",), ("igd", EQUAL), ("spacing",), ("hypervolume",))
     ]
     return {
-        one: duels(scores, one.model, OURS, RIVALS, one.indicator, one.counted) for one in asked
+        contest: duels(scores, contest.contested, OURS, RIVALS, contest.indicator, contest.counted)
+        for contest in asked
     }
 
 
-def models(scores: Scores) -> list[str]:
-    """Return the drive models that ran with exact moments."""
-    return [model for model, moments in scores.problems() if moments == EXACT]
+def exactly(scores: Scores) -> list[Contested]:
+    """Return what ran with exact moments: every drive model with every law of velocities."""
+    return [contested for contested in scores.contested() if contested.moments == EXACT]
+
+
+def _where(contested: Contested) -> tuple[str, str]:
+    """Return the cells of `WHERE`."""
+    return contested.model, contested.velocity
+
+
+def drawn(contested: Contested) -> str:
+    """Say how first velocities are drawn, as a part of a sentence."""
+    printed = contested.velocity == AS_PRINTED
+    return "as printed" if printed else "so that the first step stays within the bounds"
 
 
 def standings_table(found: Contests, findings: Sequence[Finding]) -> Table:
@@ -70,12 +88,12 @@ def standings_table(found: Contests, findings: Sequence[Finding]) -> Table:
         for population, of_population in groupby(entries, key=lambda duel: duel.population):
             by_budget = groupby(of_population, key=lambda duel: duel.evaluations)
             words = [standing(list(of_budget)) for _, of_budget in by_budget]
-            rows.append((contest.model, contest.measure, population, *words))
+            rows.append((*_where(contest.contested), contest.measure, population, *words))
     columns = [Column(f"{budget:,}", group="evaluations") for budget in budgets]
     return Table(
         "standings",
         f"{OURS} beside the rivals of Table 7, beyond chance (Wilcoxon with Holm, 5 %)",
-        (Column("problem"), Column("indicator"), Column("population"), *columns),
+        (*WHERE, Column("indicator"), Column("population"), *columns),
         tuple(rows),
         findings=tuple(findings),
     )
@@ -91,16 +109,46 @@ def standing(entries: Sequence[Duel]) -> str:
     return ", ".join(parts) or "level"
 
 
+def stated_table(scores: Scores) -> Table:
+    """Give Table 7's indicators at its stated budget for every kind of moments and velocities."""
+    rows: list[tuple[Cell, ...]] = []
+    for contested in scores.contested():
+        cases = [Case(*contested, RETURNED, *STATED, name) for name in OF_TABLE_7]
+        if all(case in scores.values for case in cases):
+            igd, spacing = (
+                [float(scores.of(case, f"{name}_{SCALE.suffix}").mean()) for case in cases]
+                for name in ("igd", "spacing")
+            )
+            seeds = len(scores.values[cases[0]])
+            rows.append((*contested, *igd, *spacing, seeds))
+    paper = (("the paper", None, None, *PRINTED.T.ravel().tolist(), 20),) if rows else ()
+    return Table(
+        "stated",
+        "The stated 100 x 100 evaluations with other moments and other first velocities: means",
+        (
+            *CONTESTED,
+            *(Column(name, digits=3, group="IGD") for name in OF_TABLE_7),
+            *(Column(name, digits=3, group="Spacing") for name in OF_TABLE_7),
+            Column("seeds"),
+        ),
+        (*paper, *rows),
+        note=f"Common moments are those of {N_SAMPLES:,} samples that all designs share, as the "
+        "paper draws them; sets found with samples are measured by their exact moments. "
+        "Indicators are normalised by the true front.",
+    )
+
+
 def duels_table(found: Contests) -> Table:
     """Give every duel: ratio of the means, A12 with its interval, and p."""
-    columns = [Column(name) for name in ("problem", "population", "evaluations", "rival")]
+    columns = [*WHERE, *(Column(name) for name in ("population", "evaluations", "rival"))]
     rows: dict[tuple[Cell, ...], list[Cell]] = {}
     for indicator in COMPARED:
         columns += duel_columns(NAMES[indicator])
         for contest, entries in found.items():
             if contest[1:] == (indicator, RETURNED):
                 for duel in entries:
-                    where = (contest.model, duel.population, duel.evaluations, duel.rival)
+                    setting = duel.population, duel.evaluations, duel.rival
+                    where = (*_where(contest.contested), *setting)
                     rows.setdefault(where, []).extend(duel_cells(duel))
     return Table(
         "duels",
@@ -129,15 +177,15 @@ def duel_cells(duel: Duel) -> list[Cell]:
 
 def means_table(scores: Scores) -> Table:
     """Give the means that the pictures show, with their intervals."""
-    columns = [Column(name) for name in ("problem", "moments", "population", "evaluations")]
-    columns += [Column("algorithm"), Column("designs returned", digits=3)]
+    columns = [*CONTESTED, *(Column(name) for name in ("population", "evaluations", "algorithm"))]
+    columns.append(Column("designs returned", digits=3))
     for indicator in COMPARED:
         unit = "" if indicator == "hypervolume" else "arcsec"
         columns.append(Column("mean", unit, 3, NAMES[indicator]))
         columns.append(Column("95 %", group=NAMES[indicator]))
     returned = [case for case in scores.values if case.counted == RETURNED]
     rows: list[tuple[Cell, ...]] = []
-    for problem, group in groupby(returned, key=lambda case: case[:2]):
+    for contested, group in groupby(returned, key=lambda case: case.contested):
         of_problem = list(group)
         found = [
             mean_intervals(np.array([scores.of(case, measure) for case in of_problem]))
@@ -146,7 +194,8 @@ def means_table(scores: Scores) -> Table:
         for i, case in enumerate(of_problem):
             cells = [cell for intervals in found for cell in _mean_cells(*intervals[i])]
             size = float(scores.of(case, "size").mean())
-            rows.append((*problem, *case[3:], size, *cells))
+            where = *contested, case.population, case.evaluations, case.algorithm
+            rows.append((*where, size, *cells))
     title = "Means over the seeds, against the true front"
     return Table("means", title, tuple(columns), tuple(rows), folded=True)
 
@@ -166,7 +215,9 @@ def readings_table(ranked: Sequence[Reading], findings: Sequence[Finding], note:
     if stated is not None and stated not in kept:
         kept.append(stated)
     columns = (
-        *(Column(name) for name in ("place", "problem", "moments", "reference", "unit")),
+        Column("place"),
+        *CONTESTED,
+        *(Column(name) for name in ("reference", "unit")),
         *(Column(name) for name in ("designs counted", "population", "evaluations")),
         *(Column(name, digits=3, group="IGD") for name in TABLE_7),
         *(Column(name, digits=3, group="Spacing") for name in TABLE_7),
@@ -175,7 +226,7 @@ def readings_table(ranked: Sequence[Reading], findings: Sequence[Finding], note:
         Column("whatever the unit", digits=3, group="off by"),
         Column("printed order"),
     )
-    paper: tuple[Cell, ...] = ("the paper", None, None, None, None, None, *STATED)
+    paper: tuple[Cell, ...] = ("the paper", *[None] * (len(CONTESTED) + 3), *STATED)
     rows = [(*paper, *PRINTED.T.ravel().tolist(), None, None, None, "kept")]
     rows += [_reading_row(place, ranked[place]) for place in kept]
     return Table(
@@ -198,8 +249,7 @@ def stated_place(ranked: Sequence[Reading]) -> int | None:
 def _reading_row(place: int, one: Reading) -> tuple[Cell, ...]:
     return (
         f"{place + 1}",
-        one.model,
-        one.moments,
+        *one.contested,
         one.scale.reference,
         one.scale.unit,
         one.counted,

@@ -12,8 +12,16 @@ from pymoo.core.algorithm import Algorithm
 from pymoo.optimize import minimize
 
 from experiments.runner.campaign import Run
-from pymoo_hdte.algorithms import AMOPSO, AMPMOPSO, MOPSO, MPMOPSO
+from pymoo_hdte.algorithms import (
+    AMOPSO,
+    AMPMOPSO,
+    MOPSO,
+    MPMOPSO,
+    FirstStepWithinBounds,
+    VelocityWithinBounds,
+)
 from pymoo_hdte.algorithms.crowding import least_crowded
+from pymoo_hdte.algorithms.velocity import InitialVelocity
 from pymoo_hdte.problems import RobustDTE
 
 FINAL_SIZE = 50
@@ -27,6 +35,13 @@ ALGORITHMS: dict[str, Callable[[int, int], Algorithm]] = {
     "AMP-MOPSO": lambda population, size: AMPMOPSO(pop_size=population, archive_size=size),
 }
 """How each algorithm is made from the size of its population and of its final set."""
+
+AS_PRINTED, FIRST_STEP = "within the bounds", "first step within the bounds"
+VELOCITIES: dict[str, type[InitialVelocity]] = {
+    AS_PRINTED: VelocityWithinBounds,
+    FIRST_STEP: FirstStepWithinBounds,
+}
+"""Laws of the first velocities: the paper's, which the swarms take by default, and another."""
 
 
 @cache

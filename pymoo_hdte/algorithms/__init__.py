@@ -8,6 +8,7 @@ from pymoo_hdte.algorithms.interpolated_front import FoundFront, interpolated_fr
 from pymoo_hdte.algorithms.pyramid import Flat, Pyramid
 from pymoo_hdte.algorithms.swarm import ParticleSwarm
 from pymoo_hdte.algorithms.variants import AMOPSO, AMPMOPSO, MOPSO, MPMOPSO
+from pymoo_hdte.algorithms.velocity import FirstStepWithinBounds, VelocityWithinBounds
 
 __all__ = [
     "AMOPSO",
@@ -17,11 +18,13 @@ __all__ = [
     "CompactSwarm",
     "ElitistSwarm",
     "EntropyWeight",
+    "FirstStepWithinBounds",
     "Flat",
     "FoundFront",
     "LeaderArchive",
     "LinearDecrease",
     "ParticleSwarm",
     "Pyramid",
+    "VelocityWithinBounds",
     "interpolated_front",
 ]

@@ -18,7 +18,8 @@ from pymoo_hdte.algorithms.horizon import generation_limit
 from pymoo_hdte.algorithms.inertia import InertiaWeight
 from pymoo_hdte.algorithms.points import Points
 from pymoo_hdte.algorithms.pyramid import Hierarchy
-from pymoo_hdte.checks import whole_number
+from pymoo_hdte.algorithms.velocity import InitialVelocity, VelocityWithinBounds
+from pymoo_hdte.checks import InvalidInput, whole_number
 
 
 class ParticleSwarm(Swarm):
@@ -35,6 +36,9 @@ class ParticleSwarm(Swarm):
         Rule for w.
     hierarchy : Hierarchy
         Rule for c1, c2 and the mutation.
+    initial_velocity : InitialVelocity, optional
+        Law of the first velocities, within the bounds of the positions by default
+        (`VelocityWithinBounds`).
     pop_size : int
         Number of particles N_p, at least 2.
     archive_size : int
@@ -54,21 +58,20 @@ class ParticleSwarm(Swarm):
     InvalidInput
         From the constructor for a size that is not allowed; from ``setup`` for a problem with
         integer, binary or mixed variables, without finite bounds or with one objective, or if G_max
-        is not known; from ``ask`` for first positions that do not fit.
+        is not known; from ``ask`` for first positions or velocities that do not fit.
     TypeError
         For an argument that does not exist.
 
     Notes
     -----
-    What the paper (Section 5.1) leaves open follows common practice:
+    What the paper (Section 5.1) leaves open follows common practice; the page on the paper's
+    numbers sets every printed statement beside the choice made here:
 
     - generation 1 is the initial sample; the move from generation t to t + 1 uses t in the
       schedules, the archive of generation t and the Pareto ranks of the swarm at generation t;
     - r1 and r2 are drawn for every particle and every dimension (Kennedy, Eberhart 1995);
     - a leader is drawn for every particle: the less crowded of two random members of the archive
       (SMPSO: Nebro et al. 2009), and the particle's own best while the archive is empty;
-    - first velocities are uniform such that the first step would end within the box (SPSO 2011:
-      Clerc 2012); a velocity drawn from the box of the positions itself would depend on the origin;
     - a position cut to the box keeps its velocity, and no velocity is clamped;
     - where neither the old nor the new personal best dominates, a fair coin decides (Coello Coello,
       Pulido, Lechuga 2004);
@@ -100,6 +103,7 @@ class ParticleSwarm(Swarm):
         inertia: InertiaWeight,
         hierarchy: Hierarchy,
         *,
+        initial_velocity: InitialVelocity | None = None,
         pop_size: int = 100,
         archive_size: int = 50,
         n_max_gen: int | None = None,
@@ -113,15 +117,18 @@ class ParticleSwarm(Swarm):
         self.n_max_gen = n_max_gen
         self.inertia = inertia
         self.hierarchy = hierarchy
+        self.initial_velocity = initial_velocity or VelocityWithinBounds()
 
     def _plan(self) -> None:
         self.generations = generation_limit(self.termination, self.pop_size, self.n_max_gen)
 
     def _initialize_infill(self) -> Population:
         particles = super()._initialize_infill()
-        X = particles.get("X")
-        lowest, highest = self.problem.bounds()
-        V = self.random_state.uniform(lowest - X, highest - X)
+        X, (lowest, highest) = particles.get("X"), self.problem.bounds()
+        V = self.initial_velocity(X, lowest, highest, self.random_state)
+        if np.shape(V) != X.shape:
+            wanted = f"{X.shape}, that of the positions"
+            raise InvalidInput("shape that initial_velocity returns", np.shape(V), wanted)
         return self._flying(particles, V, [None] * self.pop_size)
 
     def _flying(

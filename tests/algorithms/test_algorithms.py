@@ -24,6 +24,7 @@ from pymoo_hdte.algorithms import (
     MOPSO,
     MPMOPSO,
     EntropyWeight,
+    FirstStepWithinBounds,
     Flat,
     LinearDecrease,
     ParticleSwarm,
@@ -52,11 +53,11 @@ class Still:
 
 
 def test_without_pull_particles_fly_straight_and_stop_at_the_bounds():
-    swarm = ParticleSwarm(LinearDecrease(1.0, 1.0), Still(), **SMALL)
+    law = FirstStepWithinBounds()
+    swarm = ParticleSwarm(LinearDecrease(1.0, 1.0), Still(), initial_velocity=law, **SMALL)
     result = run(swarm, Parabolas(), n_gen=3, save_history=True)
     before, after, last = (step.pop for step in result.history)
     np.testing.assert_array_equal(before.get("V"), last.get("V"))
-    # The first step ends within the box by the choice of the first velocities.
     np.testing.assert_allclose(after.get("X"), before.get("X") + before.get("V"))
     expected = np.clip(after.get("X") + after.get("V"), -1.0, 2.0)
     np.testing.assert_array_equal(last.get("X"), expected)
@@ -179,7 +180,7 @@ def test_three_objectives():
 @pytest.mark.parametrize("algorithm", [MOPSO, AMPMOPSO])
 def test_constrained_fronts_are_feasible_and_free_of_duplicates(algorithm, name):
     problem = get_problem(name)
-    result = run(algorithm(), problem, n_gen=60)
+    result = run(algorithm(initial_velocity=FirstStepWithinBounds()), problem, n_gen=60)
     F, G = problem.evaluate(result.X, return_values_of=["F", "G"])
     np.testing.assert_array_equal(F, result.F)
     assert np.all(G <= 0.0)
@@ -388,7 +389,8 @@ def test_least_infeasible_solution_on_request():
 
 @pytest.mark.parametrize("edge", [0.5, 1.9])
 def test_not_a_number_never_reaches_the_front(edge):
-    result = run(AMPMOPSO(**SMALL), Cliff(edge), n_gen=60)
+    swarm = AMPMOPSO(initial_velocity=FirstStepWithinBounds(), **SMALL)
+    result = run(swarm, Cliff(edge), n_gen=60)
     assert np.isfinite(result.F).all()
     assert np.all(result.X[:, 0] >= edge)
     assert_clean_front(result)

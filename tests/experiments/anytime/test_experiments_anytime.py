@@ -7,8 +7,10 @@ import pytest
 
 from experiments.anytime.data import (
     EVERYONE,
+    FULL,
     OF_TABLE_7,
     Case,
+    Contested,
     Extent,
     Part,
     Scores,
@@ -25,13 +27,19 @@ from experiments.anytime.job import AnytimeRun, sets_of
 from experiments.anytime.measures import EQUAL, MEASURES, RETURNED, SCALES, measure
 from experiments.anytime.moments import COMMON, COMMON_SEED, EXACT, FRESH, N_SAMPLES, problem_with
 from experiments.anytime.readings import PRINTED, Reading, factors, readings
-from experiments.comparison.runs import OptimisationRun, robust_problem
+from experiments.comparison.runs import (
+    AS_PRINTED,
+    FIRST_STEP,
+    OptimisationRun,
+    robust_problem,
+)
 from experiments.comparison.statistics import effect_size
 from experiments.runner.campaign import Campaign, Run
 from experiments.runner.registry import Context
 from pymoo_hdte.problems import RobustDTE
 
-SMALL = Extent((Part("calibrated", EXACT, OF_TABLE_7, 2),), (10, 50), (100, 200))
+ON = Contested("calibrated", EXACT, AS_PRINTED)
+SMALL = Extent((Part(ON, OF_TABLE_7, 2),), (10, 50), (100, 200))
 
 
 @pytest.fixture
@@ -133,7 +141,7 @@ def test_intervals_hold_the_estimate_and_match_the_plain_statistic(rng):
 def test_the_interval_of_a_reading_holds_its_factor(rng):
     runs = 2.0 * PRINTED[:, :, None] * rng.uniform(0.9, 1.1, (3, 2, 20))
     means = runs.mean(axis=-1)
-    way = "calibrated", EXACT, SCALES[0], RETURNED, 10, 100
+    way = ON, SCALES[0], RETURNED, 10, 100
     one = Reading(*way, runs, means, *factors(means))
     low, high = one.factor_interval()
     assert low < one.factor < high
@@ -150,7 +158,7 @@ def test_runs_without_a_value_leave_no_interval():
 def scores_of(**of_algorithms):
     """Scores at one population and budget, each measure alike, from the runs of algorithms."""
     values = {
-        Case("calibrated", EXACT, RETURNED, 10, 100, name.replace("_", "-")): np.repeat(
+        Case(*ON, RETURNED, 10, 100, name.replace("_", "-")): np.repeat(
             np.array(runs)[:, None], len(MEASURES), axis=1
         )
         for name, runs in of_algorithms.items()
@@ -161,11 +169,11 @@ def scores_of(**of_algorithms):
 @pytest.mark.parametrize(("indicator", "ahead"), [("igd", 1), ("hypervolume", -1)])
 def test_who_is_ahead_depends_on_what_is_better(indicator, ahead):
     small = np.linspace(1.0, 2.0, 12)
-    (duel,) = duels(scores_of(A=small, B=small + 5.0), "calibrated", "A", ["B"], indicator)
+    (duel,) = duels(scores_of(A=small, B=small + 5.0), ON, "A", ["B"], indicator)
     assert duel.ahead == ahead
     assert duel.better == duel.low == duel.high == (1.0 if ahead == 1 else 0.0)
     assert duel.ratio == pytest.approx(1.5 / 6.5)
-    level = duels(scores_of(A=small, B=small), "calibrated", "A", ["B"], indicator)
+    level = duels(scores_of(A=small, B=small), ON, "A", ["B"], indicator)
     assert level[0].ahead == 0
 
 
@@ -190,11 +198,13 @@ class TestStoredOutcome:
         """On a processor that rounds otherwise a few runs end as other seeds do."""
         front = robust_problem("calibrated").pareto_front()
         same = []
-        for algorithm, moments in product(OF_TABLE_7, (EXACT, COMMON, FRESH)):
-            run = AnytimeRun("calibrated", moments, algorithm, 10, 2, (200,)).execute()
+        parts = [part for part in FULL.parts if part.contested.model == "calibrated"]
+        for algorithm, part in product(OF_TABLE_7, parts):
+            model, moments, law = part.contested
+            run = AnytimeRun(model, moments, algorithm, 10, 2, (200,), law).execute()
             found = measure({(algorithm, 2): run}, 200, 10, front)
             for counted in (RETURNED, EQUAL):
-                case = Case("calibrated", moments, counted, 10, 200, algorithm)
+                case = Case(*part.contested, counted, 10, 200, algorithm)
                 today = dict(zip(MEASURES, found[counted, algorithm, 2], strict=True))
                 for name in ("size", *COMPARED.values()):
                     stored = scores.of(case, name)
@@ -213,7 +223,7 @@ class TestStoredOutcome:
         self, evaluations, igd, spacing, scores
     ):
         for name, *expected in zip(OF_TABLE_7, igd, spacing, strict=True):
-            case = Case("calibrated", EXACT, RETURNED, 10, evaluations, name)
+            case = Case("calibrated", EXACT, FIRST_STEP, RETURNED, 10, evaluations, name)
             found = [scores.of(case, COMPARED[one])[:12].mean() for one in ("igd", "spacing")]
             assert found == pytest.approx(expected, abs=1e-3)
 

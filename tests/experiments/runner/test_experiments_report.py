@@ -313,8 +313,8 @@ def test_a_page_begins_with_its_answer_and_a_leading_picture(tmp_path):
     assert places == sorted(places)
 
 
-def test_a_result_speaks_of_no_other_sentence_of_the_first_page():
-    with pytest.raises(ValueError, match="no sentence of the first page: What else"):
+def test_a_result_speaks_in_no_other_section_of_the_first_page():
+    with pytest.raises(ValueError, match="no section of the first page: What else"):
         Result("", "", first_page={"What else": "this"})
 
 
