@@ -85,7 +85,9 @@ class RobustProblem(Problem):
 
     Notes
     -----
-    Evaluating a design outside the box, or one that is NaN, raises `ExtrapolationError`.
+    Evaluating a design outside the box, or one that is NaN, raises `ExtrapolationError`. One that
+    is outside only because its values were printed with four digits is evaluated on the boundary
+    (`Box.settle`).
 
     Examples
     --------
@@ -137,9 +139,10 @@ class RobustProblem(Problem):
             If a design is outside the box or NaN: the surrogate knows nothing there, and a NaN
             objective would pass for a non-dominated one.
         """
-        out["F"] = np.column_stack(self.moments(x))
+        designs = self.moments.design_box.settle(x)
+        out["F"] = np.column_stack(self.moments(designs))
         if "dF" in out:
-            out["dF"] = np.stack(self.moments.gradient(x), axis=1)
+            out["dF"] = np.stack(self.moments.gradient(designs), axis=1)
 
 
 def _some_corners(box: Box) -> NDArray[np.float64]:

@@ -184,6 +184,7 @@ class RobustDTEGrades(StoredFront, RobustProblem):
     def _evaluate(
         self, x: NDArray[np.float64], out: dict[str, Any], *args: Any, **kwargs: Any
     ) -> None:
+        x = self.moments.design_box.settle(x)
         super()._evaluate(x, out, *args, **kwargs)
         grades = x[:, len(DESIGN_VARIABLES) :]
         cost = (1.0 / grades) @ self.cost_shares

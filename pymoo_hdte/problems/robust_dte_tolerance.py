@@ -127,6 +127,7 @@ class RobustDTETolerance(StoredFront, RobustProblem):
     def _evaluate(
         self, x: NDArray[np.float64], out: dict[str, Any], *args: Any, **kwargs: Any
     ) -> None:
+        x = self.moments.design_box.settle(x)
         super()._evaluate(x, out, *args, **kwargs)
         tolerance = x[:, -1]
         out["F"] = np.column_stack([out["F"], PAPERS_TOLERANCE / tolerance])

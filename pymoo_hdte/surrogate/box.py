@@ -14,6 +14,10 @@ from pymoo_hdte.checks import InvalidInput, finite_array
 # Points computed from the bounds themselves miss them by a few roundings; those are accepted.
 _EDGE = 1e-12
 
+_PRINTED_DIGITS = 4
+_LARGEST_MOVE = 0.01
+"""Share of a half-width that no rounding to print may exceed: four digits tell such ends apart."""
+
 LARGEST = 1e150
 """Largest size of bounds and coefficients; its square is still finite."""
 
@@ -159,6 +163,43 @@ class Box:
         """
         self.to_cube(points)
 
+    def settle(self, points: ArrayLike) -> NDArray[np.float64]:
+        """Move points that rounding to print has put outside onto the boundary.
+
+        A table gives 3.229e4 for an upper bound of 32287.5. A value outside by at most half a
+        unit of the fourth significant digit of the bound, and by at most 1 % of the half-width,
+        is therefore taken for the bound. Nothing is extrapolated.
+
+        Parameters
+        ----------
+        points : array_like, shape (n, d)
+            Physical units.
+
+        Returns
+        -------
+        ndarray, shape (n, d)
+            Points of the box; those inside as they were.
+
+        Raises
+        ------
+        ExtrapolationError
+            If a point lies farther outside or is NaN; names the variable and its interval.
+        InvalidInput
+            If ``points`` is no array of numbers of shape (n, d).
+        """
+        physical = self._as_points(points)
+        inside = np.clip(physical, self.lower, self.upper)
+        if np.array_equal(inside, physical):
+            return physical
+        below, above = (
+            np.minimum(_half_unit(bound), _LARGEST_MOVE * self.half_width)
+            for bound in (self.lower, self.upper)
+        )
+        near = (physical >= self.lower - below) & (physical <= self.upper + above)
+        settled = np.where(near, inside, physical)
+        self.check_inside(settled)
+        return settled
+
     def _as_points(self, points: ArrayLike) -> NDArray[np.float64]:
         wanted = f"numbers of shape (n, {len(self)})"
         try:
@@ -176,6 +217,16 @@ class Box:
             float(physical[row, column]),
             f"{self.lower[column]!s} to {self.upper[column]!s} (row {row} of the points)",
         )
+
+
+def _half_unit(bounds: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return half a unit of the last printed digit of each bound, 0 for a bound of 0."""
+    shown = [f"{bound:.{_PRINTED_DIGITS - 1}e}" for bound in bounds]
+    units = np.array(
+        [10.0 ** (int(text.partition("e")[2]) - _PRINTED_DIGITS + 1) for text in shown]
+    )
+    # A tie is rounded by exactly half a unit, which the binary numbers miss by a rounding.
+    return np.where(bounds == 0.0, 0.0, 0.5 * (1.0 + 1e-9) * units)
 
 
 def _distinct_names(names: Any) -> tuple[str, ...]:

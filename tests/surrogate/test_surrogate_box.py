@@ -5,7 +5,7 @@ import pickle
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from pymoo_hdte.checks import InvalidInput
@@ -38,6 +38,39 @@ def test_outside_is_refused_by_name_value_and_interval(value):
     assert caught.value.value == pytest.approx(value, nan_ok=True)
     assert "6000.0 to 10000.0 (row 1" in str(caught.value)
     assert isinstance(caught.value, InvalidInput)
+
+
+def test_what_printing_put_outside_is_moved_to_the_boundary():
+    box = Box(("K", "J_in"), (19372.5, 1.4775e-4), (32287.5, 2.4625e-4))
+    inside = box.settle([[32290.0, 1.477e-4], [19370.0, 2.463e-4], [2e4, 2e-4]])
+    assert np.array_equal(inside, [[32287.5, 1.4775e-4], [19372.5, 2.4625e-4], [2e4, 2e-4]])
+
+
+@given(st.lists(st.floats(1e-6, 1e6), min_size=2, max_size=2, unique=True), st.booleans())
+def test_every_end_comes_back_from_its_four_digits(ends, negative):
+    lower, upper = sorted(-np.array(ends) if negative else ends)
+    unit = max(abs(lower), abs(upper)) * 1e-3
+    assume(upper - lower > 200 * unit)
+    box = Box(("x",), (lower,), (upper,))
+    read_back = [[float(f"{end:.3e}")] for end in (lower, upper)]
+    assert np.array_equal(box.settle(read_back), np.clip(read_back, lower, upper))
+
+
+@pytest.mark.parametrize(
+    ("lower", "upper", "value"),
+    [
+        (6e3, 1e4, 1e4 + 5.01),
+        (6e3, 1e4, 6e3 - 0.51),
+        (0.0, 1.0, -1e-9),
+        (1.0, 1.0001, 1.0003),
+        (6e3, 1e4, np.nan),
+        (6e3, 1e4, np.inf),
+    ],
+)
+def test_more_than_printing_explains_is_refused(lower, upper, value):
+    box = Box(("K",), (lower,), (upper,))
+    with pytest.raises(ExtrapolationError, match=f"K is {value}"):
+        box.settle([[value]])
 
 
 def test_the_second_variable_is_named_too():

@@ -164,8 +164,7 @@ class SimulatorProblem(Problem):
         InvalidInput
             If ``designs`` is no array of numbers of shape (n, n_var).
         """
-        self.design_box.check_inside(designs)
-        X = np.asarray(designs, dtype=float)
+        X = self.design_box.settle(designs)
         blocks = range(0, len(X), _AT_ONCE)
         parts = [self._band(self._around(X[start : start + _AT_ONCE])) for start in blocks]
         return np.concatenate(parts) if parts else np.empty((0, self.n_obj))
@@ -215,8 +214,7 @@ class SimulatorProblem(Problem):
             If there is no such response, or the design has another shape.
         """
         place = place_of(Statistic(response=response), self.responses)
-        point = finite_array("design", design, (self.n_var,))[None]
-        self.design_box.check_inside(point)
+        point = self.design_box.settle(finite_array("design", design, (self.n_var,))[None])
         moments = self._fit.moments
         expansion = moments.expansion(point)[0, place]
         variance, first, total = moments.divided_variance(expansion)
@@ -255,7 +253,7 @@ class SimulatorProblem(Problem):
         InvalidInput
             If the gradient of a statistic is asked for that has none.
         """
-        self.design_box.check_inside(x)
+        x = self.design_box.settle(x)
         slopes: list[str] = [key for key in ("dF", "dG") if key in out]
         blocks = range(0, len(x), _AT_ONCE)
         quick = None if slopes else by_moments(self._asked, self._fit.moments, x)
