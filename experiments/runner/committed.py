@@ -11,7 +11,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
-from experiments.runner.provenance import environment
+from experiments.runner.provenance import environment, source_fingerprint
 from experiments.runner.registry import Context
 from pymoo_hdte.io.text_table import csv_text, read_text_table
 
@@ -35,7 +35,8 @@ def committed_file(name: str, experiment: str) -> Path:
 
 def table_with_origin(columns: Sequence[str], rows: Iterable[Iterable[Any]], **further: Any) -> str:
     """Return the text of a table that says when and by what it was made, and ``further`` facts."""
-    origin = {**further, "date": datetime.date.today().isoformat(), **environment()}
+    made = {"date": datetime.date.today().isoformat(), "source": source_fingerprint()}
+    origin = {**further, **made, **environment()}
     return f"# {json.dumps(origin)}\n" + csv_text(columns, rows)
 
 

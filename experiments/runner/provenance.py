@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import hashlib
 import json
 import platform
@@ -20,6 +21,8 @@ EXTRAS = (
     *("pysindy", "sysidentpy", "openturns", "scikit-learn", "emcee"),
 )
 """Packages that can as well, where they are installed."""
+_COMPUTES = ("algorithms", "drive", "problems", "surrogate")
+"""Rooms of the package from which the numbers of the paper's experiments come."""
 
 
 def environment() -> dict[str, str]:
@@ -42,6 +45,36 @@ def fingerprint(*sources: Path) -> str:
     for path in [*_files(Path(pymoo_hdte.__file__).parent), *sources]:
         digest.update(f"{path.name} {path.stat().st_size}\n".encode() + path.read_bytes())
     return digest.hexdigest()[:16]
+
+
+@cache
+def source_fingerprint() -> str:
+    """Identify the code and the data of drive, surrogate, problems and swarms.
+
+    Stored outcomes carry it, so that those which belong together can be seen to stem from the same
+    source. Comments and docstrings do not count: they change no result.
+    """
+    digest = hashlib.sha256()
+    package = Path(pymoo_hdte.__file__).parent
+    for path in [path for room in _COMPUTES for path in _files(package / room)]:
+        digest.update(f"{path.relative_to(package).as_posix()}\n".encode())
+        digest.update(_code(path) if path.suffix == ".py" else path.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def _code(path: Path) -> bytes:
+    """Return the syntax tree of a module without its docstrings."""
+    tree = ast.parse(path.read_bytes())
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef):
+            # Also the strings below fields, which document them.
+            node.body = [line for line in node.body if not _is_text(line)]
+    return ast.dump(tree).encode()
+
+
+def _is_text(line: ast.stmt) -> bool:
+    value = line.value if isinstance(line, ast.Expr) else None
+    return isinstance(value, ast.Constant) and isinstance(value.value, str)
 
 
 def report_fingerprint() -> str:
