@@ -20,7 +20,6 @@ from experiments.paper.prototypes.records import Record, record
 from experiments.published_values import TABLE_6
 from experiments.runner.registry import Context
 from experiments.runner.result import (
-    WITHIN_PAPER,
     Column,
     Finding,
     Picture,
@@ -62,7 +61,7 @@ def run(context: Context) -> Result:
         command="python -m experiments table6",
         paragraphs=(SETTING,),
         models=models_of(*PRESETS),
-        first_page={WITHIN_PAPER: of_the_first_page()},
+        first_page=of_the_first_page(),
         tables=(
             bounds_table(),
             ranking_table(),

@@ -28,7 +28,6 @@ from experiments.published_values import REEVALUATION_LIMITS, TABLE_8
 from experiments.runner.registry import Context
 from experiments.runner.result import (
     OF_MODELS,
-    WITHIN_PAPER,
     Cell,
     Column,
     Finding,
@@ -81,7 +80,7 @@ def run(context: Context) -> Result:
             ),
         ),
         notes=(influence_note(ours[1]),),
-        first_page={WITHIN_PAPER: of_the_first_page(), OF_MODELS: dominated(MODEL)},
+        first_page={**of_the_first_page(), OF_MODELS: dominated(MODEL)},
     )
 
 

@@ -18,7 +18,7 @@ PAGE = "index.html"
 COMPARISONS = "comparisons.html"
 MODELS = "models.html"
 _TITLE = "Robust design of a harmonic drive: results"
-_LEADING = ("robust", "table6")
+_LEADING = ("robust", "table6", "table2", "table3")
 """Experiments that come first in a section of the first page, where they have a part in it."""
 _VERDICTS = {
     "Contradicts": ("Contradictions within the paper", "no"),

@@ -133,8 +133,8 @@ def consistency_table(predictions: Sequence[Prediction]) -> Table:
         Column("ours", "arcsec", 4, f"lead of No. {HIGHEST} over No. {LOWEST}"),
         Column("at least", "arcsec", 4, f"lead of No. {HIGHEST} over No. {LOWEST}"),
     ]
-    for until in ("the statistics hold", "the ranking holds, too"):
-        group = f"least change of our predictions until {until}"
+    for until in ("statistics hold", "ranking holds, too"):
+        group = f"least change until {until}"
         columns += [Column("RMS", "arcsec", 3, group), Column("largest", "arcsec", 3, group)]
     title = "Do our predictions fit any measured values that the paper can have?"
     note = (

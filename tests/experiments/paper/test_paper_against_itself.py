@@ -109,9 +109,11 @@ class TestRanking:
     def test_it_contradicts_the_tables_only_while_the_designs_cannot_do_it(self, monkeypatch):
         (finding,) = ranking.ranking_table().findings
         assert (finding.within_paper, finding.agrees) == (True, False)
+        assert ranking.of_the_first_page()
         monkeypatch.setattr(ranking, "reach", lambda: 14.0)
         (finding,) = ranking.ranking_table().findings
         assert finding.agrees
+        assert not ranking.of_the_first_page()
 
     def test_the_interval_of_the_mean_error_is_that_of_a_t_test(self):
         values = residuals(np.random.default_rng(1), 2, 1)[0]
@@ -214,6 +216,12 @@ class TestTimes:
         longer, ratios = printed_times.times_table().findings
         assert (longer.within_paper, longer.agrees) == (True, False)
         assert (ratios.within_paper, ratios.agrees) == (True, True)
+
+    def test_the_first_page_is_silent_where_the_times_fit(self, monkeypatch):
+        assert printed_times.of_the_first_page()
+        monkeypatch.setattr(printed_times, "longest_run", lambda: 40.0)
+        assert printed_times.times_table().findings[0].agrees
+        assert not printed_times.of_the_first_page()
 
 
 def test_one_of_the_paper_s_optimal_values_is_a_bound_of_its_box():
