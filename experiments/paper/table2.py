@@ -8,10 +8,10 @@ import numpy as np
 
 from experiments.comparison.rates import at_least
 from experiments.paper.static_error.figures import heat_maps
-from experiments.paper.static_error.normality import (
-    pooled_rejection_rate,
-    possible_sizes,
-    shapiro_p,
+from experiments.paper.static_error.normality_tables import (
+    common_sizes,
+    pooling_table,
+    sizes_table,
 )
 from experiments.paper.static_error.sources import (
     N_PROTOTYPES,
@@ -38,7 +38,16 @@ from experiments.paper.static_error.tables import (
 )
 from experiments.published_values import TABLE_2
 from experiments.runner.registry import Context
-from experiments.runner.result import Cell, Column, Finding, Picture, Result, Table, significant
+from experiments.runner.result import (
+    WITHIN_PAPER,
+    Cell,
+    Column,
+    Finding,
+    Picture,
+    Result,
+    Table,
+    significant,
+)
 from pymoo_hdte.drive import hs_20_100
 from pymoo_hdte.identification import (
     ErrorStatistics,
@@ -49,10 +58,7 @@ from pymoo_hdte.identification import (
 
 SEED = 1
 N_CAMPAIGNS = 200
-N_READINGS = N_PROTOTYPES * N_REPEATS
 CORRELATIONS = (0.3, 0.5, 0.7, 0.8, 0.9)
-NOISE_RATIOS = (0.1, 0.3, 1.0, 3.0)
-"""Standard deviation of a reading over that of the prototypes."""
 
 SETTING = (
     f"The prototypes are virtual: {N_PROTOTYPES} of them drawn from the printed Table 2, each "
@@ -78,8 +84,8 @@ def run(context: Context) -> Result:
         paragraphs=(SETTING, PLANTED),
         tables=(
             _statistics_table(clean),
-            _sizes_table(),
-            _pooling_table(rng),
+            sizes_table(),
+            pooling_table(N_CAMPAIGNS, rng),
             _outlier_table(readings, planted),
             _correlation_table(clean, rng),
             statistic_table(drawn),
@@ -96,6 +102,7 @@ def run(context: Context) -> Result:
             component_picture(drawn),
             total_picture(drawn),
         ),
+        first_page={WITHIN_PAPER: _of_the_first_page()},
         notes=tuple(f"In the campaign with planted faults: {line}" for line in spoilt.advice()),
     )
 
@@ -149,60 +156,14 @@ def _statistics_table(found: ErrorStatistics) -> Table:
     return Table("errors", title, tuple(columns), tuple(rows), findings=findings)
 
 
-def _sizes_table() -> Table:
-    ranges = {s: possible_sizes(row.shapiro_w, row.shapiro_p) for s, row in TABLE_2.items()}
-    rows = tuple(
-        (
-            symbol,
-            row.shapiro_w,
-            row.shapiro_p,
-            shapiro_p(row.shapiro_w, N_PROTOTYPES),
-            shapiro_p(row.shapiro_w, N_READINGS),
-            *ranges[symbol],
-        )
-        for symbol, row in TABLE_2.items()
+def _of_the_first_page() -> str:
+    low, high = common_sizes()
+    return (
+        f"W and p of all errors in Table 2 belong to {low} to {high} values, where "
+        f"{N_PROTOTYPES} prototypes were measured; and no reading of {N_REPEATS} can lie beyond "
+        f"{largest_deviation(N_REPEATS):.2f} standard deviations, so that the 3-sigma rule of "
+        "Section 2.1 removes nothing"
     )
-    low = max(first for first, _ in ranges.values())
-    high = min(last for _, last in ranges.values())
-    finding = Finding(
-        low <= N_PROTOTYPES <= high,
-        f"All 13 printed pairs of W and p belong to samples of {low} to {high} values; none "
-        f"fits the {N_PROTOTYPES} prototypes, at which every p would exceed 0.99. The number of "
-        f"readings, {N_PROTOTYPES} x {N_REPEATS} = {N_READINGS}, fits all.",
-        answers=True,
-    )
-    columns = (
-        Column("error"),
-        Column("W", "", 3, paper=True),
-        Column("p", "", 3, paper=True),
-        Column(f"n = {N_PROTOTYPES}", "", 3, "p that belongs to W at"),
-        Column(f"n = {N_READINGS}", "", 3, "p that belongs to W at"),
-        Column("from", group="n that fits the printed digits"),
-        Column("to", group="n that fits the printed digits"),
-    )
-    title = "Which sample size the printed tests belong to"
-    note = "p from W by Royston's calibration (1995), the one that SciPy uses."
-    return Table("sizes", title, columns, rows, note, (finding,))
-
-
-def _pooling_table(rng: np.random.Generator) -> Table:
-    rates = {ratio: pooled_rejection_rate(ratio, N_CAMPAIGNS, rng) for ratio in NOISE_RATIOS}
-    rows = tuple((ratio, 100.0 * rate) for ratio, rate in rates.items())
-    likely = NOISE_UM / float(np.mean([row.std_um for row in TABLE_2.values()]))
-    ratio = min(NOISE_RATIOS, key=lambda tried: abs(tried - likely))
-    finding = Finding(
-        at_least(round(N_CAMPAIGNS * (1.0 - rates[ratio])), N_CAMPAIGNS, 0.95),
-        f"If the {N_READINGS} values are {N_REPEATS} readings of {N_PROTOTYPES} prototypes, with a "
-        f"noise of {ratio:g} of their scatter (about {NOISE_UM} µm), the test rejects "
-        f"{100 * rates[ratio]:.0f} % of errors that are normal. All 13 pass in the paper, as "
-        f"{N_READINGS} independent values would, or readings whose noise outweighs the prototypes.",
-    )
-    columns = (
-        Column("noise of a reading / std of the prototypes", "", 2),
-        Column("rejected at 5 %", "%", 3),
-    )
-    title = f"Shapiro-Wilk on {N_READINGS} pooled readings of normal errors"
-    return Table("pooling", title, columns, rows, f"{N_CAMPAIGNS} campaigns each.", (finding,))
 
 
 def _outlier_table(readings: np.ndarray, planted: np.ndarray) -> Table:
@@ -214,9 +175,11 @@ def _outlier_table(readings: np.ndarray, planted: np.ndarray) -> Table:
     findings = (
         Finding(
             largest_deviation(N_REPEATS) > 3.0,
-            f"The paper rejects outliers among {N_REPEATS} readings by the 3-sigma rule, but no "
+            f"The paper rejects outliers among {N_REPEATS} readings by the 3-sigma rule. No "
             f"reading of {N_REPEATS} can lie further than {largest_deviation(N_REPEATS):.2f} "
-            "standard deviations from their mean: the rule as printed never rejects.",
+            f"standard deviations from their mean, or {(N_REPEATS - 1) ** 0.5:g} with n for n - 1 "
+            "in the deviation: the rule as printed never rejects.",
+            within_paper=True,
         ),
         Finding(
             pooled.found == pooled.planted
@@ -234,7 +197,12 @@ def _outlier_table(readings: np.ndarray, planted: np.ndarray) -> Table:
         Column("lost", group="good readings"),
         Column("of", group="good readings"),
     )
-    return Table("outliers", "Rejection of outliers", columns, rows, findings=findings)
+    note = (
+        "Samuelson's inequality: the deviations of the other n - 1 readings sum to minus that of "
+        "the one, so that their squares sum to at least its square over n - 1. With the variance "
+        "over n - 1, the one is (n - 1) / sqrt(n) standard deviations away at most."
+    )
+    return Table("outliers", "Rejection of outliers", columns, rows, note, findings)
 
 
 def _correlation_table(clean: ErrorStatistics, rng: np.random.Generator) -> Table:
@@ -258,6 +226,7 @@ def _correlation_findings(clean: ErrorStatistics, rng: np.random.Generator) -> I
         f"The paper takes weak correlations for independence. With {N_PROTOTYPES} prototypes only "
         f"|r| above {limit:.2f} is significant among 78 pairs; independent errors alone reach "
         f"|r| = {largest:.2f} here. Independence is an assumption, not a result.",
+        within_paper=True,
     )
     found, alarms = detections(N_CAMPAIGNS, rng)
     yield Finding(

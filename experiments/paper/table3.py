@@ -6,11 +6,8 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
-from scipy.stats import t as student
-from scipy.stats import ttest_ind_from_stats
 
 from experiments.comparison.rates import at_least, rate_p
-from experiments.comparison.statistics import holm
 from experiments.paper.bench_campaign import (
     COEFFICIENTS,
     N_PROTOTYPES,
@@ -21,10 +18,19 @@ from experiments.paper.bench_campaign import (
     slope_error_per_noise,
     summaries,
 )
+from experiments.paper.later_prototypes import later_prototypes_table, of_the_first_page
 from experiments.paper.table3_figures import damping_lines, torsion_loop
-from experiments.published_values import TABLE_3, TABLE_6
+from experiments.published_values import TABLE_3
 from experiments.runner.registry import Context
-from experiments.runner.result import Cell, Column, Finding, Picture, Result, Table, significant
+from experiments.runner.result import (
+    Cell,
+    Column,
+    Finding,
+    Picture,
+    Result,
+    Table,
+    significant,
+)
 from pymoo_hdte.drive import hs_20_100
 from pymoo_hdte.identification import Series, hysteresis_width, lost_energy
 from pymoo_hdte.identification.damping import INPUT_SPEEDS, OUTPUT_SPEEDS
@@ -39,8 +45,6 @@ SCALES = {"K": (1.0, "N.m/rad"), **dict.fromkeys(TABLE_3, (1e4, "1e-4 N.m.s/rad"
 FRICTIONS = (0.0, 0.5, 1.5, 3.0)
 """Hysteretic torques of the drive on the torsion bench, N.m."""
 
-ALIKE = 0.05
-"""Level of the test that tells two series of prototypes apart."""
 SENSOR_SHARE = 1e-3
 """What a good torque sensor resolves, as a share of its range."""
 
@@ -68,13 +72,14 @@ def run(context: Context) -> Result:
         title="Tables 3 and 4: identified stiffness and damping",
         command="python -m experiments table3",
         paragraphs=(SETTING, MEANING),
+        first_page=of_the_first_page(),
         tables=(
             _coefficient_table(found),
             _nominal_table(found),
             _coverage_table(rng),
             _friction_table(rng),
             _resolution_table(),
-            _later_prototypes_table(),
+            later_prototypes_table(),
         ),
         pictures=(
             Picture(
@@ -257,44 +262,3 @@ def _resolution_table() -> Table:
     )
     title = "The torque noise that Table 3 allows"
     return Table("resolution", title, columns, tuple(rows), note, (finding,))
-
-
-def _later_prototypes_table() -> Table:
-    five = {
-        name: np.array([getattr(p, name) for p in TABLE_6.values()]) for name in COEFFICIENTS[:3]
-    }
-    rows = []
-    for name, values in five.items():
-        mean, std = values.mean(), values.std(ddof=1)
-        paper = TABLE_3.get(name)
-        if paper:
-            p = ttest_ind_from_stats(mean, std, 5, paper.mean, paper.std, N_PROTOTYPES).pvalue
-            printed = paper.mean
-        else:
-            printed = NOMINAL_STIFFNESS
-            statistic = (mean - printed) / std / (1 / 5 + 1 / N_PROTOTYPES) ** 0.5
-            p = 2.0 * student.sf(abs(statistic), 4)
-        rows.append([name, mean, std, printed, paper.std if paper else None, p])
-    for row, adjusted in zip(rows, holm([row[-1] for row in rows]), strict=True):
-        row.append(float(adjusted))
-    least = min(rows, key=lambda row: row[-1])
-    alike = least[-1] >= ALIKE
-    relation = "nothing tells them from" if alike else "they are not of"
-    finding = Finding(
-        alike,
-        f"The five prototypes of Table 6 have a mean {least[0]} of {1e4 * least[1]:.3f}e-4 against "
-        f"{1e4 * least[3]:.3f}e-4 in Table 3 (t-test, Holm's adjustment: p = "
-        f"{significant(least[-1], 1)}): {relation} the series that Table 3 describes.",
-    )
-    columns = (
-        Column("coefficient"),
-        Column("mean", "", 4, "Table 6, five prototypes"),
-        Column("std", "", 3, "Table 6, five prototypes"),
-        Column("mean", "", 4, "Tables 3 and 4, 20 prototypes", paper=True),
-        Column("std", "", 3, "Tables 3 and 4, 20 prototypes", paper=True),
-        Column("p", "", 2),
-        Column("p, adjusted", "", 2),
-    )
-    title = "Are the prototypes of Table 6 of the same series?"
-    note = "SI units. K: with the standard deviation of the five, since Table 3 prints none."
-    return Table("later", title, columns, tuple(map(tuple, rows)), note, (finding,))

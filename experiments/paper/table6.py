@@ -15,10 +15,18 @@ from experiments.paper.prototypes.consistency import (
 )
 from experiments.paper.prototypes.figures import bars, records_figure
 from experiments.paper.prototypes.printed_validation import HIGHEST, LOWEST, NUMBERS
+from experiments.paper.prototypes.ranking import of_the_first_page, ranking_table
 from experiments.paper.prototypes.records import Record, record
 from experiments.published_values import TABLE_6
 from experiments.runner.registry import Context
-from experiments.runner.result import Column, Finding, Picture, Result, Table, significant
+from experiments.runner.result import (
+    Column,
+    Finding,
+    Picture,
+    Result,
+    Table,
+    significant,
+)
 from pymoo_hdte.drive import PRESETS
 from pymoo_hdte.drive.measurement import CUTOFF, SAMPLING_RATE
 from pymoo_hdte.units import ARCSEC
@@ -53,9 +61,11 @@ def run(context: Context) -> Result:
         command="python -m experiments table6",
         paragraphs=(SETTING,),
         models=models_of(*PRESETS),
+        first_page=of_the_first_page(),
         tables=(
-            _predictions_table(predictions),
             bounds_table(),
+            ranking_table(),
+            _predictions_table(predictions),
             consistency_table(predictions),
             best_case_table(predictions, best_cases),
             _records_table(records),

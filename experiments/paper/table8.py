@@ -23,6 +23,7 @@ from experiments.paper.choices import (
 )
 from experiments.paper.design_tables import deviation_table, dominated, influence_note, optima_table
 from experiments.paper.models import FITTED, models_of
+from experiments.paper.printed_times import of_the_first_page, times_table
 from experiments.published_values import REEVALUATION_LIMITS, TABLE_8
 from experiments.runner.registry import Context
 from experiments.runner.result import (
@@ -68,6 +69,7 @@ def run(context: Context) -> Result:
             optima_table(preferred),
             _reevaluation_table(ours, samples),
             deviation_table(ours[0]),
+            times_table(),
         ),
         pictures=(
             Picture(
@@ -78,7 +80,7 @@ def run(context: Context) -> Result:
             ),
         ),
         notes=(influence_note(ours[1]),),
-        first_page={OF_MODELS: dominated(MODEL)},
+        first_page={**of_the_first_page(), OF_MODELS: dominated(MODEL)},
     )
 
 

@@ -18,13 +18,15 @@ PAGE = "index.html"
 COMPARISONS = "comparisons.html"
 MODELS = "models.html"
 _TITLE = "Robust design of a harmonic drive: results"
-_FIRST = "robust"
-"""Experiment that comes first in each column of the first page: what the package is for."""
+_LEADING = ("robust", "table6", "table2", "table3")
+"""Experiments that come first in a section of the first page, where they have a part in it."""
 _VERDICTS = {
-    "Agrees": ("Agrees with the paper", "yes"),
-    "Differs": ("Does not agree with the paper", "no"),
-    "Fitted": ("Given back, because the model was fitted to it", "fitted"),
+    "Contradicts": ("Contradictions within the paper", "no"),
+    "Consistent": ("Consistent within the paper", "yes"),
+    "Differs": ("Our models or runs differ from the paper", "no"),
+    "Agrees": ("Our models or runs agree with the paper", "yes"),
     "Missed by the fit": ("Not given back, though the model was fitted to it", "no"),
+    "Fitted": ("Given back, because the model was fitted to it", "fitted"),
     "Fails": ("Checks of our own that fail", "no"),
     "Holds": ("Checks of our own that hold", "yes"),
 }
@@ -78,7 +80,7 @@ def write_report(out: Path, notice: str = "") -> Path:
     ]
     write_atomically(out / COMPARISONS, _page(COMPARISONS, common, up="", verdicts=verdicts))
     first = {
-        "sentences": {about: _parts(results, about) for about in FIRST_PAGE},
+        "sections": {about: _parts(results, about) for about in FIRST_PAGE},
         "shown": _shown_first(results),
         "verdicts": verdicts,
         "models": list(models),
@@ -108,9 +110,13 @@ def _environment() -> Environment:
 
 
 def _parts(results: Sequence[StoredResult], about: str) -> list[tuple[StoredResult, str]]:
-    """Return what the results have to say in one column of the first page."""
-    parts = [(one, one.first_page[about]) for one in results if about in one.first_page]
-    return sorted(parts, key=lambda part: part[0].name != _FIRST)
+    """Return what the results have to say in one section of the first page."""
+    parts = [(result, result.first_page[about]) for result in results if about in result.first_page]
+    return sorted(parts, key=lambda part: _place(part[0].name))
+
+
+def _place(name: str) -> int:
+    return _LEADING.index(name) if name in _LEADING else len(_LEADING)
 
 
 def _shown_first(results: Sequence[StoredResult]) -> list[tuple[StoredResult, StoredPicture]]:

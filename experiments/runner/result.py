@@ -27,8 +27,9 @@ class Finding:
 
     A ``check`` sets them against a demand of our own instead, and says whether it holds. Where the
     model was ``fitted`` to the paper's numbers, giving them back is no agreement. What stands
-    ``within_paper`` sets printed numbers against each other and needs no drive model of ours. What
-    ``answers`` the question of its experiment is repeated at the top of the page.
+    ``within_paper`` sets printed numbers against each other, and needs no drive model of ours. At
+    most one of the three holds. What ``answers`` the question of its experiment is repeated at the
+    top of the page.
     """
 
     agrees: bool
@@ -39,8 +40,8 @@ class Finding:
     within_paper: bool = False
 
     def __post_init__(self) -> None:
-        if self.check and self.fitted:
-            raise ValueError("a finding is a check of our own or of a fit to the paper, not both")
+        if self.check + self.fitted + self.within_paper > 1:
+            raise ValueError("a finding is a check, of a fit or within the paper, not two of these")
         object.__setattr__(self, "agrees", bool(self.agrees))
 
     @property
@@ -50,6 +51,8 @@ class Finding:
             return "Holds" if self.agrees else "Fails"
         if self.fitted:
             return "Fitted" if self.agrees else "Missed by the fit"
+        if self.within_paper:
+            return "Consistent" if self.agrees else "Contradicts"
         return "Agrees" if self.agrees else "Differs"
 
 

@@ -41,6 +41,8 @@ def example() -> Result:
         Finding(False, "A fit misses it.", fitted=True),
         Finding(True, "It holds.", check=True),
         Finding(False, "It fails.", check=True),
+        Finding(True, "It fits itself.", within_paper=True),
+        Finding(False, "It contradicts itself.", within_paper=True),
     )
     times = Table("times", "Wall times", (Column("time", "s"),), ((1.5,),), wall_times=True)
     return Result(

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.optimize import brentq
 from scipy.stats import norm, shapiro
 
 SMALLEST, LARGEST = 12, 2000
 """Sample sizes for which the calibration below holds."""
 
 
-def shapiro_p(w: float, n: int) -> float:
+def shapiro_p(w: float, n: float) -> float:
     """Return the p-value of the statistic ``w`` of ``n`` values, 12 <= n <= 2000.
 
     ln(1 - W) is about normal, with mean and standard deviation fitted to simulations (Royston,
@@ -33,6 +34,17 @@ def possible_sizes(w: float, p: float, half_digit: float = 5e-4) -> tuple[int, i
         if shapiro_p(low, n) <= p + half_digit and shapiro_p(high, n) >= p - half_digit
     ]
     return sizes[0], sizes[-1]
+
+
+def implied_size(w: float, p: float) -> float:
+    """Return the sample size at which the statistic ``w`` has the p-value ``p``, no whole number.
+
+    Raises
+    ------
+    ValueError
+        If there is none between 12 and 2000.
+    """
+    return float(brentq(lambda n: shapiro_p(w, n) - p, SMALLEST, LARGEST))
 
 
 def pooled_rejection_rate(noise: float, n_trials: int, rng: np.random.Generator) -> float:

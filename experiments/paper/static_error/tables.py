@@ -168,6 +168,7 @@ def _statistic_findings(
         f"The five prototypes of Table 6 scatter by {100 * ratio * scatter:.0f} % of their mean "
         f"({measured.mean():.1f} arcsec), independent phases give {100 * scatter:.0f} %: so little "
         f"scatter among five has a probability of {significant(p, 2)}.",
+        within_paper=True,
     )
 
 

@@ -6,7 +6,7 @@ from night import others_at_night
 from scipy import stats
 
 from experiments.comparison.rates import at_least
-from experiments.paper import table2, table3
+from experiments.paper import later_prototypes, table2, table3
 from experiments.paper.bench_campaign import draw_campaign, slope_error_per_noise, summaries
 from experiments.paper.static_error import statistics as static_error_statistics
 from experiments.paper.static_error.normality import (
@@ -184,7 +184,7 @@ def test_experiments_run_and_their_own_checks_hold(experiment, few, monkeypatch,
 
 
 def test_whether_later_prototypes_are_of_the_series_is_said_as_the_test_has_it(monkeypatch):
-    (apart,) = table3._later_prototypes_table().findings
+    (apart,) = later_prototypes.later_prototypes_table().findings
     assert not apart.agrees
     assert apart.sentence.endswith("they are not of the series that Table 3 describes.")
     means = {name: row.mean for name, row in TABLE_3.items()}
@@ -198,8 +198,8 @@ def test_whether_later_prototypes_are_of_the_series_is_said_as_the_test_has_it(m
         )
         for place, (number, prototype) in enumerate(TABLE_6.items())
     }
-    monkeypatch.setattr(table3, "TABLE_6", alike)
-    (finding,) = table3._later_prototypes_table().findings
+    monkeypatch.setattr(later_prototypes, "TABLE_6", alike)
+    (finding,) = later_prototypes.later_prototypes_table().findings
     assert finding.agrees
     assert finding.sentence.endswith("nothing tells them from the series that Table 3 describes.")
 

@@ -128,13 +128,13 @@ class TestPrintedStatistics:
         near = np.array([88.0, 80.0, 90.0, 99.0, 77.0])
         fitting = nearest_assignment(near, to="predicted", ranked=True)
         exact = Prediction("exact", fitting.predicted, fitting.predicted)
-        assert exact.distance(ranked=True) < 1e-3
-        assert exact.distance(ranked=False) < 1e-3
+        assert exact.change(ranked=True).rms < 1e-3
+        assert exact.change(ranked=False).rms < 1e-3
         swapped = fitting.predicted.copy()
         swapped[[HIGH, LOW]] = swapped[[LOW, HIGH]]
         wrong = Prediction("swapped", swapped, swapped)
-        assert wrong.distance(ranked=False) < 1e-3
-        assert wrong.distance(ranked=True) > 5.0
+        assert wrong.change(ranked=False).rms < 1e-3
+        assert wrong.change(ranked=True).rms > 5.0
         table = consistency_table([exact, wrong])
         assert [finding.agrees for finding in table.findings] == [True, False]
 
@@ -285,7 +285,7 @@ class TestFitted:
         self, share, words, verdict, monkeypatch
     ):
         monkeypatch.setattr(design_tables, "dominating_shares", lambda _: {"balanced": share})
-        _, *found = design_tables.optima_table(paper_choices()).findings
+        _, _, *found = design_tables.optima_table(paper_choices()).findings
         assert [finding.verdict for finding in found] == [verdict] * len(FITTED)
         assert all(f" is {words} (balanced)." in finding.sentence for finding in found)
 
@@ -294,7 +294,7 @@ class TestFitted:
         *_, chosen, _, _ = study_designs(problem)
         optimum = replace(paper_choices()[0], design=chosen[1])
         table = deviation_table(optimum)
-        assert [finding.verdict for finding in table.findings] == ["Agrees"]
+        assert [finding.verdict for finding in table.findings] == ["Consistent"]
         name, share, swept = _idle_sweep(optimum)
         assert name == "B_in"
         moments = problem.evaluate(swept)

@@ -4,9 +4,11 @@ import csv
 import json
 import re
 from dataclasses import replace
+from html import unescape
 from html.parser import HTMLParser
 from importlib import import_module
 from importlib.metadata import packages_distributions
+from itertools import combinations
 from pathlib import Path
 from shutil import copytree, ignore_patterns
 
@@ -23,6 +25,7 @@ from experiments.runner.committed import read_origin, read_rows, stored_outcome,
 from experiments.runner.registry import Context, Experiment
 from experiments.runner.report import check_page, write_report
 from experiments.runner.result import (
+    FIRST_PAGE,
     OF_MODELS,
     WITHIN_PAPER,
     Column,
@@ -262,13 +265,23 @@ def test_pages_are_well_formed_and_escape_what_they_show(out):
     assert "&lt;script&gt;" in (out / "table7" / "index.html").read_text()
 
 
+def sections_of_the_first_page(out):
+    """Return heading and parts of each section, and what follows them."""
+    text = write_report(out).read_text()
+    sections, rest = text.split('<ul class="cards">')
+    headings = [piece.split("</section>")[0] for piece in sections.split("<section>")[1:]]
+    return [
+        (re.search("<h2>([^<]+)</h2>", piece)[1], re.findall("<li><a [^>]+>([^<]+)</a>", piece))
+        for piece in headings
+    ], rest
+
+
 def test_the_first_page_has_sections_pictures_and_a_card_for_each_result(out):
-    first = write_report(out).read_text()
-    sentences, cards = first.split('<ul class="cards">')
-    found = re.findall(r"<h2>([^<]+)</h2>\s*<ul>\s*<li><a [^>]+>([^<]+)</a></li>", sentences)
-    assert found == [(WITHIN_PAPER, "This holds."), (OF_MODELS, "That does not.")]
-    assert "python -m experiments" in sentences
-    assert re.findall(r'<img src="([^"]*)"', sentences) == ["table7/line.png"]
+    sections, cards = sections_of_the_first_page(out)
+    assert sections == [(WITHIN_PAPER, ["This holds."]), (OF_MODELS, ["That does not."])]
+    first = (out / "index.html").read_text()
+    before, _ = first.split('<ul class="cards">')
+    assert re.findall(r'<img src="([^"]*)"', before) == ["table7/line.png"]
     (card,) = cards.split("<li>")[1:]
     question = next(one.question for one in EXPERIMENTS if one.name == "table7")
     for words in ("An example", question.replace("'", "&#39;"), "They differ.", "table7/line.png"):
@@ -276,26 +289,55 @@ def test_the_first_page_has_sections_pictures_and_a_card_for_each_result(out):
     assert "<table>" not in first
 
 
+def test_sections_come_in_the_order_of_the_first_page_whatever_says_them(tmp_path):
+    names = ("table7", "table2", "table6", "robust")
+    for name in names:
+        parts = {about: f"by {name}" for about in reversed(FIRST_PAGE)}
+        save(tmp_path, name, replace(example(), first_page=parts))
+    sections, _ = sections_of_the_first_page(tmp_path)
+    assert [about for about, _ in sections] == list(FIRST_PAGE)
+    for _, parts in sections:
+        assert parts == ["By robust.", "By table6.", "By table2.", "By table7."]
+
+
 def test_comparisons_are_sorted_by_what_came_out(out):
     first = write_report(out).read_text()
     text = (out / "comparisons.html").read_text()
-    sections = text.partition('<div class="verdicts">')[2].split("<h2 ")[1:]
-    found = [re.findall(r">([^<>]+)</h2>|<li>([^<]+) <a", section) for section in sections]
-    assert [[heading or sentence for heading, sentence in section] for section in found] == [
-        ["Agrees with the paper", "They agree."],
-        ["Does not agree with the paper", "They differ."],
-        ["Given back, because the model was fitted to it", "A fit gives it back."],
-        ["Not given back, though the model was fitted to it", "A fit misses it."],
-        ["Checks of our own that fail", "It fails."],
-        ["Checks of our own that hold", "It holds."],
+    lists = {
+        number: (unescape(heading), re.findall("<li>(.+?) <a", body))
+        for number, heading, body in re.findall(
+            r'<section id="(.+?)">\s*<h2[^>]*>(.+?)</h2>(.+?)</section>', text, re.DOTALL
+        )
+    }
+    headings = [heading for heading, _ in lists.values()]
+    assert len(set(headings)) == len(headings)
+    # Each list holds the findings of one verdict, and the summary counts them.
+    findings = example().tables[0].findings
+    by_verdict = {}
+    for finding in findings:
+        by_verdict.setdefault(finding.verdict, []).append(finding.sentence)
+    assert sorted(entries for _, entries in lists.values()) == sorted(by_verdict.values())
+    counts = re.findall(r'href="comparisons.html#(.+?)">(.+?): <b>(\d+)</b>', first)
+    assert [(number, unescape(heading), int(count)) for number, heading, count in counts] == [
+        (number, heading, len(entries)) for number, (heading, entries) in lists.items()
     ]
-    counts = re.findall(r'href="comparisons.html#(verdict-\d)">([^<]+): <b>1</b>', first)
-    assert [heading for _, heading in counts] == [heading for (heading, _), *_ in map(list, found)]
-    assert re.findall(r'<section id="(verdict-\d)">', text) == [link for link, _ in counts]
     page = (out / "table7" / "index.html").read_text()
-    assert re.findall(r"<b>([^<]+)</b>", page) == [
-        "Agrees.", "Differs.", "Fitted.", "Missed by the fit.", "Holds.", "Fails.",
-    ]  # fmt: skip
+    shown = re.findall(r'class="finding[^>]*><b>([^<]+)\.</b>', page)
+    assert shown == [finding.verdict for finding in findings]
+
+
+def test_contradictions_within_the_paper_are_no_misfits_of_ours(out):
+    sentences = {"It contradicts itself.", "They differ.", "They agree.", "It fits itself."}
+    findings = [one for one in example().tables[0].findings if one.sentence in sentences]
+    assert len({one.verdict for one in findings}) == len(sentences)
+    write_report(out)
+    (within,) = (
+        section
+        for section in (out / "comparisons.html").read_text().split("<section ")
+        if "It contradicts itself." in section
+    )
+    assert "They differ." not in within
+    assert 'class="no"' in within
 
 
 def test_a_page_begins_with_its_answer_and_a_leading_picture(tmp_path):
@@ -313,14 +355,15 @@ def test_a_page_begins_with_its_answer_and_a_leading_picture(tmp_path):
     assert places == sorted(places)
 
 
-def test_a_result_speaks_in_no_other_section_of_the_first_page():
-    with pytest.raises(ValueError, match="no section of the first page: What else"):
+def test_a_result_speaks_of_no_other_section_of_the_first_page():
+    with pytest.raises(ValueError, match="What else"):
         Result("", "", first_page={"What else": "this"})
 
 
-def test_a_finding_is_judged_in_one_way():
-    with pytest.raises(ValueError, match="not both"):
-        Finding(True, "Both.", check=True, fitted=True)
+@pytest.mark.parametrize("kinds", [*combinations(("check", "fitted", "within_paper"), 2)])
+def test_a_finding_is_judged_in_one_way(kinds):
+    with pytest.raises(ValueError, match="not two"):
+        Finding(True, "Both.", **dict.fromkeys(kinds, True))
 
 
 def test_results_of_another_source_are_marked(out):
