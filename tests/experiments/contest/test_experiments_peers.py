@@ -1,7 +1,6 @@
 """The peer comparison and the ablation: scores on disk, demands judged, costs of parts."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -231,8 +230,6 @@ def test_a_part_without_which_runs_fail_costs_everything(rng):
 )
 def test_the_committed_outcome_is_whole_and_makes_the_report(tmp_path, experiment, algorithms):
     name = experiment.__name__.rpartition(".")[2]
-    if not (Path(experiment.__file__).parent / "data" / f"{name}.csv").is_file():
-        pytest.skip(f"python -m experiments {name} --full has not been run to its end yet")
     scores = committed_scores(name)
     assert len(scores.seeds) == experiment.FULL.seeds
     assert set(scores.problems) == set(BENCHMARKS)

@@ -7,8 +7,9 @@ import pytest
 
 from experiments.runner.campaign import Campaign
 from experiments.runner.registry import Context
+from experiments.suites import anew as suites_anew
 from experiments.suites import experiment
-from experiments.suites.anew import BBOB_RUNS, SUITE_RUNS
+from experiments.suites.anew import BBOB_RUNS, SUITE_RUNS, anew_table
 from experiments.suites.bbob.coco import MARKS
 from experiments.suites.bbob.published import BEST, CITED, curves
 from experiments.suites.bbob_tables import duels, reached
@@ -214,10 +215,29 @@ def test_the_stored_outcome_gives_the_report_and_repeats(tmp_path):
     result = experiment.run(Context(1, tmp_path, Campaign(tmp_path)))
     assert result.answer
     anew = result.tables[-1]
-    assert len(anew.rows) >= len(SUITE_RUNS)
+    assert {row[0] for row in anew.rows} >= {run.problem for run in SUITE_RUNS}
     for *_, stored, now in anew.rows:
         # Another processor may round otherwise, which a search amplifies.
         assert now == pytest.approx(stored, abs=0.1)
+
+
+def test_two_zeros_beside_each_other_check_nothing(tmp_path, monkeypatch):
+    # On ZCAT1 with three objectives so short a run reaches no hypervolume, stored and anew.
+    run = next(one for one in SUITE_RUNS if one.problem == "ZCAT1_3")
+    monkeypatch.setattr(suites_anew, "SUITE_RUNS", (run,))
+    monkeypatch.setattr(suites_anew, "find_spec", lambda _: None)
+    outcome = outcome_for(Context(1, None, None))
+    place = run.problem, run.algorithm, *run.budgets, run.seed
+    spent, hypervolume, distance, solutions = outcome.suites[place]
+    assert hypervolume == 0.0
+    table = anew_table(Campaign(tmp_path), outcome)
+    assert all(stored or now for *_, stored, now in table.rows)
+    assert [one.agrees for one in table.findings] == [True]
+    outcome.suites[place] = spent, hypervolume, 1.01 * distance, solutions
+    (finding,) = anew_table(Campaign(tmp_path), outcome).findings
+    assert finding.verdict == "Fails"
+    # Without anything to compare, nothing is found.
+    assert not anew_table(Campaign(tmp_path), Outcome()).findings
 
 
 def test_shares_of_the_stored_outcome_are_of_all_functions():
