@@ -1,4 +1,4 @@
-"""Rates and medians with exact intervals, and the state of a score that they give.
+"""Rates, medians and means with 95 % intervals, and the state of a score that they give.
 
 A score is held against a demand by its 95 % interval (`Estimate.state`). Whether a stated coverage
 is contradicted is another question: `at_least` answers that, and shows nothing.
@@ -6,11 +6,12 @@ is contradicted is another question: `at_least` answers that, and shows nothing.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.stats import binomtest, quantile_test
+from scipy.stats import t as student
 
 from experiments.runner.result import MISSED, NOT_SHOWN, SHOWN, significant
 
@@ -19,7 +20,7 @@ SIGNIFICANCE = 0.01
 
 @dataclass(frozen=True)
 class Estimate:
-    """A rate or a median of ``n`` cases with its exact 95 % interval, both ends included."""
+    """A rate, a median or a mean of ``n`` cases with its 95 % interval."""
 
     value: float
     low: float
@@ -74,6 +75,16 @@ def median(values: Iterable[float | None]) -> Estimate:
     low = interval.low if np.isfinite(interval.low) else -np.inf
     high = interval.high if np.isfinite(interval.high) else np.inf
     return Estimate(float(np.median(known)), float(low), float(high), len(known))
+
+
+def mean(values: Sequence[float]) -> Estimate:
+    """Return the mean with Student's interval; of one value or none, that is unbounded."""
+    count = len(values)
+    if count < 2:
+        return Estimate(values[0] if count else np.nan, -np.inf, np.inf, count)
+    middle = float(np.mean(values))
+    reach = float(student.ppf(0.975, count - 1) * np.std(values, ddof=1) / np.sqrt(count))
+    return Estimate(middle, middle - reach, middle + reach, count)
 
 
 def at_least(successes: int, trials: int, rate: float) -> bool:

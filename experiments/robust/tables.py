@@ -14,7 +14,7 @@ from experiments.runner.result import NOT_SHOWN, SHOWN, Cell, Column, Finding, T
 WANTED_AHEAD = 0.8
 """Share of the functions on which ours needs fewer runs."""
 WANTED_COVERED = 0.95
-"""Share of the designs at which a band holds mean and deviation, of every growth."""
+"""Share of the designs at which a band holds mean and deviation, of every build."""
 
 
 def needed_table(outcome: Outcome) -> Table:
@@ -129,7 +129,7 @@ _ERRORS = ("true_mean_error", "true_std_error", "stated_mean_error", "stated_std
 
 
 def _cover_finding(outcome: Outcome) -> Finding:
-    """Judge the band of the growth that covers least, of those that gave an answer at all."""
+    """Judge the band of the build that covers least, of those that gave an answer at all."""
     refused = [key for key, one in outcome.stops.items() if not np.isfinite(one["runs"])]
     covered = {
         key: min(numbers[one] for one in _COVERED)
@@ -143,7 +143,7 @@ def _cover_finding(outcome: Outcome) -> Finding:
     words = f"{len(refused)} refused ({none})" if refused else "none was refused"
     words += f". Not run with all seeds: {', '.join(missing)}." if missing else "."
     if not covered:
-        return scored(NOT_SHOWN, f"No growth of {OURS} gave an answer: {words}")
+        return scored(NOT_SHOWN, f"No build of {OURS} gave an answer: {words}")
     (name, seed), least = min(covered.items(), key=lambda item: item[1])
     share = rate(round(least * DESIGNS), DESIGNS)
     state = share.state(WANTED_COVERED)
@@ -151,9 +151,9 @@ def _cover_finding(outcome: Outcome) -> Finding:
     return scored(
         NOT_SHOWN if missing and state == SHOWN else state,
         f"The stated band of {OURS} covers mean and deviation at {100.0 * WANTED_COVERED:g} % of "
-        f"{DESIGNS} designs or more in {enough} of {len(covered)} growths that gave an answer, "
-        f"and in all of them it should. The smallest share is {share.in_words}, on {name} with "
-        f"seed {seed}. Of {len(outcome.stops)} growths, {words}",
+        f"{DESIGNS} designs or more in {enough} of {len(covered)} surrogate builds that gave an "
+        f"answer, and in all of them it should. The smallest share is {share.in_words}, on {name} "
+        f"with seed {seed}. Of {len(outcome.stops)} builds, {words}",
     )
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from experiments.comparison.rates import Estimate, median, rate
+from experiments.comparison.rates import Estimate, mean, median, rate
 from experiments.runner.result import MISSED, NOT_SHOWN, SHOWN, Finding, scored
 
 
@@ -55,6 +55,16 @@ def test_the_interval_of_a_median_lies_between_order_statistics():
     assert few.state(1.5) == NOT_SHOWN
     assert median([1.0] * 20).state(2.0) == MISSED
     assert median([1.0] * 20).state(2.0, at_least=False) == SHOWN
+
+
+def test_the_interval_of_a_mean_is_students(rng):
+    # With two values and one degree of freedom, t is tan(0.475 pi) = 12.7 times half the distance.
+    found = mean([1.0, 3.0])
+    assert (found.value, found.n) == (2.0, 2)
+    assert found.high - 2.0 == pytest.approx(np.tan(0.475 * np.pi))
+    assert mean([1.0]).state(0.5) == NOT_SHOWN
+    drawn = [mean(values.tolist()) for values in rng.normal(5.0, 2.0, (4000, 8))]
+    assert np.mean([one.low <= 5.0 <= one.high for one in drawn]) == pytest.approx(0.95, abs=0.015)
 
 
 def test_only_what_is_shown_agrees():

@@ -124,7 +124,7 @@ def test_a_refused_growth_covers_nothing():
     answered, refused = stops_of(FUNCTIONS[1:]), stops_of(FUNCTIONS[:1], runs=np.nan)
     said = band(answered | refused).sentence
     count = len(answered)
-    assert f"{count} of {count} growths" in said
+    assert f"{count} of {count} surrogate builds" in said
     assert f"{len(SEEDS)} refused ({FUNCTIONS[0].name})" in said
     # What a refused growth has covered, had it been asked, changes nothing.
     worse = stops_of(FUNCTIONS[:1], runs=np.nan, covered_mean=0.1)
@@ -132,7 +132,7 @@ def test_a_refused_growth_covers_nothing():
     answered[FUNCTIONS[-1].name, SEEDS[0]] = dict.fromkeys(STOP_NUMBERS, 0.9)
     short = band(answered | refused)
     assert short.verdict == MISSED
-    assert f"{count - 1} of {count} growths" in short.sentence
+    assert f"{count - 1} of {count} surrogate builds" in short.sentence
     assert band(refused).verdict == NOT_SHOWN
 
 

@@ -288,6 +288,9 @@ def test_comparisons_are_sorted_by_what_came_out(out):
         ["Not given back, though the model was fitted to it", "A fit misses it."],
         ["Checks of our own that fail", "It fails."],
         ["Checks of our own that hold", "It holds."],
+        ["Scores that miss what was demanded", "It is missed."],
+        ["Scores that meet it, but with too few cases to show it", "It is too few."],
+        ["Scores shown to meet what was demanded", "It is shown."],
     ]
     counts = re.findall(r'href="comparisons.html#(verdict-\d)">([^<]+): <b>1</b>', first)
     assert [heading for _, heading in counts] == [heading for (heading, _), *_ in map(list, found)]
@@ -295,6 +298,7 @@ def test_comparisons_are_sorted_by_what_came_out(out):
     page = (out / "table7" / "index.html").read_text()
     assert re.findall(r"<b>([^<]+)</b>", page) == [
         "Agrees.", "Differs.", "Fitted.", "Missed by the fit.", "Holds.", "Fails.",
+        "Shown.", "Not shown.", "Missed.",
     ]  # fmt: skip
 
 
