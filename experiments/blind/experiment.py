@@ -37,7 +37,7 @@ from experiments.blind.tables import (
     wrong_table,
 )
 from experiments.runner.campaign import Campaign
-from experiments.runner.committed import DATA, stored_outcome
+from experiments.runner.committed import committed_file, stored_outcome
 from experiments.runner.registry import Context, require
 from experiments.runner.result import NEW, Picture, Result, Table
 from experiments.runner.store import TIMES, write_atomically
@@ -63,20 +63,11 @@ SETTING = (
 def run(context: Context) -> Result:
     """Run the cases or read their outcomes, and hold the scores against what must be reached."""
     outcomes = _campaign(context) if context.full else _committed()
-    title, command = "Blind campaigns: what the discrepancy workflow finds", "blind"
-    if not outcomes:
-        return Result(
-            title=title,
-            command=context.command(command),
-            answer="No case was run.",
-            paragraphs=(SETTING, _extent(outcomes)),
-            tables=(must_reach_table(outcomes),),
-        )
     runs = _runs(outcomes, context.full)
     pooled = total(recent(runs))
     return Result(
-        title=title,
-        command=context.command(command),
+        title="Blind campaigns: what the discrepancy workflow finds",
+        command=context.command("blind"),
         answer=in_one_sentence(pooled),
         paragraphs=(
             *stored_outcome(context, "blind"),
@@ -127,7 +118,7 @@ def _pictures(outcomes: list[Outcome]) -> tuple[Picture, ...]:
 
 def _runs(outcomes: list[Outcome], full: bool) -> list[BlindRun]:
     """Return all runs that are stored, the one just made in place of those that it repeats."""
-    stored = read_runs(DATA / RUNS)
+    stored = read_runs(committed_file(RUNS, "blind"))
     if not full:
         return stored
     now = run_of(outcomes, _first(outcomes))
@@ -142,8 +133,6 @@ def _first(outcomes: list[Outcome]) -> int:
 def _extent(outcomes: list[Outcome]) -> str:
     """Return in words how many cases of the list have been run."""
     count = len(all_cases())
-    if not outcomes:
-        return f"None of the {count} cases of the list is stored yet: all figures are missing."
     if len(outcomes) == count:
         return f"All {count} cases of the list have been run."
     first = _first(outcomes)
@@ -176,6 +165,4 @@ def _campaign(context: Context) -> list[Outcome]:
 
 
 def _committed() -> list[Outcome]:
-    """Return the committed outcomes; none if no case has been run yet."""
-    paths = DATA / OUTCOMES, DATA / SECONDS
-    return read_outcomes(*paths) if paths[0].is_file() else []
+    return read_outcomes(*(committed_file(name, "blind") for name in (OUTCOMES, SECONDS)))

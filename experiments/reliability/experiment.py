@@ -218,7 +218,8 @@ def _kills_table(tallies: list[Tally]) -> Table:
             Finding(
                 failed == 0,
                 f"After {kills} kills, {failed or 'no'} files or runs were partial, different from "
-                f"those of an undisturbed run, failed to resume, or left workers behind{_below(total)}.",
+                "those of an undisturbed run, failed to resume, or left workers "
+                f"behind{_below(total)}.",
                 check=True,
                 answers=True,
             ),
@@ -241,8 +242,8 @@ def _limits_table(tallies: list[Tally]) -> Table:
         findings=(
             Finding(
                 failed == 0,
-                f"{failed} of {trials} runs that the machine denied something ended without a clear "
-                f"message, or left a torn file{_below(total)}.",
+                f"{failed} of {trials} runs that the machine denied something ended without a "
+                f"clear message, or left a torn file{_below(total)}.",
                 check=True,
             ),
         ),

@@ -471,22 +471,16 @@ def test_a_campaign_outlives_a_defect_resumes_and_leaves_what_the_report_reads(
     for file in (*files, tmp_path / "blind" / RUNS):
         shutil.copy(file, tmp_path)
     monkeypatch.setattr(committed, "DATA", tmp_path)
-    monkeypatch.setattr(blind, "DATA", tmp_path)
     quick = blind.run(replace(context, full=False))
     for table, other in zip(quick.tables, first.tables, strict=True):
         assert [row[0] for row in table.rows] == [row[0] for row in other.rows]
     assert blind.run(replace(context, full=False)).tables == quick.tables
 
 
-def test_without_outcomes_the_report_says_that_nothing_has_been_run(tmp_path, monkeypatch):
-    monkeypatch.setattr(blind, "DATA", tmp_path)
-    found = blind.run(Context(1, tmp_path, Campaign(tmp_path)))
-    assert f"None of the {len(all_cases())} cases" in " ".join(found.paragraphs)
-    assert {row[-1] for row in found.tables[0].rows} == {NOT_RUN.lower()}
-    assert not found.tables[0].findings
-    # Tables of no case would look like findings: no wrong answer among none.
-    assert len(found.tables) == 1
-    assert not found.pictures
+def test_without_its_committed_outcome_there_is_no_report(tmp_path, monkeypatch):
+    monkeypatch.setattr(committed, "DATA", tmp_path)
+    with pytest.raises(FileNotFoundError, match="blind --full"):
+        blind.run(Context(1, tmp_path, Campaign(tmp_path)))
 
 
 def test_outcomes_survive_their_csv(tmp_path):
