@@ -71,8 +71,8 @@ def run(context: Context) -> Result:
         answer=in_one_sentence(pooled),
         paragraphs=(
             *stored_outcome(context, "blind"),
-            f"These figures are pooled over the cases since case {recent(runs)[0].first}. "
-            f"{_extent(outcomes)}",
+            f"These figures are pooled over the runs since case {recent(runs)[0].first}, which met "
+            f"about the code of now. {_extent(outcomes)}",
             SETTING,
         ),
         tables=(

@@ -26,7 +26,7 @@ from experiments.runner.result import SCORE_STATES, Cell, Column, Table, scored,
 
 JUDGED_COLUMNS = (
     Column("demand"),
-    Column("cases that hide"),
+    Column("of what"),
     Column("n"),
     Column("required"),
     Column("value", "", 3, "measured"),
@@ -269,7 +269,7 @@ def _judged_table(
 ) -> Table:
     rows = tuple(_judged_row(one) for one in judged)
     findings = tuple(
-        scored(one.verdict, f"{about}; {_sentence(one)}") for one in judged if one.measured.n
+        scored(one.verdict, f"{about} {_sentence(one)}") for one in judged if one.measured.n
     )
     return Table(name, title, JUDGED_COLUMNS, rows, note=note, findings=findings,
                  wall_times=wall_times)  # fmt: skip
@@ -283,13 +283,13 @@ def _judged_row(one: Judged) -> tuple[Cell, ...]:
 
 def _sentence(one: Judged) -> str:
     return (
-        f"{one.cases}, {one.what}: {one.measured.in_words}, {one.measured.n} cases, "
-        f"{_asked(one)} required."
+        f"({one.cases}): {one.what}, {one.measured.in_words} of {one.measured.n}, {_asked(one)} "
+        "required."
     )
 
 
 def _asked(one: Judged) -> str:
-    return ("at least " if one.at_least else "at most ") + significant(one.required, 3)
+    return f"at {'least' if one.at_least else 'most'} {one.required:g}"
 
 
 def _plain(name: str) -> str:

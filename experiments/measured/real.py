@@ -81,9 +81,9 @@ ARROW = "silverbox"
 SETTING = (
     "Published measurements with known answers. The first 60 % of a log are fitted and the rest is "
     "held out where nothing else is given; the files say what is believed "
-    "(experiments/data/*.toml). Right: all known effects are named plainly and no other. Partly "
-    "right: the main effect is named, but not all or more, or the verdict says itself that it is "
-    "not all. Confidently wrong: a plain verdict without the main effect."
+    "(experiments/data/*.toml). Right: all known effects are named plainly, and no other than is "
+    "allowed below. Partly right: the main effect is named, but not all or more, or the verdict "
+    "says itself that it is not all. Confidently wrong: a plain verdict without the main effect."
 )
 NOTE = (
     "Before: the believed model, fitted within its tolerances; SI. A simulation begins anew from "
