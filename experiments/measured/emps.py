@@ -57,7 +57,8 @@ def _judged(one: Study, found: tuple[Twin, ...]) -> Table:
     findings = (
         Finding(
             first == "coulomb_friction",
-            f"The first effect that is named is {first.replace('_', ' ')}; it should be Coulomb friction.",
+            f"The first effect that is named is {first.replace('_', ' ')}; it should be Coulomb "
+            "friction.",
             check=True,
         ),
         Finding(
@@ -73,8 +74,8 @@ def _judged(one: Study, found: tuple[Twin, ...]) -> Table:
         Finding(
             simulated.after <= MOST_LEFT * simulated.before,
             f"The simulated position of the held-out file is off by {1e3 * simulated.before:.3g} "
-            f"mm before and by {1e3 * simulated.after:.3g} mm after; at most {MOST_LEFT:g} of it may "
-            "be left.",
+            f"mm before and by {1e3 * simulated.after:.3g} mm after; at most {MOST_LEFT:g} of it "
+            "may be left.",
             check=True,
             answers=True,
         ),
