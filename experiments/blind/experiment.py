@@ -14,20 +14,30 @@ from experiments.blind.figures import confusion_matrix, reliability_diagram
 from experiments.blind.outcome import Outcome
 from experiments.blind.reliability import reliability_table
 from experiments.blind.rig.visible import LEAST
-from experiments.blind.runs import RUNS, BlindRun, format_runs, read_runs, run_of, runs_table
+from experiments.blind.runs import (
+    RUNS,
+    BlindRun,
+    format_runs,
+    read_runs,
+    recent,
+    run_of,
+    runs_table,
+    total,
+)
 from experiments.blind.scoring import BlindJob
 from experiments.blind.sentences import in_one_sentence, of_the_first_page
 from experiments.blind.tables import (
     effects_table,
     misses_table,
     must_reach_table,
+    pooled_table,
     status_table,
     times_tables,
     tools_table,
     wrong_table,
 )
 from experiments.runner.campaign import Campaign
-from experiments.runner.committed import DATA, stored_outcome
+from experiments.runner.committed import committed_file, stored_outcome
 from experiments.runner.registry import Context, require
 from experiments.runner.result import NEW, Picture, Result, Table
 from experiments.runner.store import TIMES, write_atomically
@@ -53,21 +63,31 @@ SETTING = (
 def run(context: Context) -> Result:
     """Run the cases or read their outcomes, and hold the scores against what must be reached."""
     outcomes = _campaign(context) if context.full else _committed()
-    stored = stored_outcome(context, "blind") if outcomes else ()
+    runs = _runs(outcomes, context.full)
+    pooled = total(recent(runs))
     return Result(
         title="Blind campaigns: what the discrepancy workflow finds",
         command=context.command("blind"),
-        answer=in_one_sentence(outcomes),
-        paragraphs=(*stored, SETTING, _extent(outcomes)),
-        tables=(must_reach_table(outcomes), *(_tables(outcomes, context.full) if outcomes else ())),
-        pictures=_pictures(outcomes) if outcomes else (),
-        first_page={NEW: of_the_first_page(outcomes)} if outcomes else {},
+        answer=in_one_sentence(pooled),
+        paragraphs=(
+            *stored_outcome(context, "blind"),
+            f"These figures are pooled over the runs since case {recent(runs)[0].first}, which met "
+            f"about the code of now. {_extent(outcomes)}",
+            SETTING,
+        ),
+        tables=(
+            pooled_table(recent(runs)),
+            must_reach_table(outcomes),
+            runs_table(runs),
+            *_tables(outcomes),
+        ),
+        pictures=_pictures(outcomes),
+        first_page={NEW: of_the_first_page(pooled)},
     )
 
 
-def _tables(outcomes: list[Outcome], full: bool) -> tuple[Table, ...]:
+def _tables(outcomes: list[Outcome]) -> tuple[Table, ...]:
     return (
-        runs_table(_runs(outcomes, full)),
         wrong_table(outcomes),
         *times_tables(outcomes),
         reliability_table(outcomes),
@@ -98,7 +118,7 @@ def _pictures(outcomes: list[Outcome]) -> tuple[Picture, ...]:
 
 def _runs(outcomes: list[Outcome], full: bool) -> list[BlindRun]:
     """Return all runs that are stored, the one just made in place of those that it repeats."""
-    stored = read_runs(DATA / RUNS)
+    stored = read_runs(committed_file(RUNS, "blind"))
     if not full:
         return stored
     now = run_of(outcomes, _first(outcomes))
@@ -112,19 +132,17 @@ def _first(outcomes: list[Outcome]) -> int:
 
 def _extent(outcomes: list[Outcome]) -> str:
     """Return in words how many cases of the list have been run."""
-    total = len(all_cases())
-    if not outcomes:
-        return f"None of the {total} cases of the list is stored yet: all figures are missing."
-    if len(outcomes) == total:
-        return f"All {total} cases of the list have been run."
+    count = len(all_cases())
+    if len(outcomes) == count:
+        return f"All {count} cases of the list have been run."
     first = _first(outcomes)
     what = (
-        f"Cases {first} to {first + len(outcomes) - 1} of the {total} of the list are shown, in "
-        "which kinds, effects, forms and stresses are mixed evenly."
+        f"Cases {first} to {first + len(outcomes) - 1} of the {count} of the list are shown one by "
+        "one, in which kinds, effects, forms and stresses are mixed evenly."
     )
     if first == 1:
         return what
-    return f"{what} Those before them were run earlier and have led to changes of the rules."
+    return f"{what} Each run before led to changes of the rules, and the next met unseen cases."
 
 
 def score_cases(chosen: list[Case], campaign: Campaign, title: str) -> list[Outcome]:
@@ -147,6 +165,4 @@ def _campaign(context: Context) -> list[Outcome]:
 
 
 def _committed() -> list[Outcome]:
-    """Return the committed outcomes; none if no case has been run yet."""
-    paths = DATA / OUTCOMES, DATA / SECONDS
-    return read_outcomes(*paths) if paths[0].is_file() else []
+    return read_outcomes(*(committed_file(name, "blind") for name in (OUTCOMES, SECONDS)))

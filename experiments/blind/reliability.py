@@ -8,7 +8,8 @@ from itertools import pairwise
 import numpy as np
 
 from experiments.blind.outcome import Outcome
-from experiments.blind.targets import Estimate, rate
+from experiments.blind.targets import share
+from experiments.comparison.rates import Estimate
 from experiments.runner.result import Cell, Column, Table
 
 EDGES = (0.0, 0.5, 0.7, 0.8, 0.9, 0.95, 0.99, 1.0)
@@ -21,7 +22,7 @@ def reliability(outcomes: Sequence[Outcome]) -> list[tuple[float, Estimate]]:
     for _, _, chosen in _groups(outcomes):
         if chosen:
             said = float(np.mean([one.probability for one in chosen]))
-            found.append((said, rate([one.true_statement for one in chosen])))
+            found.append((said, share([one.true_statement for one in chosen])))
     return found
 
 
@@ -30,7 +31,7 @@ def reliability_table(outcomes: Sequence[Outcome]) -> Table:
     rows: list[tuple[Cell, ...]] = []
     for low, high, chosen in _groups(outcomes):
         said = float(np.mean([one.probability for one in chosen])) if chosen else None
-        true = rate([one.true_statement for one in chosen])
+        true = share([one.true_statement for one in chosen])
         value = true.value if chosen else None
         rows.append((f"{low:g} to {high:g}", len(chosen), said, value, true.low, true.high))
     columns = (

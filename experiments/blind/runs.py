@@ -12,12 +12,13 @@ from dataclasses import astuple, dataclass, fields
 from pathlib import Path
 
 from experiments.blind.outcome import Outcome
-from experiments.blind.targets import select
 from experiments.runner.committed import read_rows
 from experiments.runner.result import Cell, Column, Table
 from pymoo_hdte.io.text_table import csv_text
 
 RUNS = "blind_runs.csv"
+SINCE = 2305
+"""First case of the runs that met about the code of now, which the figures are pooled from."""
 
 
 @dataclass(frozen=True)
@@ -55,7 +56,8 @@ class BlindRun:
 def run_of(outcomes: Sequence[Outcome], first: int, code: str = "") -> BlindRun:
     """Return the run of outcomes, which stand together in the list, from its first number on."""
     single, pair, triple, clean = (
-        select(outcomes, kind) for kind in ("single", "pair", "triple", "none")
+        [one for one in outcomes if one.case.kind == kind]
+        for kind in ("single", "pair", "triple", "none")
     )
     plain = [one for one in outcomes if one.confident]
     covered = [held for one in outcomes for held in one.covered]
@@ -101,6 +103,11 @@ def total(runs: Sequence[BlindRun]) -> Counts:
     return sum((one.counts for one in runs[1:]), runs[0].counts)
 
 
+def recent(runs: Sequence[BlindRun]) -> list[BlindRun]:
+    """Return the runs since case `SINCE`, or the last one if none begins there or later."""
+    return [one for one in runs if one.first >= SINCE] or list(runs[-1:])
+
+
 def runs_table(runs: Sequence[BlindRun]) -> Table:
     """Return a row a run, all of them together last."""
     rows: list[tuple[Cell, ...]] = [
@@ -108,7 +115,7 @@ def runs_table(runs: Sequence[BlindRun]) -> Table:
     ]
     rows.append((f"{runs[0].first} to {runs[-1].last}", "all", *astuple(total(runs))))
     groups = {
-        "plain answers": "wrong",
+        "unqualified answers": "wrong",
         "one effect": "right",
         "two effects": "both",
         "three effects": "two",

@@ -2,45 +2,38 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
-from experiments.blind.outcome import Outcome
-from experiments.blind.scoring import MOST_IN_CLASS
-from experiments.blind.targets import select
+from experiments.blind.runs import Counts
+from experiments.comparison.rates import Estimate, rate
+from experiments.runner.result import significant
 
 
-def in_one_sentence(outcomes: Sequence[Outcome]) -> str:
-    """Say how many plain answers were wrong, and how much was found."""
-    if not outcomes:
-        return "No case was run."
-    plain, wrong = _plain_answers(outcomes)
-    return (
-        f"Of {len(outcomes)} campaigns {plain} had an answer without reservation, {wrong} of them "
-        "wrong; "
-        f"{_found(outcomes)}."
-    )
+def in_one_sentence(counts: Counts) -> str:
+    """Say how many unqualified answers were wrong, and how much was found."""
+    words = found(counts)
+    return f"{words[0].upper()}{words[1:]}."
 
 
-def of_the_first_page(outcomes: Sequence[Outcome]) -> str:
+def of_the_first_page(counts: Counts) -> str:
     """Say the same as part of a longer sentence."""
-    plain, wrong = _plain_answers(outcomes)
+    return f"a workflow that says what a drive model lacks beside measurements: {found(counts)}"
+
+
+def found(counts: Counts, *, intervals: bool = True) -> str:
+    """Say it beginning in lower case, with exact 95 % intervals on request."""
+    wrong, single, both = (
+        rate(counts.plain_wrong, counts.plain),
+        rate(counts.single_right, counts.single),
+        rate(counts.pair_both, counts.pair),
+    )
+    ends = [f" ({in_percent(one)})" if intervals else "" for one in (wrong, single, both)]
     return (
-        "a workflow that says what a drive model lacks beside measurements: on simulated campaigns "
-        f"that it had not seen, {wrong} of {plain} answers without reservation were wrong, and "
-        f"{_found(outcomes)}"
+        f"in blind tests against an independent simulator, {counts.plain_wrong} of {counts.plain} "
+        f"unqualified answers were wrong{ends[0]}; {counts.single_right} of {counts.single} single "
+        f"effects{ends[1]} and {100.0 * both.value:.0f} % of pairs{ends[2]} were identified"
     )
 
 
-def _plain_answers(outcomes: Sequence[Outcome]) -> tuple[int, int]:
-    """Return how many answers were confident, and how many of these were wrong."""
-    return sum(one.confident for one in outcomes), sum(one.wrong_confident for one in outcomes)
-
-
-def _found(outcomes: Sequence[Outcome]) -> str:
-    """Say how many single effects, and both effects of how many pairs, were found."""
-    shares = []
-    for kind, what in (("single", "single effects"), ("pair", "pairs")):
-        of_kind = select(outcomes, kind)
-        shares.append(f"{sum(one.right_answer for one in of_kind)} of {len(of_kind)} {what}")
-    how = f"or stood in a list of at most {MOST_IN_CLASS} candidates"
-    return f"{shares[0]}, and both effects in {shares[1]}, were named {how}"
+def in_percent(one: Estimate) -> str:
+    """Write an interval in per cent, with three digits."""
+    low, high = (significant(100.0 * end, 3) for end in (one.low, one.high))
+    return f"{low} to {high} %"

@@ -2,29 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 from experiments.blind.codes import STATUSES
 from experiments.blind.outcome import Outcome
 from experiments.blind.rig.forms import LISTED
+from experiments.blind.runs import BlindRun, total
 from experiments.blind.scoring import COMPARED, DETERMINED, PARTS, RIVALS
 from experiments.blind.targets import (
     KINDS,
+    NOT_RUN,
     NOTHING_STRESSED,
-    Estimate,
     Judged,
     demands,
-    median,
     nothing_stressed,
-    rate,
+    pooled_demands,
     select,
+    share,
     time_demand,
 )
-from experiments.runner.result import Cell, Column, Finding, Table, significant
+from experiments.comparison.rates import Estimate, median
+from experiments.runner.result import SCORE_STATES, Cell, Column, Table, scored, significant
 
 JUDGED_COLUMNS = (
     Column("demand"),
-    Column("cases that hide"),
+    Column("of what"),
     Column("n"),
     Column("required"),
     Column("value", "", 3, "measured"),
@@ -42,23 +44,43 @@ _OTHERS = ("class", "partial", "unlisted", "adequate", "error")
 
 def must_reach_table(outcomes: Sequence[Outcome]) -> Table:
     """Return what must be reached beside what was measured, what falls short first."""
-    order = ("missed", "within chance", "met", "not run")
-    judged = sorted(demands(outcomes), key=lambda one: order.index(one.verdict))
+    judged = _short_first(demands(outcomes))
     note = (
         "What falls short stands first. Confident are the statuses named and parameter; such an "
         "answer is wrong if any name in it is not hidden. A class is right if it has at most three "
         "members and one of them is what is hidden, a partial answer if all its names are hidden. "
-        "Intervals are exact: Clopper and Pearson's for rates, order statistics' for medians. A "
-        "demand is missed where an exact one-sided test at 1 % rejects it. A gap that exceeds the "
+        "Intervals are exact: Clopper and Pearson's for rates, order statistics' for medians. What "
+        "meets its demand is shown to do so if its whole interval does. A gap that exceeds the "
         "noise floor by less than a tenth cannot shrink and counts for no median."
     )
-    return _judged_table("must_reach", "Must reach", judged, note)
+    return _judged_table(
+        "must_reach",
+        "Must reach: the cases shown here",
+        "Blind campaigns of the last run",
+        judged,
+        note,
+    )
+
+
+def pooled_table(runs: Sequence[BlindRun]) -> Table:
+    """Return what must be reached beside what several runs together came to."""
+    cases = f"cases {runs[0].first} to {runs[-1].last}"
+    note = "Counted by the rules of now. Intervals are Clopper and Pearson's."
+    judged = _short_first(pooled_demands(total(runs)))
+    return _judged_table(
+        "pooled", f"Must reach: {cases} pooled", "Blind campaigns, pooled", judged, note
+    )
+
+
+def _short_first(judged: Iterable[Judged]) -> list[Judged]:
+    order = (*SCORE_STATES[::-1], NOT_RUN)
+    return sorted(judged, key=lambda one: order.index(one.verdict))
 
 
 def times_tables(outcomes: Sequence[Outcome]) -> tuple[Table, Table]:
     """Return the demand on time, and the seconds of the parts, by what is hidden."""
     judged = _judged_table(
-        "time", "Must reach: time", [time_demand(outcomes)],
+        "time", "Must reach: time", "Blind campaigns", [time_demand(outcomes)],
         "Processor time of analyse, locate, prove and next experiment.", wall_times=True,
     )  # fmt: skip
     rows: list[tuple[Cell, ...]] = []
@@ -117,7 +139,7 @@ def effects_table(outcomes: Sequence[Outcome]) -> Table:
     rows: list[tuple[Cell, ...]] = []
     for name in LISTED:
         chosen = select(outcomes, "single", name)
-        right = rate([one.right for one in chosen])
+        right = share([one.right for one in chosen])
         counts = [sum(one.status == status for one in chosen)
                   for status in _OTHERS]  # fmt: skip
         biases = [median([one.numbers.get(f"bias_{state}") for one in chosen]).value
@@ -176,13 +198,13 @@ def tools_table(outcomes: Sequence[Outcome]) -> Table:
         chosen = select(outcomes, kind)
         expected = {"none": "adequate", "unlisted": "unlisted"}.get(kind)
         rates: dict[str, Estimate] = {
-            "this workflow, name or class": rate([one.right_answer for one in chosen]),
-            "this workflow, first name alone": rate([one.right_first for one in chosen]),
+            "this workflow, name or class": share([one.right_answer for one in chosen]),
+            "this workflow, first name alone": share([one.right_first for one in chosen]),
         }
         for tool in RIVALS:
             answers = [one.answers.get(tool, "error") == (expected or one.case.truth)
                        for one in chosen]  # fmt: skip
-            rates[_plain(tool)] = rate(answers)
+            rates[_plain(tool)] = share(answers)
         for tool, found in rates.items():
             rows.append((KINDS[kind], tool, found.n, found.value, found.low, found.high))
         rows.append((KINDS[kind], "chance", None, 1.0 / _ANSWERS, None, None))
@@ -238,34 +260,36 @@ def _cases_table(name: str, title: str, chosen: Sequence[Outcome], folded: bool)
 
 
 def _judged_table(
-    name: str, title: str, judged: Sequence[Judged], note: str, wall_times: bool = False
+    name: str,
+    title: str,
+    about: str,
+    judged: Sequence[Judged],
+    note: str,
+    wall_times: bool = False,
 ) -> Table:
-    rows = tuple(judged_row(one) for one in judged)
+    rows = tuple(_judged_row(one) for one in judged)
     findings = tuple(
-        Finding(one.met, _sentence(one), check=True)
-        for one in judged
-        if one.verdict in ("met", "missed")
+        scored(one.verdict, f"{about} {_sentence(one)}") for one in judged if one.measured.n
     )
     return Table(name, title, JUDGED_COLUMNS, rows, note=note, findings=findings,
                  wall_times=wall_times)  # fmt: skip
 
 
-def judged_row(one: Judged) -> tuple[Cell, ...]:
-    """Return a demand and what was measured as cells of `JUDGED_COLUMNS`."""
-    asked = ("at least " if one.at_least else "at most ") + significant(one.required, 3)
+def _judged_row(one: Judged) -> tuple[Cell, ...]:
     measured = one.measured
-    return (one.what, one.cases, measured.n, asked, measured.value, measured.low, measured.high,
-            one.verdict)  # fmt: skip
+    return (one.what, one.cases, measured.n, _asked(one), measured.value, measured.low,
+            measured.high, one.verdict.lower())  # fmt: skip
 
 
 def _sentence(one: Judged) -> str:
-    value, low, high = (significant(x, 3) for x in
-                        (one.measured.value, one.measured.low, one.measured.high))  # fmt: skip
-    bound = "at least" if one.at_least else "at most"
     return (
-        f"Blind campaigns with {one.cases}, {one.what}: {value} ({low} to {high}, "
-        f"{one.measured.n} cases), required {bound} {significant(one.required, 3)}."
+        f"({one.cases}): {one.what}, {one.measured.in_words} of {one.measured.n}, {_asked(one)} "
+        "required."
     )
+
+
+def _asked(one: Judged) -> str:
+    return f"at {'least' if one.at_least else 'most'} {one.required:g}"
 
 
 def _plain(name: str) -> str:

@@ -1,8 +1,4 @@
-"""Rates and medians with their intervals, held against what must be reached.
-
-A target is missed only where an exact one-sided test at `LEVEL` rejects it (design section 8). Both
-tests are binomial: the median is at least m if at least half of all cases are.
-"""
+"""Rates and medians with their intervals, held against what must be reached."""
 
 from __future__ import annotations
 
@@ -10,11 +6,12 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import binomtest, quantile_test
 
 from experiments.blind.outcome import Outcome
+from experiments.blind.runs import Counts
+from experiments.comparison.rates import Estimate, median, rate
 
-# "Must reach" of issue 21, as rates; they are judged as design section 8 says.
+# What must be reached, as rates.
 MOST_WRONG = {
     "single": 10 / 1000,
     "pair": 4 / 400,
@@ -22,7 +19,9 @@ MOST_WRONG = {
     "unlisted": 2 / 200,
     "stressed": 4 / 400,
 }
-"""Confident wrong answers of each kind."""
+"""Confident wrong answers among the cases of each kind."""
+MOST_WRONG_OF_PLAIN = 0.01
+"""Share of the unqualified answers that are wrong."""
 LEAST_RIGHT = 0.97
 """Share of singles whose first name or class is right."""
 LEAST_BOTH = 0.80
@@ -43,6 +42,11 @@ FLOOR_MULTIPLE = 1.5
 LEAST_CLOSED = 0.70
 MOST_SECONDS = 5.5
 """Median time of a case on one core: half of the 9 to 13 s of the workflow before."""
+WRONG = "wrong name with confidence"
+RIGHT = "first name or class right"
+BOTH = "both named, or in a class of at most three"
+TWO = "two named"
+ALARM = "alarm"
 ALARM_STRESSES = ("noise", "outliers")
 KINDS = {
     "none": "nothing",
@@ -54,55 +58,34 @@ KINDS = {
 }
 NOTHING_STRESSED = "nothing, with misstated noise or faulty rows"
 
-LEVEL = 0.01
-
-
-@dataclass(frozen=True)
-class Estimate:
-    """A rate or a median of n cases with its exact 95 % interval."""
-
-    value: float
-    low: float
-    high: float
-    n: int
+NOT_RUN = "Not run"
 
 
 @dataclass(frozen=True)
 class Judged:
-    """A demand, what was measured, and whether the two contradict each other.
+    """A demand and what was measured.
 
     Attributes
     ----------
     what, cases : str
-    at_least : bool
-        Whether more is better.
     required : float
     measured : Estimate
-    p_value : float
-        Of the demand being true.
+    at_least : bool
+        Whether more is better.
     """
 
     what: str
     cases: str
-    at_least: bool
     required: float
     measured: Estimate
-    p_value: float
-
-    @property
-    def met(self) -> bool:
-        """Whether no test rejects the demand."""
-        return self.p_value >= LEVEL
+    at_least: bool = True
 
     @property
     def verdict(self) -> str:
-        """In words: met by the measured figure itself, by its interval only, missed, or not run."""
+        """One of `SCORE_STATES`, or `NOT_RUN`."""
         if self.measured.n == 0:
-            return "not run"
-        beyond = self.measured.value - self.required
-        if beyond == 0.0 or (beyond > 0.0) == self.at_least:
-            return "met"
-        return "within chance" if self.met else "missed"
+            return NOT_RUN
+        return self.measured.state(self.required, at_least=self.at_least)
 
 
 def select(outcomes: Sequence[Outcome], kind: str, name: str | None = None) -> list[Outcome]:
@@ -111,82 +94,55 @@ def select(outcomes: Sequence[Outcome], kind: str, name: str | None = None) -> l
     return of_kind if name is None else [one for one in of_kind if one.case.truth == name]
 
 
-def rate(flags: Sequence[bool]) -> Estimate:
-    """Return the share of true flags; its interval is that of Clopper and Pearson."""
-    n, hits = len(flags), sum(map(bool, flags))
-    if n == 0:
-        return Estimate(np.nan, 0.0, 1.0, 0)
-    interval = binomtest(hits, n).proportion_ci(method="exact")
-    return Estimate(hits / n, float(interval.low), float(interval.high), n)
-
-
-def median(values: Sequence[float | None]) -> Estimate:
-    """Return the median of the values that there are; its interval is between two of them.
-
-    Ends are infinite where too few values leave one open.
-    """
-    known = np.array([value for value in values if value is not None])
-    if not known.size:
-        return Estimate(np.nan, -np.inf, np.inf, 0)
-    interval = quantile_test(known).confidence_interval()
-    low = interval.low if np.isfinite(interval.low) else -np.inf
-    high = interval.high if np.isfinite(interval.high) else np.inf
-    return Estimate(float(np.median(known)), float(low), float(high), len(known))
-
-
-def judge_rate(
-    what: str, cases: str, flags: Sequence[bool], required: float, at_least: bool = True
-) -> Judged:
-    """Hold a rate against what it must reach or must not exceed."""
-    side = "less" if at_least else "greater"
-    n = len(flags)
-    p_value = binomtest(sum(map(bool, flags)), n, required, alternative=side).pvalue if n else 1.0
-    return Judged(what, cases, at_least, required, rate(flags), float(p_value))
-
-
-def judge_median(
-    what: str, cases: str, values: Sequence[float | None], required: float, at_least: bool = True
-) -> Judged:
-    """Hold a median against what it must reach or must not exceed."""
-    known = [value for value in values if value is not None]
-    side = "less" if at_least else "greater"
-    p_value = quantile_test(known, q=required, alternative=side).pvalue if known else 1.0
-    return Judged(what, cases, at_least, required, median(known), float(p_value))
+def share(flags: Sequence[bool]) -> Estimate:
+    """Return the share of true flags."""
+    return rate(sum(map(bool, flags)), len(flags))
 
 
 def demands(outcomes: Sequence[Outcome]) -> Iterator[Judged]:
     """Judge everything that must be reached but the time."""
     single, listed = select(outcomes, "single"), KINDS["single"]
     for kind, most in MOST_WRONG.items():
-        wrong = [one.wrong_confident for one in select(outcomes, kind)]
-        yield judge_rate("wrong name with confidence", KINDS[kind], wrong, most, at_least=False)
-    yield judge_rate(
-        "first name or class right", listed, [one.right for one in single], LEAST_RIGHT
-    )
-    pairs, triples = select(outcomes, "pair"), select(outcomes, "triple")
-    both = [one.all_named for one in pairs]
-    yield judge_rate("both named, or in a class of at most three", KINDS["pair"], both, LEAST_BOTH)
-    two = [one.two_named for one in triples]
-    yield judge_rate("two named", KINDS["triple"], two, LEAST_TWO_OF_THREE)
-    alarms = [one.status != "adequate" for one in select(outcomes, "none")]
-    yield judge_rate("alarm", KINDS["none"], alarms, MOST_ALARMS, at_least=False)
-    alarms = [one.status != "adequate" for one in nothing_stressed(outcomes)]
-    yield judge_rate("alarm", NOTHING_STRESSED, alarms, MOST_ALARMS, at_least=False)
-    yield judge_median(
-        "bias left in the base over bias before, median",
-        listed,
-        [one.bias_ratio for one in single],
-        MOST_BIAS_LEFT,
-        at_least=False,
-    )
-    values = [flag for one in outcomes for flag in one.covered]
-    for end, at_least in zip(COVERED, (True, False), strict=True):
-        yield judge_rate("95 % intervals that hold the true value", "what is named", values, end,
-                         at_least)  # fmt: skip
-    yield judge_median("F1 of the flagged cells, median", listed, [one.f1 for one in single],
-                       LEAST_F1)  # fmt: skip
+        wrong = share([one.wrong_confident for one in select(outcomes, kind)])
+        yield Judged(WRONG, KINDS[kind], most, wrong, at_least=False)
+    yield Judged(RIGHT, listed, LEAST_RIGHT, share([one.right for one in single]))
+    both = share([one.all_named for one in select(outcomes, "pair")])
+    yield Judged(BOTH, KINDS["pair"], LEAST_BOTH, both)
+    two = share([one.two_named for one in select(outcomes, "triple")])
+    yield Judged(TWO, KINDS["triple"], LEAST_TWO_OF_THREE, two)
+    for words, chosen in (
+        (KINDS["none"], select(outcomes, "none")),
+        (NOTHING_STRESSED, nothing_stressed(outcomes)),
+    ):
+        alarms = share([one.status != "adequate" for one in chosen])
+        yield Judged(ALARM, words, MOST_ALARMS, alarms, at_least=False)
+    bias = median([one.bias_ratio for one in single])
+    what = "bias left in the base over bias before, median"
+    yield Judged(what, listed, MOST_BIAS_LEFT, bias, at_least=False)
+    yield from _covered(share([flag for one in outcomes for flag in one.covered]))
+    f1 = median([one.f1 for one in single])
+    yield Judged("F1 of the flagged cells, median", listed, LEAST_F1, f1)
     for gap in ("transmission_error", "leading"):
         yield from _proof(gap, single)
+
+
+def pooled_demands(counts: Counts) -> Iterator[Judged]:
+    """Judge what is counted over several runs."""
+    wrong = rate(counts.plain_wrong, counts.plain)
+    yield Judged("wrong", "unqualified answers", MOST_WRONG_OF_PLAIN, wrong, at_least=False)
+    yield Judged(RIGHT, KINDS["single"], LEAST_RIGHT, rate(counts.single_right, counts.single))
+    yield Judged(BOTH, KINDS["pair"], LEAST_BOTH, rate(counts.pair_both, counts.pair))
+    two = rate(counts.triple_two, counts.triple)
+    yield Judged(TWO, KINDS["triple"], LEAST_TWO_OF_THREE, two)
+    alarms = rate(counts.clean_alarms, counts.clean)
+    yield Judged(ALARM, KINDS["none"], MOST_ALARMS, alarms, at_least=False)
+    yield from _covered(rate(counts.interval_holds, counts.interval))
+
+
+def _covered(measured: Estimate) -> Iterator[Judged]:
+    what = "95 % intervals that hold the true value"
+    for end, at_least in zip(COVERED, (True, False), strict=True):
+        yield Judged(what, "what is named", end, measured, at_least)
 
 
 def nothing_stressed(outcomes: Sequence[Outcome]) -> list[Outcome]:
@@ -200,9 +156,8 @@ def nothing_stressed(outcomes: Sequence[Outcome]) -> list[Outcome]:
 
 def time_demand(outcomes: Sequence[Outcome]) -> Judged:
     """Judge the time of all parts together."""
-    whole = [sum(one.seconds) if one.seconds else np.inf for one in outcomes]
-    return judge_median("time of a campaign, median, s", "all kinds", whole, MOST_SECONDS,
-                        at_least=False)  # fmt: skip
+    whole = median([sum(one.seconds) if one.seconds else np.inf for one in outcomes])
+    return Judged("time of a campaign, median, s", "all kinds", MOST_SECONDS, whole, at_least=False)
 
 
 _GAP_WORDS = {
@@ -212,11 +167,9 @@ _GAP_WORDS = {
 
 
 def _proof(gap: str, single: Sequence[Outcome]) -> Iterator[Judged]:
-    where = f"one listed effect, {_GAP_WORDS[gap]}"
-    shrunk = [one.shrinkage(gap) for one in single]
-    multiple = FLOOR_MULTIPLE
+    where, multiple = f"one listed effect, {_GAP_WORDS[gap]}", FLOOR_MULTIPLE
+    shrunk = median([one.shrinkage(gap) for one in single])
+    yield Judged("shrinkage of the held-out gap, median", where, LEAST_SHRINKAGE, shrunk)
     closed = [one.closed(gap, multiple) for one in single if one.open_before(gap, multiple)]
-    yield judge_median("shrinkage of the held-out gap, median", where, shrunk,
-                       LEAST_SHRINKAGE)  # fmt: skip
-    yield judge_rate(f"held-out gap within {FLOOR_MULTIPLE:g} x the noise floor", where,
-                     closed, LEAST_CLOSED)  # fmt: skip
+    what = f"held-out gap within {multiple:g} x the noise floor"
+    yield Judged(what, where, LEAST_CLOSED, share(closed))

@@ -16,9 +16,11 @@ from experiments.cards.separation import (
 )
 from experiments.comparison.paired import SIGNIFICANT
 from experiments.comparison.ranks import medians
+from experiments.comparison.rates import state_of
+from experiments.comparison.statistics import holm
 from experiments.contest.peers_data import Scores
 from experiments.contest.peers_tables import NAMES, smaller_is_better
-from experiments.runner.result import Cell, Column, Finding, Table
+from experiments.runner.result import Cell, Column, Finding, Table, scored
 
 HARDNESS_NOTE = (
     f"Local optima are those of the weighted sum (objectives in widths of the front, weights in "
@@ -104,12 +106,15 @@ def summary(found: list[Separation]) -> Finding:
         if names:
             parts.append(f"After {budget:,}: {', '.join(names)}.")
     largest = max(entry.evaluations for entry in found)
-    some = any(entry.separates for entry in found if entry.evaluations == largest)
-    return Finding(
-        some,
-        f"Robust problems that separate the algorithms: {', '.join(counts)} evaluations. "
-        + " ".join(parts),
-        check=True,
+    last = [one for one in found if one.evaluations == largest and one.separates is not None]
+    corrected = holm([one.p for one in last])
+    separate = [bool(one.separates) for one in last]
+    shown = any(one and p <= SIGNIFICANT for one, p in zip(separate, corrected, strict=True))
+    return scored(
+        state_of(any(separate), shown=shown),
+        f"Robust problems that separate the algorithms: {', '.join(counts)} evaluations; at least "
+        f"one is wanted at the largest budget, with p after Holm over the {len(last)} problems "
+        f"there. {' '.join(parts)}".rstrip(),
         answers=True,
     )
 

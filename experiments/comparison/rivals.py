@@ -14,6 +14,7 @@ from scipy.stats import binomtest, mannwhitneyu, rankdata
 
 from experiments.comparison.paired import SIGNIFICANT
 from experiments.comparison.ranks import OF_PROBLEMS, OF_RUNS, costs_of
+from experiments.comparison.rates import state_of
 from experiments.comparison.statistics import holm, wilcoxon_p
 from pymoo_hdte.checks import InvalidInput, one_of
 
@@ -34,6 +35,11 @@ class RivalTest(NamedTuple):
     def beaten(self) -> bool:
         """Whether the control is better than this rival beyond chance."""
         return self.ahead and self.p < SIGNIFICANT
+
+
+def better_than_each(tests: Sequence[RivalTest]) -> str:
+    """Return the state of the demand to be better than each rival, shown if beyond chance."""
+    return state_of(all(test.ahead for test in tests), shown=all(test.beaten for test in tests))
 
 
 class WinTieLoss(NamedTuple):

@@ -97,6 +97,12 @@ def judged(rig: KnownRig, status: str, names: Collection[str]) -> str:
     return CONFIDENT if status in (*PLAIN, "class") else WRONG
 
 
+def beside(rig: KnownRig, names: Collection[str]) -> list[str]:
+    """Return which names are no part of the known answer, and only allowed beside it."""
+    known = frozenset().union(*rig.effects)
+    return [name for name in names if name in rig.also and name not in known]
+
+
 _UR10E = "identification in shamilmamedov/dynamic_calibration, and least squares of our own"
 KNOWN_RIGS = (
     KnownRig(

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 from tqdm import tqdm
 
+from experiments.comparison.rates import rate
 from experiments.measured.cpu_time import SECONDS, TOOL, cpu_table, timed_study
 from experiments.measured.known_answers import (
     CONFIDENT,
@@ -19,6 +20,7 @@ from experiments.measured.known_answers import (
     RIGHT,
     UNKNOWN,
     KnownRig,
+    beside,
     judged,
 )
 from experiments.measured.other_tools import Answer, answers
@@ -40,7 +42,7 @@ from experiments.runner.committed import (
     table_with_origin,
 )
 from experiments.runner.registry import Context
-from experiments.runner.result import Cell, Column, Finding, Result, Table
+from experiments.runner.result import Cell, Column, Finding, Result, Table, scored
 from experiments.runner.store import TIMES, write_atomically
 from pymoo_hdte.discrepancy.mechanism.proof import prove_measured
 from pymoo_hdte.discrepancy.report.tables import STATUSES
@@ -79,9 +81,9 @@ ARROW = "silverbox"
 SETTING = (
     "Published measurements with known answers. The first 60 % of a log are fitted and the rest is "
     "held out where nothing else is given; the files say what is believed "
-    "(experiments/data/*.toml). Right: all known effects are named plainly and no other. Partly "
-    "right: the main effect is named, but not all or more, or the verdict says itself that it is "
-    "not all. Confidently wrong: a plain verdict without the main effect."
+    "(experiments/data/*.toml). Right: all known effects are named plainly, and no other than is "
+    "allowed below. Partly right: the main effect is named, but not all or more, or the verdict "
+    "says itself that it is not all. Confidently wrong: a plain verdict without the main effect."
 )
 NOTE = (
     "Before: the believed model, fitted within its tolerances; SI. A simulation begins anew from "
@@ -128,6 +130,7 @@ def run(context: Context) -> Result:
                 note=NOTE,
                 findings=_findings(first),
             ),
+            allowances_table(),
             Table("tools", "Beside other tools", TOOLS, _cells(found[1]), note=TOOLS_NOTE),
             cpu_table(found[2]),
         ),
@@ -180,10 +183,51 @@ def shortfalls(rows: Sequence[Sequence[str]]) -> tuple[str, ...]:
     """Return what falls short, in sentences, the worst first."""
     short = [row for row in rows if row[1] not in (RIGHT, UNKNOWN)]
     told = [f"{row[0]} ({row[1]}): {row[3]}, where {row[4]} is known" for row in short]
-    right = sum(row[1] == RIGHT for row in rows)
+    right = [row for row in rows if row[1] == RIGHT]
     known = sum(row[1] != UNKNOWN for row in rows)
-    count = f"Right: {right} of {known} whose answer is known."
+    helped = [f"{row[0]} ({_beside(row)})" for row in right if _beside(row)]
+    extra = f", with a further effect that is allowed there: {', '.join(helped)}" if helped else ""
+    count = f"Right: {len(right)} of {known} whose answer is known{extra}."
     return (f"What falls short. {'; '.join(told)}. {count}",) if told else (count,)
+
+
+def _beside(row: Sequence[str]) -> str:
+    """Return what a verdict names beyond the known answer, and is allowed to."""
+    rigs = [rig for rig in KNOWN_RIGS if rig.name == row[0]]
+    names = [words.replace(" ", "_") for words in row[3].split(" + ")]
+    return " + ".join(name for rig in rigs for name in beside(rig, names)).replace("_", " ")
+
+
+def allowances_table() -> Table:
+    """Return by which allowances answers are judged."""
+    rows = tuple(
+        (
+            rig.name,
+            "; ".join(_any_of(effects) for effects in rig.effects),
+            ", ".join(sorted(rig.also)).replace("_", " ") or None,
+            rig.order,
+            rig.reach if rig.order is not None else None,
+        )
+        for rig in KNOWN_RIGS
+        if rig.effects
+    )
+    return Table(
+        "allowances",
+        "What counts as right",
+        (
+            *(Column("rig"), Column("must be named, the main effect first")),
+            Column("may be named beside it"),
+            *(Column(name, "per turn", 4, "order of the ripple") for name in ("known", "within")),
+        ),
+        rows,
+        note="Further effects are allowed where they are plausible and no published answer "
+        "excludes them. An order is known within the resolution of the travel and its confusion of "
+        "housing and output.",
+    )
+
+
+def _any_of(effects: frozenset[str]) -> str:
+    return " or ".join(sorted(effects)).replace("_", " ")
 
 
 def _in_one_sentence(rows: Sequence[Sequence[str]]) -> str:
@@ -194,6 +238,8 @@ def _in_one_sentence(rows: Sequence[Sequence[str]]) -> str:
         for word, count in counts
         if count
     )
+    helped = sum(row[1] == RIGHT and bool(_beside(row)) for row in rows)
+    told += f" ({helped} of them with a further effect that is allowed)" if helped else ""
     none = "" if counts[0][1] else f", none {CONFIDENT}"
     return f"Verdicts on {len(rows)} machines that others measured: {told}{none}."
 
@@ -219,7 +265,8 @@ def _tool_row(rig: KnownRig, answer: Answer) -> list[str]:
 
 def _findings(rows: Sequence[Sequence[str]]) -> tuple[Finding, ...]:
     """Return whether the demands on real machines hold."""
-    confident = [row[0] for row in rows if row[1] == FALLS_SHORT[0]]
+    confident = [row[0] for row in rows if row[1] == CONFIDENT]
+    wrong = rate(len(confident), sum(row[1] != UNKNOWN for row in rows))
     named = [row for row in rows if row[2] in ("named", "class", "partial") and row[10] and row[11]]
     worse = [row[0] for row in named if not float(row[11]) < float(row[10])]
     missed = [
@@ -230,7 +277,11 @@ def _findings(rows: Sequence[Sequence[str]]) -> tuple[Finding, ...]:
         if not row[6] or abs(float(row[6]) - one.order) > one.reach
     ]
     return (
-        Finding(not confident, f"Confidently wrong: {_listed(confident)}.", check=True),
+        scored(
+            wrong.state(0.0, at_least=False),
+            f"Confidently wrong: {_listed(confident)}, a share of {wrong.in_words} of {wrong.n} "
+            "machines with a known answer; none should be.",
+        ),
         Finding(
             not worse,
             f"Named, though it makes the simulated held-out position worse: {_listed(worse)}.",
@@ -238,7 +289,7 @@ def _findings(rows: Sequence[Sequence[str]]) -> tuple[Finding, ...]:
         ),
         Finding(
             not missed,
-            "Ripple not found at the known order, within the resolution of the travel: "
+            "Ripple not found at the known order, within what is allowed for it: "
             f"{_listed(missed)}.",
             check=True,
         ),

@@ -33,7 +33,7 @@ from experiments.reliability.limits import LIMITS, LimitJob, MemoryJob
 from experiments.runner.campaign import Campaign
 from experiments.runner.committed import committed_file, stored_outcome
 from experiments.runner.registry import Context
-from experiments.runner.result import Column, Finding, Result, Table
+from experiments.runner.result import Column, Finding, Result, Table, significant
 from experiments.runner.store import TIMES, write_atomically
 
 TALLIES, PEAKS = "reliability.csv", "reliability_memory.csv"
@@ -161,6 +161,11 @@ def _committed() -> tuple[list[Tally], list[Peak]]:
     return read_tallies(tallies), read_peaks(peaks)
 
 
+def _below(total: Tally) -> str:
+    """Say what rate of failures the trials leave possible."""
+    return f" (a rate below {significant(100.0 * total.bound, 2)} %, one-sided 95 % limit)"
+
+
 def _inputs_table(tallies: list[Tally]) -> Table:
     inputs, refused, accepted, failed = (
         sum(getattr(one, name) for one in tallies)
@@ -186,7 +191,7 @@ def _inputs_table(tallies: list[Tally]) -> Table:
             Finding(
                 failed == 0,
                 f"Of {inputs:,} inputs with a planted mistake {failed or 'none'} raised anything "
-                "but a clear error, hung, crashed or left anything half-done.",
+                f"but a clear error, hung, crashed or left anything half-done{_below(total)}.",
                 check=True,
                 answers=True,
             ),
@@ -196,6 +201,7 @@ def _inputs_table(tallies: list[Tally]) -> Table:
 
 def _kills_table(tallies: list[Tally]) -> Table:
     kills, failed = sum(one.trials for one in tallies), sum(one.failed for one in tallies)
+    total = Tally(KILL, "all", kills, 0, 0, failed)
     return Table(
         "kills",
         "Runs killed and resumed",
@@ -212,7 +218,8 @@ def _kills_table(tallies: list[Tally]) -> Table:
             Finding(
                 failed == 0,
                 f"After {kills} kills, {failed or 'no'} files or runs were partial, different from "
-                "those of an undisturbed run, failed to resume, or left workers behind.",
+                "those of an undisturbed run, failed to resume, or left workers "
+                f"behind{_below(total)}.",
                 check=True,
                 answers=True,
             ),
@@ -221,7 +228,8 @@ def _kills_table(tallies: list[Tally]) -> Table:
 
 
 def _limits_table(tallies: list[Tally]) -> Table:
-    failed = sum(one.failed for one in tallies)
+    trials, failed = sum(one.trials for one in tallies), sum(one.failed for one in tallies)
+    total = Tally(LIMIT, "all", trials, 0, 0, failed)
     return Table(
         "limits",
         "Full disks, folders without permission, and two runs in one folder",
@@ -234,8 +242,8 @@ def _limits_table(tallies: list[Tally]) -> Table:
         findings=(
             Finding(
                 failed == 0,
-                f"{failed} of {sum(one.trials for one in tallies)} runs that the machine denied "
-                "something ended without a clear message, or left a torn file.",
+                f"{failed} of {trials} runs that the machine denied something ended without a "
+                f"clear message, or left a torn file{_below(total)}.",
                 check=True,
             ),
         ),

@@ -10,7 +10,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from experiments.runner.catalogue import EXPERIMENTS
 from experiments.runner.provenance import report_fingerprint
-from experiments.runner.result import FIRST_PAGE, Finding
+from experiments.runner.result import FIRST_PAGE, MISSED, NOT_SHOWN, SHOWN, Finding
 from experiments.runner.store import TIMES, StoredPicture, StoredResult, load, write_atomically
 from pymoo_hdte.checks import InvalidInput
 
@@ -29,6 +29,9 @@ _VERDICTS = {
     "Fitted": ("Given back, because the model was fitted to it", "fitted"),
     "Fails": ("Checks of our own that fail", "no"),
     "Holds": ("Checks of our own that hold", "yes"),
+    MISSED: ("Scores that miss what was demanded", "no"),
+    NOT_SHOWN: ("Scores that meet it, but with too few cases to show it", "open"),
+    SHOWN: ("Scores shown to meet what was demanded", "yes"),
 }
 """Heading of the findings of one verdict, and the style that they are shown in."""
 

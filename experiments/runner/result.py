@@ -20,13 +20,19 @@ LONG = 40
 Cell = float | int | str | None
 """What a table holds; None where there is nothing to say."""
 
+SHOWN, NOT_SHOWN, MISSED = "Shown", "Not shown", "Missed"
+"""States of a score, which chance has a part in: its 95 % interval meets the demand, the score
+itself does but its interval does not, as there are too few cases, or the score does not."""
+SCORE_STATES = (SHOWN, NOT_SHOWN, MISSED)
+
 
 @dataclass(frozen=True)
 class Finding:
     """One sentence that sets our numbers against the paper's, and whether the two agree.
 
-    A ``check`` sets them against a demand of our own instead, and says whether it holds. Where the
-    model was ``fitted`` to the paper's numbers, giving them back is no agreement. What stands
+    A ``check`` sets them against a demand of our own instead, and says whether it holds. A check in
+    which chance has a part is a ``score``, one of `SCORE_STATES`; see `scored`. Where the model was
+    ``fitted`` to the paper's numbers, giving them back is no agreement. What stands
     ``within_paper`` sets printed numbers against each other, and needs no drive model of ours. At
     most one of the three holds. What ``answers`` the question of its experiment is repeated at the
     top of the page.
@@ -38,15 +44,20 @@ class Finding:
     fitted: bool = False
     answers: bool = False
     within_paper: bool = False
+    score: str = ""
 
     def __post_init__(self) -> None:
         if self.check + self.fitted + self.within_paper > 1:
             raise ValueError("a finding is a check, of a fit or within the paper, not two of these")
+        if self.score and not (self.check and self.score in SCORE_STATES):
+            raise ValueError(f"a score is a check in one of the states {', '.join(SCORE_STATES)}")
         object.__setattr__(self, "agrees", bool(self.agrees))
 
     @property
     def verdict(self) -> str:
         """The outcome in a word or two."""
+        if self.score:
+            return self.score
         if self.check:
             return "Holds" if self.agrees else "Fails"
         if self.fitted:
@@ -54,6 +65,11 @@ class Finding:
         if self.within_paper:
             return "Consistent" if self.agrees else "Contradicts"
         return "Agrees" if self.agrees else "Differs"
+
+
+def scored(state: str, sentence: str, *, answers: bool = False) -> Finding:
+    """Return the finding on a score in one of `SCORE_STATES`; only what is shown agrees."""
+    return Finding(state == SHOWN, sentence, check=True, answers=answers, score=state)
 
 
 @dataclass(frozen=True)

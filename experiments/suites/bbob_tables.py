@@ -16,14 +16,24 @@ from experiments.suites.peers import BBOB_PEERS, ON_BBOB, OURS
 from experiments.suites.protocol import BESIDE_PEERS, BUDGETS, DIMENSIONS
 
 
-def reached(outcome: Outcome, dimension: int, evaluations: int) -> float | None:
-    """Return the mean share of our swarm after so many evaluations; None if it was not run.
+def reached_shares(outcome: Outcome, dimension: int, evaluations: int) -> list[float]:
+    """Return the share of our swarm after so many evaluations on each function that was run.
 
     It moves alike whatever its budget, so that its longest runs tell of shorter ones. Only the
     held-out instance counts.
     """
-    found = outcome.shares(dimension, OURS, BUDGETS[-1], instance=BESIDE_PEERS)
-    return found.get(evaluations)
+    where = dimension, OURS, BUDGETS[-1], BESIDE_PEERS
+    return [
+        shares[evaluations]
+        for run, shares in outcome.bbob.items()
+        if (run.dimension, run.algorithm, run.told, run.instance) == where and evaluations in shares
+    ]
+
+
+def reached(outcome: Outcome, dimension: int, evaluations: int) -> float | None:
+    """Return the mean of `reached_shares`; None if it was not run."""
+    found = reached_shares(outcome, dimension, evaluations)
+    return float(np.mean(found)) if found else None
 
 
 class Duel(NamedTuple):

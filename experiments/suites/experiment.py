@@ -15,7 +15,7 @@ from experiments.suites.anew import anew_table
 from experiments.suites.bbob.published import BEST, CITED
 from experiments.suites.bbob_tables import duels_table, reached, shares_table
 from experiments.suites.data import NAME, Outcome, outcome_for
-from experiments.suites.demands import demands_table, in_one_sentence
+from experiments.suites.demands import counted, demands_table, in_one_sentence
 from experiments.suites.figures import how_to_choose, runtime_profiles
 from experiments.suites.formulas import engineering, imop, lz09, zcat
 from experiments.suites.gather import kept_table
@@ -66,7 +66,7 @@ def run(context: Context) -> Result:
     return Result(
         title="The swarms on suites of others",
         command=context.command(NAME),
-        answer=in_one_sentence(outcome),
+        answer=f"{in_one_sentence(outcome)} {counted(outcome)}",
         paragraphs=(*stored_outcome(context, NAME), SETS, SETTING, PEERS_NOTE, *sources),
         tables=(
             in_short(outcome),

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from experiments.comparison.paired import SIGNIFICANT
 from experiments.comparison.ranks import average_ranks
+from experiments.comparison.rates import rate
 from experiments.comparison.rivals import RivalTest, holm_against
 from experiments.runner.result import Cell, Column, Table
 from experiments.suites.bbob.published import BEST, CITED
@@ -86,21 +88,33 @@ def feasible_runs(outcome: Outcome, suite: str, budget: int, algorithm: str) -> 
     return sum(count > 0 for count in counts), len(counts)
 
 
-def feasible_beside(outcome: Outcome, suite: str, budget: int, rival: str) -> tuple[int, int, int]:
-    """Return in how many runs ours and a rival found feasible solutions, and of how many.
+class Feasible(NamedTuple):
+    """In how many runs ours found feasible solutions, a rival did, and ours alone, of how many."""
 
-    Of the pairs of problem and seed with which both ran.
-    """
+    ours: int
+    theirs: int
+    ours_alone: int
+    runs: int
+
+    @property
+    def state(self) -> str:
+        """Whether ours is feasible as often; shown by the runs in which one of the two is alone."""
+        theirs_alone = self.theirs - (self.ours - self.ours_alone)
+        return rate(self.ours_alone, self.ours_alone + theirs_alone).state(0.5)
+
+
+def feasible_beside(outcome: Outcome, suite: str, budget: int, rival: str) -> Feasible:
+    """Count the feasible runs of the pairs of problem and seed with which ours and a rival ran."""
     place = 1 + MEASURES.index("solutions")
     pairs = [
-        (row[place], outcome.suites[problem, rival, budget, seed][place])
+        (row[place] > 0, outcome.suites[problem, rival, budget, seed][place] > 0)
         for (problem, name, spent, seed), row in outcome.suites.items()
         if (name, spent) == (OURS, budget)
         and PROBLEMS[problem].suite == suite
         and (problem, rival, budget, seed) in outcome.suites
     ]
-    ours, theirs = (sum(count > 0 for count in counts) for counts in zip(*pairs, strict=True))
-    return ours, theirs, len(pairs)
+    ours, theirs = (sum(flags) for flags in zip(*pairs, strict=True))
+    return Feasible(ours, theirs, pairs.count((True, False)), len(pairs))
 
 
 def ranks_tables(outcome: Outcome) -> list[Table]:

@@ -4,13 +4,17 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from experiments.runner.result import (
+    MISSED,
+    NOT_SHOWN,
     OF_MODELS,
+    SHOWN,
     WITHIN_PAPER,
     Column,
     Finding,
     Picture,
     Result,
     Table,
+    scored,
 )
 
 HOSTILE = "<script>alert('x')</script>"
@@ -43,6 +47,9 @@ def example() -> Result:
         Finding(False, "It fails.", check=True),
         Finding(True, "It fits itself.", within_paper=True),
         Finding(False, "It contradicts itself.", within_paper=True),
+        scored(SHOWN, "It is shown."),
+        scored(NOT_SHOWN, "It is too few."),
+        scored(MISSED, "It is missed."),
     )
     times = Table("times", "Wall times", (Column("time", "s"),), ((1.5,),), wall_times=True)
     return Result(

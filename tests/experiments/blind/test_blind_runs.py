@@ -7,7 +7,7 @@ import pytest
 from experiments.blind.cases import all_cases
 from experiments.blind.data import read_outcomes
 from experiments.blind.experiment import OUTCOMES, SECONDS
-from experiments.blind.runs import RUNS, format_runs, read_runs, run_of, total
+from experiments.blind.runs import RUNS, SINCE, format_runs, read_runs, recent, run_of, total
 from experiments.runner.committed import DATA
 
 ALL = read_runs(DATA / RUNS)
@@ -41,3 +41,10 @@ def test_runs_are_read_as_they_are_written(tmp_path):
 def test_counts_of_runs_add_up():
     counts = vars(total(ALL))
     assert all(counts[name] == sum(vars(one.counts)[name] for one in ALL) for name in counts)
+
+
+def test_figures_are_pooled_from_the_runs_of_about_this_code():
+    pooled = recent(ALL)
+    assert pooled[0].first == SINCE
+    assert pooled[-1] is ALL[-1]
+    assert recent(ALL[:3]) == [ALL[2]]

@@ -36,19 +36,21 @@ from experiments.blind.scoring import (
     verdict_scores,
 )
 from experiments.blind.stresses import stressed
-from experiments.blind.tables import _judged_table
+from experiments.blind.tables import must_reach_table
 from experiments.blind.targets import (
+    ALARM,
     ALARM_STRESSES,
+    BOTH,
+    KINDS,
+    NOT_RUN,
+    WRONG,
     demands,
-    judge_median,
-    judge_rate,
-    median,
-    rate,
 )
 from experiments.command_line import FAILED, main
 from experiments.runner import committed
 from experiments.runner.campaign import Campaign, Run
 from experiments.runner.registry import Context
+from experiments.runner.result import MISSED, NOT_SHOWN, SHOWN
 from pymoo_hdte.discrepancy.drive.analysis import DriveFinding
 from pymoo_hdte.discrepancy.drive.evidence import Data, start_parameters
 from pymoo_hdte.discrepancy.drive.features import measure
@@ -416,52 +418,19 @@ def test_numbers_of_a_case_give_its_scores():
     assert not failed.closed("leading", 1.5)
 
 
-@pytest.mark.parametrize("n", [5, 20, 200])
-def test_intervals_of_a_rate_are_exact(n):
-    none, every = rate([False] * n), rate([True] * n)
-    assert none.high == pytest.approx(1.0 - 0.025 ** (1.0 / n))
-    assert none.low == 0.0
-    assert every.low == pytest.approx(0.025 ** (1.0 / n))
-
-
-def test_the_interval_of_a_median_lies_between_order_statistics():
-    # P(at most 2 of 12 below the median) = (1 + 12 + 66) / 2^12 = 1.9 %, at most 3: 7.3 %.
-    found = median([*np.arange(12.0), None])
-    assert (found.value, found.low, found.high, found.n) == (5.5, 2.0, 9.0, 12)
-    few = median([1.0, 2.0, 3.0])
-    assert (few.low, few.high) == (-np.inf, np.inf)
-
-
-def test_a_demand_is_missed_only_where_an_exact_test_rejects_it():
-    for hits, verdict in ((20, "met"), (19, "met"), (17, "within chance"), (15, "missed")):
-        judged = judge_rate("", "", [True] * hits + [False] * (20 - hits), 0.95)
-        assert judged.verdict == verdict
-        # The tail of the binomial distribution, summed by hand.
-        tail = sum(_binomial(20, k, 0.95) for k in range(hits + 1))
-        assert judged.p_value == pytest.approx(tail)
-        assert judged.met == (tail >= 0.01)
-    above = judge_median("", "", [1.0] * 9 + [3.0], 2.0)
-    assert above.p_value == pytest.approx(11.0 / 2.0**10)
-    assert above.verdict == "within chance"
-    assert judge_median("", "", [1.0] * 20, 2.0).verdict == "missed"
-    assert judge_median("", "", [1.0] * 20, 2.0, at_least=False).verdict == "met"
-
-
-def test_a_demand_within_chance_is_neither_said_to_hold_nor_to_fail():
-    demands = [
-        judge_rate("met", "", [True] * 20, 0.95),
-        judge_rate("within", "", [True] * 18 + [False] * 2, 0.95),
-        judge_rate("missed", "", [False] * 20, 0.95),
-        judge_rate("not run", "", [], 0.95),
-    ]
-    table = _judged_table("must_reach", "Must reach", demands, "")
-    assert [row[-1] for row in table.rows] == ["met", "within chance", "missed", "not run"]
-    assert [finding.agrees for finding in table.findings] == [True, False]
-
-
-def _binomial(n, k, p):
-    ways = np.prod([(n - i) / (i + 1) for i in range(k)])
-    return ways * p**k * (1.0 - p) ** (n - k)
+def test_every_demand_that_was_run_is_found_and_three_cases_show_nothing():
+    triples = [one for one in all_cases(ROOT) if one.kind == "triple"][:3]
+    pairs = [one for one in all_cases(ROOT) if one.kind == "pair"][:12]
+    outcomes = [Outcome(one, "unlisted", ()) for one in (*triples, *pairs)]
+    judged = list(demands(outcomes))
+    verdicts = {(one.what, one.cases): one.verdict for one in judged}
+    assert verdicts[WRONG, KINDS["triple"]] == NOT_SHOWN
+    assert verdicts[BOTH, KINDS["pair"]] == MISSED
+    assert verdicts[ALARM, KINDS["none"]] == NOT_RUN
+    table = must_reach_table(outcomes)
+    ran = [one for one in judged if one.measured.n]
+    assert sorted(one.verdict for one in table.findings) == sorted(one.verdict for one in ran)
+    assert SHOWN not in verdicts.values()
 
 
 MADE_UP = all_cases(ROOT)[:16]
@@ -502,22 +471,16 @@ def test_a_campaign_outlives_a_defect_resumes_and_leaves_what_the_report_reads(
     for file in (*files, tmp_path / "blind" / RUNS):
         shutil.copy(file, tmp_path)
     monkeypatch.setattr(committed, "DATA", tmp_path)
-    monkeypatch.setattr(blind, "DATA", tmp_path)
     quick = blind.run(replace(context, full=False))
     for table, other in zip(quick.tables, first.tables, strict=True):
         assert [row[0] for row in table.rows] == [row[0] for row in other.rows]
     assert blind.run(replace(context, full=False)).tables == quick.tables
 
 
-def test_without_outcomes_the_report_says_that_nothing_has_been_run(tmp_path, monkeypatch):
-    monkeypatch.setattr(blind, "DATA", tmp_path)
-    found = blind.run(Context(1, tmp_path, Campaign(tmp_path)))
-    assert f"None of the {len(all_cases())} cases" in " ".join(found.paragraphs)
-    assert {row[-1] for row in found.tables[0].rows} == {"not run"}
-    assert not found.tables[0].findings
-    # Tables of no case would look like findings: no wrong answer among none.
-    assert len(found.tables) == 1
-    assert not found.pictures
+def test_without_its_committed_outcome_there_is_no_report(tmp_path, monkeypatch):
+    monkeypatch.setattr(committed, "DATA", tmp_path)
+    with pytest.raises(FileNotFoundError, match="blind --full"):
+        blind.run(Context(1, tmp_path, Campaign(tmp_path)))
 
 
 def test_outcomes_survive_their_csv(tmp_path):

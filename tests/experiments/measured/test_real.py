@@ -21,6 +21,7 @@ from experiments.measured.rigs import MEASURED, RIGS
 from experiments.runner.campaign import Campaign
 from experiments.runner.committed import committed_file, read_rows
 from experiments.runner.registry import Context
+from experiments.runner.result import NOT_SHOWN
 from pymoo_hdte.mechanism import BelievedValue, Input, Mechanism, Port, Record
 
 CHEAP = ("lara8_joint_3",)
@@ -63,7 +64,7 @@ def stored(part=""):
 
 def test_every_rig_is_shown_what_falls_short_first(tmp_path):
     result = real.run(Context(1, tmp_path, Campaign(tmp_path)))
-    verdicts, tools, seconds = result.tables
+    verdicts, allowances, tools, seconds = result.tables
     names = [rig.name for rig in KNOWN_RIGS]
     assert all((RIGS / f"{name}.toml").is_file() for name in names)
     assert [row[0] for row in stored()] == names
@@ -72,7 +73,13 @@ def test_every_rig_is_shown_what_falls_short_first(tmp_path):
     assert ranks == sorted(ranks)
     findings = [one for table in result.tables for one in table.findings]
     assert len(findings) == 4
-    assert [one.sentence for one in findings if not one.agrees] == []
+    assert [one.verdict for one in findings].count("Holds") == 3
+    # Eight machines are too few to show that none is judged wrongly with confidence.
+    assert findings[0].verdict == NOT_SHOWN
+    assert {row[0] for row in allowances.rows} == {rig.name for rig in KNOWN_RIGS if rig.effects}
+    allowed = {name.replace("_", " ") for rig in KNOWN_RIGS for name in rig.also}
+    printed = " ".join(str(row[2]) for row in allowances.rows)
+    assert all(name in printed for name in allowed)
     for table, least in ((tools, 4), (seconds, 1)):
         assert {row[0] for row in table.rows} == set(names)
         assert all(sum(row[0] == name for row in table.rows) >= least for name in names)
@@ -95,6 +102,17 @@ def test_shortfalls_are_told_and_what_is_right_is_counted():
     assert f"2 machines that others measured: {counted}, none confidently wrong." in (
         real._in_one_sentence(rows[1:])
     )
+
+
+def test_what_is_right_by_an_allowance_alone_is_said():
+    verdict = next(row for row in stored() if row[0] == "silverbox")
+    assert verdict[1] == RIGHT
+    (counted,) = real.shortfalls([verdict])
+    assert counted.startswith("Right: 1 of 1 whose answer is known, with")
+    assert "silverbox (force offset)" in counted
+    assert "1 right (1 of them with" in real._in_one_sentence([verdict])
+    plain = [*verdict[:3], "hardening stiffness", *verdict[4:]]
+    assert real.shortfalls([plain]) == ("Right: 1 of 1 whose answer is known.",)
 
 
 def examined(name, **options):

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from experiments.robust.data import (
+    SEEDS,
     STOP_NUMBERS,
     Outcome,
     ahead,
@@ -23,10 +24,11 @@ from experiments.robust.rivals import (
     terms_up_to,
     until_it_stays,
 )
-from experiments.robust.tables import stops_table
+from experiments.robust.tables import needed_table, stops_table
 from experiments.robust.task import Task
 from experiments.runner.campaign import Campaign
 from experiments.runner.registry import Context
+from experiments.runner.result import MISSED, NOT_SHOWN, SHOWN
 from pymoo_hdte.problems import robust_problem
 
 
@@ -100,15 +102,44 @@ def test_a_watched_growth_stops_where_the_problem_of_the_same_seed_does():
     assert growth.stop.n_runs == alone.n_runs
 
 
-def test_a_band_that_was_not_looked_at_on_all_functions_is_not_said_to_hold():
-    numbers = dict.fromkeys(STOP_NUMBERS, 1.0)
-    every = {(one.name, 1): numbers for one in FUNCTIONS}
-    some = dict(list(every.items())[1:])
+def stops_of(functions, **changed):
+    numbers = dict.fromkeys(STOP_NUMBERS, 1.0) | changed
+    return {(one.name, seed): numbers for one in functions for seed in SEEDS}
+
+
+def band(stops):
     curves = {(one.name, OURS, OURS): [(39, 0.001, 0.001)] for one in FUNCTIONS}
-    for stops, holds in ((every, True), (some, False)):
-        (finding,) = stops_table(Outcome(curves, stops)).findings
-        assert finding.agrees is holds
-    assert FUNCTIONS[0].name in finding.sentence
+    (finding,) = stops_table(Outcome(curves, stops)).findings
+    return finding
+
+
+def test_a_band_that_was_not_looked_at_on_all_functions_is_not_shown_to_cover():
+    assert band(stops_of(FUNCTIONS)).verdict == SHOWN
+    some = band(stops_of(FUNCTIONS[1:]))
+    assert some.verdict == NOT_SHOWN
+    assert FUNCTIONS[0].name in some.sentence
+
+
+def test_a_refused_growth_covers_nothing():
+    answered, refused = stops_of(FUNCTIONS[1:]), stops_of(FUNCTIONS[:1], runs=np.nan)
+    said = band(answered | refused).sentence
+    count = len(answered)
+    assert f"{count} of {count} surrogate builds" in said
+    assert f"{len(SEEDS)} refused ({FUNCTIONS[0].name})" in said
+    # What a refused growth has covered, had it been asked, changes nothing.
+    worse = stops_of(FUNCTIONS[:1], runs=np.nan, covered_mean=0.1)
+    assert band(answered | worse).sentence == said
+    answered[FUNCTIONS[-1].name, SEEDS[0]] = dict.fromkeys(STOP_NUMBERS, 0.9)
+    short = band(answered | refused)
+    assert short.verdict == MISSED
+    assert f"{count - 1} of {count} surrogate builds" in short.sentence
+    assert band(refused).verdict == NOT_SHOWN
+
+
+def test_eight_of_ten_functions_are_too_few_to_show_eight_in_ten():
+    table = needed_table(outcome_for(Context(1, None, None)))
+    (finding,) = table.findings
+    assert finding.verdict == NOT_SHOWN
 
 
 def test_the_stored_outcome_gives_the_report(tmp_path):
