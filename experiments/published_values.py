@@ -10,6 +10,19 @@ from typing import NamedTuple
 PAPER = "Hu et al., Machines 2026, 14(9), 1000"
 
 
+DESIGN_BOX = 0.25
+"""Share of the nominal values by which the search of Section 5.1 may leave them."""
+
+MODEL_SECONDS, SURROGATE_SECONDS = 0.147, 3e-6
+"""Section 3, for one evaluation."""
+BATCH_SIZE, BATCH_MODEL_SECONDS, BATCH_SURROGATE_SECONDS = 1000, 128.83, 0.0030
+"""Section 3, for a Monte Carlo analysis of so many evaluations."""
+SPEED_UPS = (49_000, 42_943)
+"""Section 3: ratios of the times of one evaluation, and of those of the analysis."""
+MONTE_CARLO, POPULATION, GENERATIONS = 1000, 100, 100
+"""Section 5.1: evaluations of the surrogate for a design, designs, and generations of a run."""
+
+
 class SurrogateAccuracy(NamedTuple):
     """One row of Table 5: errors of the surrogate of one order on 500 test points."""
 
