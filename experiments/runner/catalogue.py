@@ -34,6 +34,12 @@ EXPERIMENTS = (
         "How accurate is the Chebyshev surrogate, and is order 3 the best?",
     ),
     Experiment(
+        "cost",
+        "studies.cost",
+        "What a run of the model, of an integrator and of the surrogate costs, as ratios",
+        "Is the surrogate needed, and how many times faster is it?",
+    ),
+    Experiment(
         "table8",
         "paper.table8",
         "Tables 8 and 9, Fig. 19: the designs that three preferences choose",

@@ -17,7 +17,7 @@ def machine_table() -> Table:
     """Return processor, cores, memory, system and versions."""
     versions = environment()
     rows = [
-        ("processor", _processor()),
+        ("processor", processor()),
         ("cores this process may use", str(usable_cores())),
         ("memory", f"{os.sysconf('SC_PAGE_SIZE') * os.sysconf('SC_PHYS_PAGES') / 2**30:.1f} GiB"),
         ("system", f"{platform.system()} {platform.release()}"),
@@ -30,7 +30,8 @@ def machine_table() -> Table:
     )
 
 
-def _processor() -> str:
+def processor() -> str:
+    """Return the name of the processor, as the system gives it."""
     facts = Path("/proc/cpuinfo")
     if facts.is_file():
         for line in facts.read_text(encoding="utf-8").splitlines():

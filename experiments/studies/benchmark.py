@@ -22,7 +22,7 @@ from experiments.runner.result import Column, Finding, Result, Table
 from experiments.studies.benchmark_parts import ratios_of_parts
 from experiments.studies.benchmark_verdicts import verdict_times
 from experiments.studies.benchmark_workers import ratios_of_workers, virtual_table
-from experiments.studies.timing import Ratio, best_time, ratio_table
+from experiments.studies.timing import Ratio, best_time, integration_time, ratio_table
 from pymoo_hdte.algorithms import AMPMOPSO, CompactSwarm, ElitistSwarm
 from pymoo_hdte.drive import (
     PARAMETERS,
@@ -115,11 +115,11 @@ def _steady_state() -> Iterator[Ratio]:
         nodes = _random_designs(model, N_NODES)
         steady = best_time(lambda m=model, n=nodes: m.dte_arcsec(n), REPEATS)  # type: ignore[misc]
         by_method = {
-            method: _integration_time(model, nodes[:1], method)
+            method: integration_time(model, nodes[:1], method)
             for method in tqdm(METHODS, desc=f"integrators, {name}", leave=False)
         }
         best = min(by_method, key=by_method.__getitem__)
-        scaled = _integration_time(model, nodes[:N_TIMED], best) * N_NODES / N_TIMED
+        scaled = integration_time(model, nodes[:N_TIMED], best) * N_NODES / N_TIMED
         yield Ratio(
             f"{N_NODES} nodes of {name}",
             f"{best}, rtol 1e-8, {N_TIMED} nodes scaled",
@@ -129,13 +129,6 @@ def _steady_state() -> Iterator[Ratio]:
             "at least 1000, fast side below 1 s",
             scaled >= 1000.0 * steady and steady < 1.0,
         )
-
-
-def _integration_time(model: DriveModel, designs: NDArray[np.float64], method: str) -> float:
-    begin = time.perf_counter()
-    for design in designs:
-        simulate_drive(model, design, method=method)
-    return time.perf_counter() - begin
 
 
 def _algorithms() -> Iterator[Ratio]:

@@ -34,7 +34,7 @@ AGREEMENT = 1e-8
 SETTING = (
     "chaospy builds its distributions, quadrature rules and orthogonal polynomials by other means "
     "than we do, so that agreement to rounding checks both. The second half spends model runs on "
-    f"surrogates of several kinds and tests all at the {N_TEST} points of Table 5. 'Idle "
+    f"surrogates of several kinds and tests all on one hypercube of {N_TEST} points. 'Idle "
     "parameters held' looks for parameters without influence on a grid of two nodes each, whose 32 "
     "runs are counted, and gives those a single node."
 )

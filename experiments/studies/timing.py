@@ -6,7 +6,11 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+from numpy.typing import NDArray
+
 from experiments.runner.result import Column, Finding, Table
+from pymoo_hdte.drive import DriveModel, simulate_drive
 
 
 @dataclass(frozen=True)
@@ -35,6 +39,14 @@ def best_time(function: Callable[[], object], repeats: int) -> float:
         function()
         times.append(time.perf_counter() - begin)
     return min(times)
+
+
+def integration_time(model: DriveModel, designs: NDArray[np.float64], method: str) -> float:
+    """Return the wall time in seconds of integrating designs, shape (n, 5), one after the other."""
+    begin = time.perf_counter()
+    for design in designs:
+        simulate_drive(model, design, method=method)
+    return time.perf_counter() - begin
 
 
 def ratio_table(ratios: Sequence[Ratio]) -> Table:

@@ -83,6 +83,9 @@ class RobustDTE(StoredFront, RobustProblem):
     They are stored for every preset under the other defaults, and for the members of
     `robust_dte_family`; with any other setting both return None.
 
+    A design is refused outside the box, but for what rounding to print explains: the paper's
+    accuracy-first optimum, printed as K = 3.229e4, is evaluated at the bound of 32287.5.
+
     In a real drive K and B_fc cannot be chosen independently: wall thickness and preload move both.
 
     Examples

@@ -56,6 +56,6 @@ def test_every_problem_takes_its_ends_as_printed(make):
 
 
 def test_what_lies_farther_outside_is_refused_with_its_value(problem):
-    design = np.add(problem.xu, [10.0, 0.0, 0.0, 0.0])
+    design = problem.xu + np.array([10.0, 0.0, 0.0, 0.0])
     with pytest.raises(ExtrapolationError, match=r"K is 32297\.5, allowed: 19372\.5 to 32287\.5"):
         problem.evaluate(design)
