@@ -95,6 +95,19 @@ def readings_findings(ranked: Sequence[Reading]) -> Iterator[Finding]:
     )
 
 
+def closest_sentence(ranked: Sequence[Reading]) -> str:
+    """Say which setting comes closest to the six printed numbers, and how close the stated does."""
+    best, place = ranked[0], stated_place(ranked)
+    against = (
+        "" if place is None else f", against {significant(ranked[place].factor, 2)} at 100 x 100"
+    )
+    return (
+        f"The printed numbers come closest with {best.population} particles after "
+        f"{best.evaluations:,} evaluations (off by a factor of {significant(best.factor, 2)}"
+        f"{against})."
+    )
+
+
 def number_of_designs(scores: Scores, ranked: Sequence[Reading]) -> str:
     """Say what the number of designs counted does to the lead in the closest reading."""
     best = ranked[0]
@@ -130,21 +143,17 @@ def _setting(one: Reading) -> str:
 
 def opening(scores: Scores, found: Contests, ranked: Sequence[Reading]) -> str:
     """Return the first sentences of the report, about the stated setting where it was run."""
-    entries, place = found.get(Contest(SPOKEN_OF, "igd"), []), stated_place(ranked)
-    at_stated = _of_stated(entries)
-    if not at_stated or place is None:
+    at_stated = _of_stated(found.get(Contest(SPOKEN_OF, "igd"), []))
+    if not at_stated:
         return f"O{leads_sentence(scores)[1:]}."
     igd, spacing = (
         settings_ahead(found[Contest(SPOKEN_OF, indicator)]) or "nowhere"
         for indicator in ("igd", "spacing")
     )
-    best, stated = ranked[0], ranked[place]
     return (
         f"Of the paper's Table 7, {OURS}'s advantage over both MOPSO and NSGA-II holds, on "
         f"{SPOKEN_OF.model}, in IGD {igd}, and in Spacing {spacing}. At the stated 100 x 100 "
-        f"evaluations {_at_stated(scores, standing(at_stated))} The printed numbers come closest "
-        f"with {best.population} particles after {best.evaluations:,} evaluations (off by a factor "
-        f"of {significant(best.factor, 2)}, against {significant(stated.factor, 2)} at 100 x 100)."
+        f"evaluations {_at_stated(scores, standing(at_stated))} {closest_sentence(ranked)}"
     )
 
 

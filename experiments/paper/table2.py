@@ -102,7 +102,7 @@ def run(context: Context) -> Result:
             component_picture(drawn),
             total_picture(drawn),
         ),
-        first_page={WITHIN_PAPER: _of_the_first_page()},
+        first_page={WITHIN_PAPER: of_the_first_page()},
         notes=tuple(f"In the campaign with planted faults: {line}" for line in spoilt.advice()),
     )
 
@@ -156,7 +156,8 @@ def _statistics_table(found: ErrorStatistics) -> Table:
     return Table("errors", title, tuple(columns), tuple(rows), findings=findings)
 
 
-def _of_the_first_page() -> str:
+def of_the_first_page() -> str:
+    """Say how many values the printed tests belong to, and what the outlier rule removes."""
     low, high = common_sizes()
     return (
         f"W and p of all errors in Table 2 belong to {low} to {high} values, where "

@@ -170,6 +170,14 @@ def _trials(name: str, interval: str, box: Box, progress: tqdm) -> Iterator[Tria
         yield Trial(name, interval, order, values, np.array(actual))
 
 
+def rmse_over_hypercubes(name: str, order: int) -> tuple[float, float]:
+    """Return mean and std in arcsec of a surrogate's RMSE over the test hypercubes of a model."""
+    box = robust_problem(name).surrogate.box
+    trials = _trials(name, SCATTER, box, tqdm(disable=True))
+    (rmse,) = (trial.spread("rmse") for trial in trials if trial.order == order)
+    return float(rmse.mean()), float(rmse.std(ddof=1))
+
+
 def _table(name: str, trials: Sequence[Trial], findings: tuple[Finding, ...]) -> Table:
     rows = [tuple(_cells(trial, *measure)) for trial in trials for measure in MEASURES]
     columns = (

@@ -73,11 +73,11 @@ def run(context: Context) -> Result:
     return Result(
         title="Cost: the drive model, an integrator and the surrogate",
         command="python -m experiments cost",
-        answer=f"{_verdict(quick)}. {_on_the_integrator()}",
+        answer=f"{verdict(quick=quick)}. {_on_the_integrator()}",
         paragraphs=(SETTING,),
         models=models_of(*PRESETS),
         tables=(_printed_table(), _times_table(measured, _direct_seconds()), machine_table()),
-        first_page={OF_MODELS: _lowered(_verdict(quick))},
+        first_page={OF_MODELS: _lowered(verdict(quick=quick))},
     )
 
 
@@ -110,7 +110,8 @@ def _direct_seconds() -> float:
     return best_time(lambda: problem.evaluate(designs), 1) / DIRECT_DESIGNS
 
 
-def _verdict(quick: bool) -> str:
+def verdict(*, quick: bool) -> str:
+    """Say whether the drive model itself is quick enough to need no surrogate; no full stop."""
     if not quick:
         return (
             f"{BATCH_SIZE:,} DTEs of the drive model itself take {LITTLE:g} s or more on this "

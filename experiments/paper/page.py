@@ -1,0 +1,151 @@
+"""The page on the paper's numbers, ``docs/paper.md``, from stored outcomes and quick computations.
+
+``python -m experiments.paper.page`` writes it anew; a test holds the file against `page`, so that
+no number on it can differ from what the experiments say.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+from experiments.anytime.data import OF_TABLE_7, Case, Contested, Scores, committed_scores
+from experiments.anytime.leads import RIVALS, cells_in_order, leads
+from experiments.anytime.measures import RETURNED
+from experiments.anytime.moments import COMMON, EXACT
+from experiments.anytime.readings import readings
+from experiments.anytime.sentences import closest_sentence
+from experiments.anytime.tables import SCALE, STATED, exactly
+from experiments.comparison.runs import AS_PRINTED, VELOCITIES
+from experiments.paper import later_prototypes, printed_times, published, table2, table5
+from experiments.paper.calibrating import experiment as calibration
+from experiments.paper.calibrating.data import best_rungs, read_outcomes
+from experiments.paper.design_tables import dominated
+from experiments.paper.inference import experiment as inference
+from experiments.paper.inference.data import read_fits
+from experiments.paper.prototypes import ranking
+from experiments.published_values import TABLE_5, TABLE_7, TABLE_8, TABLE_9, Moments
+from experiments.runner.committed import committed_file
+from experiments.runner.result import WITHIN_PAPER, significant
+from experiments.runner.store import write_atomically
+from experiments.studies import cost
+from pymoo_hdte.decision import PREFERENCES, WeightedUtopia
+from pymoo_hdte.problems import RobustDTE
+
+PAGE = Path(__file__).parents[2] / "docs" / "paper.md"
+MODEL = "calibrated"
+ORDER = 3
+"""Order of the surrogate that the paper chose."""
+
+
+def page() -> str:
+    """Return the text of the page."""
+    environment = Environment(
+        loader=FileSystemLoader(Path(__file__).parents[1] / "templates"),
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+        autoescape=False,
+    )
+    return environment.get_template("paper.md").render(values())
+
+
+def values() -> dict[str, Any]:
+    """Return what the template shows, each number with the digits that it is printed with."""
+    scores, problem = committed_scores(), RobustDTE()
+    front = problem.pareto_front()
+    best = front[WeightedUtopia(PREFERENCES["balanced"]).do(front)]
+    printed = published.printed_equations()
+    igd, spacing = (_stated(scores, EXACT, name) for name in ("igd", "spacing"))
+    return {
+        "paper": {
+            "initial": _moments(TABLE_8["initial"]),
+            "balanced": _moments(TABLE_8["balanced"]),
+            "rmse": TABLE_5[ORDER].rmse_arcsec,
+            "igd": _list(row.igd for row in TABLE_7.values()),
+            "spacing": _list(row.spacing for row in TABLE_7.values()),
+            "factors": _factors(),
+        },
+        "initial": _moments(problem.evaluate(problem.nominal)),
+        "balanced": _moments(problem.evaluate(np.array(TABLE_9["balanced"]))),
+        "best_balanced": _moments(best),
+        "printed": {
+            reading: _moments((moments.mean, moments.std)) for reading, moments in printed.items()
+        },
+        "rmse": "{:.2f} ± {:.2f}".format(*table5.rmse_over_hypercubes(MODEL, ORDER)),
+        "igd": _list(igd),
+        "spacing": _list(spacing),
+        "igd_common": _list(_stated(scores, COMMON, "igd")),
+        "stated_spread": f"{significant(100.0 * (max(igd) / min(igd) - 1.0), 2)} %",
+        "rivals": RIVALS,
+        "laws": [_law(scores, law) for law in VELOCITIES],
+        "n_seeds": len(scores.values[_case(Contested(MODEL, EXACT, AS_PRINTED), OF_TABLE_7[0])]),
+        "closest": closest_sentence(readings(scores)),
+        "contradictions": [_sentence(part) for part in _within_paper()],
+        "models": [_sentence(part) for part in _of_models()],
+    }
+
+
+def _within_paper() -> Iterator[str]:
+    for parts in (
+        ranking.of_the_first_page(),
+        {WITHIN_PAPER: table2.of_the_first_page()},
+        later_prototypes.of_the_first_page(),
+        printed_times.of_the_first_page(),
+    ):
+        yield from parts.values()
+
+
+def _of_models() -> Iterator[str]:
+    yield published.of_the_first_page(published.printed_equations())
+    outcomes = read_outcomes(committed_file(calibration.OUTCOMES, "calibration"))
+    yield calibration.of_the_first_page(best_rungs(outcomes, "table8")[0])
+    yield inference.of_the_first_page(read_fits(committed_file(inference.FITS, inference.NAME)))
+    yield dominated(MODEL)
+    yield cost.verdict(quick=True)
+
+
+def _law(scores: Scores, law: str) -> dict[str, Any]:
+    """Return in how many cells AMP-MOPSO leads under a law of velocities, over all models."""
+    contested = [one for one in exactly(scores) if one.velocity == law]
+    kept, cells = np.sum([cells_in_order(scores, one) for one in contested], axis=0)
+    ahead = np.sum([[lead.ahead for lead in leads(scores, one)] for one in contested], axis=0)
+    return {"name": law, "ahead": ahead.tolist(), "kept": int(kept), "cells": int(cells)}
+
+
+def _stated(scores: Scores, moments: str, indicator: str) -> list[float]:
+    contested = Contested(MODEL, moments, AS_PRINTED)
+    return [
+        float(scores.of(_case(contested, name), f"{indicator}_{SCALE.suffix}").mean())
+        for name in OF_TABLE_7
+    ]
+
+
+def _case(contested: Contested, algorithm: str) -> Case:
+    return Case(*contested, RETURNED, *STATED, algorithm)
+
+
+def _factors() -> str:
+    others = [row.igd / TABLE_7["AMP-MOPSO"].igd for row in TABLE_7.values()][:-1]
+    return " and ".join(significant(factor, 2) for factor in sorted(others))
+
+
+def _moments(pair: Moments | Any) -> str:
+    return "{:.2f}, {:.2f}".format(*pair)
+
+
+def _list(numbers: Any) -> str:
+    return ", ".join(f"{number:.4f}" for number in numbers)
+
+
+def _sentence(part: str) -> str:
+    return f"{part[0].upper()}{part[1:]}."
+
+
+if __name__ == "__main__":
+    write_atomically(PAGE, page().encode())
