@@ -112,10 +112,13 @@ def gain() -> float:
 
 def fit_rigid(bands: str) -> RigidDrive:
     """Return the rigid drive that meets the nine numbers best under this reading of the bands."""
-    found = least_squares(
-        lambda values: _residuals(RigidDrive(*values, bands)), START, x_scale=START
-    )
-    return RigidDrive(*map(float, found.x), bands)
+
+    def drive(values: NDArray[np.float64]) -> RigidDrive:
+        share, std = map(float, values)
+        return RigidDrive(share, std, bands)
+
+    found = least_squares(lambda values: _residuals(drive(values)), START, x_scale=START)
+    return drive(found.x)
 
 
 def simplest() -> RigidDrive:

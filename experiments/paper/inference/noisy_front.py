@@ -58,8 +58,10 @@ def noisy_choice(
         [found.means + noise @ found.of_means.T, found.stds + noise @ found.of_stds.T], axis=-1
     )
     features = np.array([_features(values, designs[:, 0]) for values in objectives])
-    published = [*FRONT_WIDTHS, *(TABLE_9[name][0] / nominal[0] for name in PREFERENCES)]
-    return NoisyChoice(np.percentile(features, RANGE, axis=0).T, np.array(published))
+    # Rounded to four digits, one of the printed values lies outside the box.
+    stiffness = [min(TABLE_9[name][0] / nominal[0], 1.0 + BOX) for name in PREFERENCES]
+    published = np.array([*FRONT_WIDTHS, *stiffness])
+    return NoisyChoice(np.percentile(features, RANGE, axis=0).T, published)
 
 
 def _features(

@@ -124,6 +124,14 @@ def uncertainty_of_steps(
     return np.asarray(np.sqrt(variance - (2.0 * READING**2 if sampling_alone else 0.0)))
 
 
+def noise_that_excuses(found: Evaluation) -> NDArray[np.float64]:
+    """Return the least node noise with which each step misses by `WITHIN` at most, arcsec, (4,)."""
+    misses = steps_of(found.predicted) - steps_of(OBSERVED)
+    without, unit = (uncertainty_of_steps(found, node_noise=size) ** 2 for size in (0.0, 1.0))
+    lacking = (misses / WITHIN) ** 2 - without
+    return np.asarray(np.sqrt(np.maximum(lacking, 0.0) / (unit - without)))
+
+
 def gives_trade_off(fit: Fit) -> bool:
     """Whether all four steps and the nine numbers are met."""
     found = fit.evaluation

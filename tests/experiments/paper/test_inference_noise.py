@@ -21,7 +21,12 @@ from experiments.paper.inference.node_noise import (
 )
 from experiments.paper.inference.noisy_front import noisy_choice
 from experiments.paper.inference.rungs import RIGID, Rung, all_rungs, noisy_rungs
-from experiments.paper.inference.verdicts import step_errors, uncertainty_of_steps
+from experiments.paper.inference.verdicts import (
+    WITHIN,
+    noise_that_excuses,
+    step_errors,
+    uncertainty_of_steps,
+)
 from experiments.published_values import TABLE_5, TABLE_9
 from experiments.runner.committed import committed_file
 from pymoo_hdte.drive import preset
@@ -98,6 +103,9 @@ def test_noise_of_an_arcsec_moves_the_reversed_step_by_a_quarter_of_one():
     assert (mean, std) == pytest.approx((0.30, 0.20), abs=0.03)
     assert np.abs(step_errors(found, node_noise=1.0)[[1, 3]]) == pytest.approx([1.6, 0.8], abs=0.1)
     assert np.abs(step_errors(found)[[1, 3]]).min() > 3.0
+    for place, needed in enumerate(noise_that_excuses(found)):
+        misses = abs(step_errors(found, node_noise=needed)[place])
+        assert misses == pytest.approx(WITHIN) if needed > 0.0 else misses <= WITHIN
 
 
 @pytest.mark.parametrize("bands", [NARROW, WIDE])

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from experiments.paper.calibrating.ladder import WIDE, Candidate
 from experiments.paper.inference import experiment, posterior
 from experiments.paper.inference.data import (
     fits_of,
@@ -13,13 +14,17 @@ from experiments.paper.inference.data import (
 )
 from experiments.paper.inference.experiment import DRAWN, FITS, FULL, NAME, PROFILED, searches
 from experiments.paper.inference.likelihood import OBSERVED
-from experiments.paper.inference.rungs import Rung, all_rungs
+from experiments.paper.inference.node_noise import LARGEST
+from experiments.paper.inference.rungs import RIGID, Rung, all_rungs, noisy_rungs
 from experiments.paper.inference.search import Effort, Search
 from experiments.paper.inference.verdicts import (
     chosen_fits,
     gives_trade_off,
+    rigid,
     steps_of,
     undominated,
+    with_noise,
+    without_noise,
 )
 from experiments.runner.campaign import Campaign
 from experiments.runner.committed import committed_file
@@ -46,6 +51,32 @@ def test_stored_fits_are_as_likely_as_they_say(fits):
         assert one.evaluation.deviance(one.target) == pytest.approx(one.deviance, abs=0.05)
 
 
+@pytest.mark.parametrize("target", ["common", "noise"])
+@pytest.mark.parametrize("bands", ["R1", "R2"])
+def test_a_stored_search_of_the_rigid_drive_runs_again(fits, target, bands):
+    (job,) = (
+        job
+        for job in searches()
+        if (job.target, job.rung.name) == (target, f"nothing_semi_{bands}__torsion")
+    )
+    (stored,) = (one for one in fits if (one.target, one.rung) == (target, job.rung))
+    (again,) = fits_of([job], [job.execute()])
+    assert again.deviance == pytest.approx(stored.deviance, abs=0.01)
+    assert again.parameters == pytest.approx(stored.parameters, rel=1e-2)
+    assert again.node_noise == pytest.approx(stored.node_noise, abs=0.01)
+
+
+def test_stored_fits_with_noise_are_as_likely_as_they_say(fits):
+    noisy = with_noise(fits)
+    assert {one.rung for one in noisy} == set(noisy_rungs())
+    for one in (noisy[0], noisy[-1], rigid(noisy)):
+        assert one.evaluation.deviance("noise") == pytest.approx(one.deviance, abs=0.05)
+        assert 0.0 <= one.node_noise <= LARGEST
+        (quiet,) = (f for f in fits if (f.target, f.rung) == ("common", one.rung))
+        # The size of the noise is one parameter more, which may be 0.
+        assert one.n_parameters == quiet.n_parameters + 1
+
+
 def test_steps_of_the_paper_are_those_of_table_8():
     assert steps_of(OBSERVED) == pytest.approx([0.484, 0.468, -0.460, -0.136])
 
@@ -53,17 +84,21 @@ def test_steps_of_the_paper_are_those_of_table_8():
 def test_the_report_says_what_the_fits_say(tmp_path, fits):
     result = experiment.run(Context(1, tmp_path, Campaign(tmp_path)))
     meeting = [one for one in fits if one.target == "common" and gives_trade_off(one)]
-    both = [one for one in fits if gives_trade_off(one) and undominated(one)]
+    quiet, noisy = without_noise(fits), with_noise(fits)
+    both = [one for one in quiet if gives_trade_off(one) and undominated(one)]
     searched = sum(one.target == "common" for one in fits)
     assert f"of {searched} drive models" in result.answer
     assert f"{len(meeting)} give" in result.answer
+    given = sum(map(gives_trade_off, noisy))
+    assert f"{given} of {len(noisy)} models give" in result.answer
+    assert f"{given} of {len(noisy)} give" in result.first_page[OF_MODELS]
     # A model that is fitted to two targets is one model.
     assert len({one.rung for one in fits}) == searched
     assert f"of {searched} fitted drive models" in result.first_page[OF_MODELS]
     assert (not both) == (f"None of {searched} drive models gives both" in result.answer)
     least = min(meeting, key=lambda one: one.bic)
     assert f"by {significant(least.evaluation.depths.max(), 2)} widths" in result.answer
-    ladder = result.tables[1]
+    ladder = result.tables[2]
     assert len(ladder.rows) == searched
     heights = [row[6] for row in ladder.rows]
     assert heights == sorted(heights)
@@ -100,7 +135,9 @@ def test_the_full_campaign_leaves_what_the_report_reads(tmp_path, monkeypatch):
     for name in ("LARGE", "FRONT", "MIDDLE", "SMALL"):
         monkeypatch.setattr(experiment, name, tiny)
     closed = [Rung(rung.candidate, ("torsion",)) for rung in FULL.values()]
-    monkeypatch.setattr(experiment, "all_rungs", lambda: [*FULL.values(), *closed])
+    plain = Rung(Candidate((), "semi_amplitude", WIDE), RIGID)
+    monkeypatch.setattr(experiment, "all_rungs", lambda: [*FULL.values(), *closed, plain])
+    monkeypatch.setattr(experiment, "noisy_rungs", lambda: [plain])
     monkeypatch.setattr(experiment, "STEPS", 2)
     monkeypatch.setattr(posterior, "DRAWS", 4)
     monkeypatch.setattr(posterior, "PROFILE_STEPS", 1)
