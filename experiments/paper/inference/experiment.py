@@ -1,7 +1,7 @@
 """Whether any model gives the published trade-off, and what the numbers say of its parameters.
 
 Without ``--full`` the report is made from ``experiments/data/inference*.csv``, the committed
-outcome of the last full campaign; with it the campaign runs (some twenty minutes of one core, with
+outcome of the last full campaign; with it the campaign runs (some half hour of one core, with
 the extra ``posterior``), goes on where it was interrupted, and leaves the files in the results
 folder.
 """
@@ -129,14 +129,21 @@ def run(context: Context) -> Result:
 
 
 def searches() -> list[Search]:
-    """Return all searches, in the order in which they are reported."""
+    """Return all searches without node noise, in the order in which they are reported."""
     rungs = all_rungs()
     found = [Search(FULL[NARROW], "independent", SEED, LARGE)]
     for rung in rungs:
         found.append(Search(rung, "common", SEED, effort_for(rung)))
     closed = [Rung(rung.candidate, tuple(CLOSURES)) for rung in FULL.values()]
-    found += [Search(rung, "front", SEED, FRONT) for rung in (*FULL.values(), *closed)]
-    return [*found, *(Search(rung, "noise", SEED, noisy_effort(rung)) for rung in noisy_rungs())]
+    return [*found, *(Search(rung, "front", SEED, FRONT) for rung in (*FULL.values(), *closed))]
+
+
+def noisy_searches(best: dict[tuple[str, Rung], tuple[float, ...]]) -> list[Search]:
+    """Return the searches with node noise; each also goes on from the best place without it."""
+    return [
+        Search(rung, "noise", SEED, noisy_effort(rung), best["common", rung])
+        for rung in noisy_rungs()
+    ]
 
 
 def effort_for(rung: Rung) -> Effort:
@@ -167,6 +174,8 @@ def _campaign(context: Context) -> tuple[list[Fit], list[Draws], list[Profiled]]
         (job.target, job.rung): tuple(run.values[0, 1:].tolist())
         for job, run in zip(jobs, runs, strict=True)
     }
+    noisy = noisy_searches(best)
+    jobs, runs = [*jobs, *noisy], [*runs, *context.campaign.run(noisy, "with node noise")]
     wanted = [("independent", FULL[NARROW]), ("common", FULL[WIDE])]
     posteriors = [Posterior(rung, target, best[target, rung], SEED, STEPS)
                   for target, rung in wanted]  # fmt: skip

@@ -337,7 +337,8 @@ def noise_table(fits: Sequence[Fit]) -> Table:
         findings=tuple(_noise_findings(noisy)),
         note="The noise is counted among the parameters. Ranges of the front hold 95 % of what "
         f"noise of that size gives; the published one is {low:.3f} by {high:.3f} arcsec. Optima: "
-        "whether both widths and the K of the three chosen designs lie within such ranges.",
+        "whether both widths and the K of the three chosen designs lie within such ranges. "
+        f"{len(above_a_special_case(noisy))} of the searches ended above a special case.",
     )
 
 

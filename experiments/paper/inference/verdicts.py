@@ -144,10 +144,10 @@ def gives_trade_off(fit: Fit) -> bool:
 def undominated(fit: Fit) -> bool:
     """Whether no design of the box dominates a published optimum.
 
-    Where the nodes carry noise, a front of the model itself says little: whether the published
-    front and stiffnesses lie within the spread of what would be chosen (`choice_of`).
+    Where the nodes carry noise, the front of the model itself says little: then, whether the
+    published front and stiffnesses lie within the spread of what would be chosen (`choice_of`).
     """
-    if fit.target == "noise":
+    if fit.node_noise > READING:
         return choice_of(fit).holds_the_published
     return bool(fit.evaluation.depths.max() <= DEPTH_TOLERANCE)
 
