@@ -178,6 +178,18 @@ def test_the_committed_ladder_is_what_its_parameters_predict():
         assert np.sum(residuals(searched) ** 2) == pytest.approx(one.chi_square, rel=1e-2)
 
 
+@pytest.mark.nightly
+def test_a_stored_fit_runs_again():
+    rung = Candidate((), "semi_amplitude", NARROW)
+    run = Fit(rung, "table5", 1, calibration.BUDGETS["table5"]).execute()
+    stored = [
+        one.chi_square
+        for one in read_outcomes(committed_file(OUTCOMES, "calibration"))
+        if (one.kind, one.direction, one.candidate, one.seed) == ("fit", "table5", rung, 1)
+    ]
+    assert run.values[:, 0] == pytest.approx(stored, rel=1e-4)
+
+
 def test_the_report_is_made_from_the_committed_ladder(tmp_path):
     result = calibration.run(Context(1, tmp_path, Campaign(tmp_path)))
     numbers = result.tables[0]
