@@ -12,7 +12,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache, reduce
-from math import prod
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,12 +26,13 @@ from experiments.paper.inference.moments import (
     place,
     uniform_rule,
 )
-from experiments.paper.inference.rungs import COLUMNS
 from experiments.paper.quadrature import Rule
 from experiments.published_values import TABLE_5, TABLE_9
 from pymoo_hdte.drive import PARAMETERS
 from pymoo_hdte.surrogate.tensor import chebyshev_basis, chebyshev_nodes, coefficients_from_nodes
 
+Averages = tuple[NDArray[np.float64], NDArray[np.float64]]
+"""Of one axis at n designs, see `cardinal_averages`: (n, 4) and (n, 4, 4)."""
 SIZE = ORDER + 1
 """Nodes on each of the five axes."""
 ROLLING = PARAMETERS.index("B_in")
@@ -85,9 +85,6 @@ def cardinal_averages(points: NDArray[np.float64], weights: NDArray[np.float64])
     values = np.moveaxis(chebyshev_basis(points, SIZE), 0, -1) @ _cardinal()
     first = np.einsum("q,...qj->...j", weights, values)
     return first, np.einsum("q,...qi,...qj->...ij", weights, values, values)
-
-
-Averages = tuple[NDArray[np.float64], NDArray[np.float64]]
 
 
 @cache
@@ -200,7 +197,3 @@ def _box_axes(surrogate: TensorSurrogate, bands: str) -> list[Averages]:
     points = tested.centre[:, None] + tested.half_width[:, None] * nodes
     centred = (points - box.centre[:, None]) / box.half_width[:, None]
     return [cardinal_averages(row[None], weights) for row in centred]
-
-
-assert prod((SIZE,) * len(PARAMETERS)) == 1024
-assert [PARAMETERS.index("theta_s"), *COLUMNS[1:]] == COLUMNS
