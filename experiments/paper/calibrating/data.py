@@ -32,6 +32,14 @@ class Outcome:
     predictions: dict[str, float]
     traits: dict[str, float]
 
+    @property
+    def n_parameters(self) -> int:
+        """How many are open; the shape of theta_s is none where no effect is added.
+
+        The printed equations follow theta_s like a rigid drive, whatever its shape.
+        """
+        return len(self.parameters) if self.candidate.effects else 1
+
     def gap(self, names: Sequence[str]) -> float:
         """Return the root mean square relative gap to the published numbers, in percent."""
         return gap(self.predictions, names)
@@ -41,6 +49,16 @@ def gap(predictions: dict[str, float], names: Sequence[str]) -> float:
     """Return the root mean square relative gap of predictions to `PUBLISHED`, in percent."""
     relative = [predictions[name] / PUBLISHED[name] - 1.0 for name in names]
     return 100.0 * float(np.sqrt(np.mean(np.square(relative))))
+
+
+def largest_gap(predictions: dict[str, float], names: Sequence[str]) -> float:
+    """Return the largest relative gap of predictions to `PUBLISHED`, in percent."""
+    return 100.0 * max(abs(predictions[name] / PUBLISHED[name] - 1.0) for name in names)
+
+
+def information_criteria(chi_square: float, parameters: int, numbers: int) -> tuple[float, float]:
+    """Return AIC and BIC: chi-square and the price of the parameters, 2 k and k ln n."""
+    return chi_square + 2.0 * parameters, chi_square + parameters * float(np.log(numbers))
 
 
 def collect(jobs: Sequence[Fit | Bootstrap], runs: Sequence[Run]) -> list[Outcome]:

@@ -17,6 +17,7 @@ from experiments.paper.calibrating.tables import (
     numbers_table,
     of_the_first_page,
     parameter_table,
+    simplest_table,
     unexplained,
 )
 from experiments.runner.committed import committed_file, stored_outcome
@@ -51,7 +52,9 @@ def run(context: Context) -> Result:
     )
     best = best_rungs(outcomes, "table8")[0]
     first, numbers = of_the_first_page(best), numbers_table(best)
-    told = " ".join(one.sentence for one in numbers.findings if one.answers)
+    plain = simplest_table(outcomes)
+    answers = [one for table in (numbers, plain) for one in table.findings if one.answers]
+    told = " ".join(one.sentence for one in answers)
     return Result(
         title="Calibration: what the printed equations lack",
         command=context.command("calibration"),
@@ -59,6 +62,7 @@ def run(context: Context) -> Result:
         paragraphs=(*stored_outcome(context, "calibration"), SETTING),
         tables=(
             numbers,
+            plain,
             ladder_table(outcomes, "table8", "fitted to Table 8 and the box scatter"),
             ladder_table(outcomes, "table5", "fitted to Table 5 and the prototypes"),
             parameter_table(best, outcomes),

@@ -47,8 +47,13 @@ class Fit:
 
     @property
     def n_parameters(self) -> int:
-        """How many are open."""
-        return len(self.parameters)
+        """How many are open; the size of the node noise is one where it is fitted."""
+        return len(self.parameters) + (self.target == "noise")
+
+    @property
+    def node_noise(self) -> float:
+        """Standard deviation of the nodes' noise, arcsec; 0 where none is fitted."""
+        return self.evaluation.node_noise if self.target == "noise" else 0.0
 
     @property
     def bic(self) -> float:

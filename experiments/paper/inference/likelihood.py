@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import minimize_scalar
 
 from experiments.paper.calibrating.predictions import PUBLISHED, TABLE_8_AND_BOX, UNCERTAINTY
 from experiments.paper.inference.draws import sampling_covariance
 from experiments.paper.inference.moments import DESIGNS, TensorSurrogate
+from experiments.paper.inference.node_noise import LARGEST, published_influence
 from experiments.paper.inference.rungs import COLUMNS, Rung
 from experiments.published_values import TABLE_8
 
@@ -41,10 +44,13 @@ DEPTH_TOLERANCE = 0.1
 of 0.018, so that this leaves five times what its search does."""
 UNLIKELY = 1e3
 """Residual of every number where a model has no steady state."""
-TARGETS = ("independent", "common", "front")
+TARGETS = ("independent", "common", "front", "noise")
 """What is fitted. ``independent``: nine numbers, each with its own sampling error alone, as the
 calibration takes them. ``common``: with their covariance. ``front``: besides, no design of the box
-dominates one of the optima."""
+dominates one of the optima. ``noise``: as ``common``, and the surrogate's nodes carry noise, whose
+size is fitted with the parameters between 0 and `node_noise.LARGEST`."""
+NOISE_GRID = 25
+"""Sizes of the node noise that are tried before the best is refined."""
 
 assert set(FITTED) == set(TABLE_8_AND_BOX)
 
@@ -57,11 +63,47 @@ class Evaluation:
     """Predictions (9,) and their covariance (9, 9), arcsec; depths (3,) in front widths.
 
     A depth says how far both objectives of an optimum can be bettered at once, see `depths`.
+    ``influence`` (9, 1024) holds the derivatives by the runs that the surrogate is fitted to.
     """
 
     predicted: NDArray[np.float64]
     covariance: NDArray[np.float64]
     depths: NDArray[np.float64]
+    influence: NDArray[np.float64]
+
+    @cached_property
+    def of_unit_noise(self) -> NDArray[np.float64]:
+        """Covariance of the predictions for node noise of 1 arcsec, shape (9, 9)."""
+        return np.asarray(self.influence @ self.influence.T)
+
+    @cached_property
+    def node_noise(self) -> float:
+        """Likeliest standard deviation of the node noise, arcsec, at most `LARGEST`."""
+        factor = np.linalg.cholesky(self.covariance)
+        half = np.linalg.solve(factor, self.influence)
+        sizes, directions = np.linalg.eigh(half @ half.T)
+        squares = (directions.T @ np.linalg.solve(factor, self.predicted - OBSERVED)) ** 2
+
+        def deviance(noise: NDArray[np.float64]) -> NDArray[np.float64]:
+            growth = 1.0 + np.multiply.outer(noise**2, np.maximum(sizes, 0.0))
+            return np.asarray(np.sum(squares / growth + np.log(growth), axis=-1))
+
+        grid = np.linspace(0.0, LARGEST, NOISE_GRID)
+        best = int(np.argmin(deviance(grid)))
+        low, high = grid[max(best - 1, 0)], grid[min(best + 1, NOISE_GRID - 1)]
+        # The solver stops short of the ends of its interval.
+        refined = minimize_scalar(
+            lambda size: float(deviance(np.array(size))),
+            bounds=(low, high),
+            method="bounded",
+            options={"xatol": 1e-9},
+        )
+        tried = np.array([float(refined.x), grid[best]])
+        return float(tried[np.argmin(deviance(tried))])
+
+    def covariance_with(self, node_noise: float) -> NDArray[np.float64]:
+        """Return the covariance for node noise of this size in arcsec, shape (9, 9)."""
+        return self.covariance + node_noise**2 * self.of_unit_noise
 
     def chi_square(self, target: str) -> float:
         """Return the sum of squares of what is fitted, without the size of the covariance."""
@@ -81,7 +123,9 @@ class Evaluation:
         return np.append(self._whitened(target), np.sqrt(size - _LOWEST))
 
     def _covariance(self, target: str) -> NDArray[np.float64]:
-        return _INDEPENDENT if target == "independent" else self.covariance
+        if target == "independent":
+            return _INDEPENDENT
+        return self.covariance_with(self.node_noise if target == "noise" else 0.0)
 
     def _whitened(self, target: str) -> NDArray[np.float64]:
         factor = np.linalg.cholesky(self._covariance(target))
@@ -109,7 +153,7 @@ def evaluate(rung: Rung, parameters: dict[str, float], front: bool = True) -> Ev
     covariance[:8, :8] += sampling_covariance(joint, SAMPLES, DRAWS)
     optima = np.column_stack([joint.means, joint.stds])[1:]
     found = depths(surrogate, optima) if front else np.zeros(3)
-    return Evaluation(predicted, covariance, found)
+    return Evaluation(predicted, covariance, found, published_influence(surrogate, bands))
 
 
 def box_axes(surrogate: TensorSurrogate, n: int) -> list[NDArray[np.float64]]:

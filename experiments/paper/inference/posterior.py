@@ -5,7 +5,6 @@ The prior is uniform on the searched scale within the ranges of the ladder and o
 
 from __future__ import annotations
 
-import hashlib
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -16,7 +15,7 @@ from numpy.typing import NDArray
 from experiments.paper.inference.likelihood import UNLIKELY, least_deviance, residuals_of
 from experiments.paper.inference.optimum import OPTIMA, optima
 from experiments.paper.inference.rungs import PERIODIC, Rung
-from experiments.paper.inference.search import STEP, Residuals, refine
+from experiments.paper.inference.search import STEP, Residuals, digest, refine
 from experiments.runner.campaign import Run
 from experiments.runner.registry import require
 
@@ -127,7 +126,7 @@ class Posterior:
     @property
     def key(self) -> str:
         """All settings in one name."""
-        start = f"from{_digest(self.place)}_{self.steps}_seed{self.seed}"
+        start = f"from{digest(self.place)}_{self.steps}_seed{self.seed}"
         return f"posterior_{self.target}_{self.rung.name}_{start}"
 
     def execute(self) -> Run:
@@ -160,7 +159,7 @@ class Profile:
     @property
     def key(self) -> str:
         """All settings in one name."""
-        return f"profile_{self.target}_{self.rung.name}_{_digest(self.place)}"
+        return f"profile_{self.target}_{self.rung.name}_{digest(self.place)}"
 
     def execute(self) -> Run:
         """Return rows: number of the parameter, its value on the searched scale, deviance."""
@@ -192,7 +191,3 @@ def profiles(residuals: Residuals, rung: Rung, place: NDArray[np.float64]) -> ND
                 least, near_by = refine(residuals, rung, near_by, PROFILE_STEPS, fixed=axis)
                 rows.append([axis, value, least])
     return np.array(rows)
-
-
-def _digest(place: tuple[float, ...]) -> str:
-    return hashlib.sha256(repr(place).encode()).hexdigest()[:8]

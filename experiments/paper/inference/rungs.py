@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from experiments.paper.calibrating.ladder import (
     EFFECTS,
+    LOGARITHMIC,
     NARROW,
     WIDE,
     Candidate,
@@ -27,13 +28,19 @@ from pymoo_hdte.units import ARCSEC
 
 PERIODIC = ("phase", "phase_2", "phase_2.02")
 """Angles: a search may leave their range, and comes back by whole turns."""
+RIGID = ("torsion",)
+"""Closures of the rigid drive alone, on no effect: two parameters, std(theta_s) and the share."""
 COLUMNS = [PARAMETERS.index(name) for name in VARIABLES]
 """Where `VARIABLES` stand among `PARAMETERS`."""
 
 
 @dataclass(frozen=True)
 class Rung:
-    """Effects, readings and closures; its parameters are those of both."""
+    """Effects, readings and closures; its parameters are those of both.
+
+    The printed equations follow theta_s like a rigid drive, whatever its shape. Without effects the
+    shape is therefore no parameter: it is that of the preset ``published``.
+    """
 
     candidate: Candidate
     closures: tuple[str, ...] = ()
@@ -47,6 +54,8 @@ class Rung:
     def bounds(self) -> dict[str, tuple[float, float]]:
         """The open parameters with their ranges, on the scale that is searched."""
         found = self.candidate.bounds
+        if not self.candidate.effects:
+            found = {name: found[name] for name in found if name not in _printed_shape()}
         for name in self.closures:
             found |= CLOSURES[name].bounds
         return found
@@ -59,27 +68,32 @@ class Rung:
 
     def physical(self, searched: Sequence[float] | NDArray[np.float64]) -> dict[str, float]:
         """Turn a point of the search space into named parameters; angles within one turn."""
-        size = len(self.candidate.bounds)
-        found = self.candidate.physical(searched[:size])
-        found |= dict(zip(list(self.bounds)[size:], map(float, searched[size:]), strict=True))
         return {
-            name: value % (2.0 * np.pi) if name in PERIODIC else value
-            for name, value in found.items()
+            name: _physical(name, float(value))
+            for name, value in zip(self.bounds, searched, strict=True)
         }
 
     def searched(self, parameters: dict[str, float]) -> NDArray[np.float64]:
         """Turn named parameters into a point of the search space."""
-        names = list(self.bounds)[len(self.candidate.bounds) :]
-        return np.array([*self.candidate.searched(parameters), *(parameters[n] for n in names)])
+        return np.array(
+            [np.log(parameters[n]) if n in LOGARITHMIC else parameters[n] for n in self.bounds]
+        )
 
     def model(self, parameters: dict[str, float]) -> DriveModel:
         """Return the drive model, without closures."""
-        return self.candidate.model(parameters)
+        return self.candidate.model(_printed_shape() | parameters)
+
+
+def _physical(name: str, value: float) -> float:
+    if name in LOGARITHMIC:
+        return float(np.exp(value))
+    return value % (2.0 * np.pi) if name in PERIODIC else value
 
 
 def all_rungs() -> list[Rung]:
-    """Return the ladder; each closure on all its effects; and all closures on all and on none.
+    """Return the ladder; each closure on all its effects; and torsion and all closures on none.
 
+    Torsion on none is the simplest model: a rigid drive, and a share of its torsion read as error.
     With closures theta_s is read as semi-amplitude: read as peak-to-peak, the ladder is far off.
     """
     found = [Rung(candidate) for candidate in ladder_rungs()]
@@ -87,8 +101,21 @@ def all_rungs() -> list[Rung]:
     for bands in (WIDE, NARROW):
         full, printed = (Candidate(one, "semi_amplitude", bands) for one in (EFFECTS, ()))
         found += [Rung(full, (name,)) for name in CLOSURES]
-        found += [Rung(printed, every), Rung(full, every)]
+        found += [Rung(printed, RIGID), Rung(printed, every), Rung(full, every)]
     return found
+
+
+def noisy_rungs() -> list[Rung]:
+    """Return the rungs that are fitted with node noise as well: those of theta_s as semi-amplitude.
+
+    Single closures on all effects are left out: all effects meet the numbers without them.
+    """
+    return [
+        rung
+        for rung in all_rungs()
+        if rung.candidate.reading == "semi_amplitude"
+        and (not rung.candidate.effects or len(rung.closures) != 1)
+    ]
 
 
 def rung_named(name: str) -> Rung:
@@ -152,3 +179,16 @@ def _coefficients(model: DriveModel, rest: NDArray[np.float64]) -> Coefficients:
 @cache
 def _printed() -> DriveModel:
     return preset("published")
+
+
+@cache
+def _printed_shape() -> dict[str, float]:
+    """Return the shape of theta_s in ``published``, by the names of the ladder's parameters."""
+    error = _printed().kinematic_error
+    first, second, beat = error.amplitudes
+    return {
+        "amplitude_1": first / second,
+        "amplitude_2.02": beat / second,
+        "phase_2": error.phases[1] - error.phases[0],
+        "phase_2.02": error.phases[2] - error.phases[0],
+    }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -43,19 +44,30 @@ class Effort:
         return f"{self.starts}x{'_'.join(map(str, self.steps))}"
 
 
+def digest(place: tuple[float, ...]) -> str:
+    """Return a short name of a place, for keys."""
+    return hashlib.sha256(repr(place).encode()).hexdigest()[:8]
+
+
 @dataclass(frozen=True)
 class Search:
-    """A rung fitted to one of the targets of `likelihood` from one seed."""
+    """A rung fitted to one of the targets of `likelihood` from one seed.
+
+    ``known`` is a place on the searched scale that is followed beside the starts: the end of a
+    target that this one contains.
+    """
 
     rung: Rung
     target: str
     seed: int
     effort: Effort
+    known: tuple[float, ...] = ()
 
     @property
     def key(self) -> str:
         """All settings in one name."""
-        return f"search_{self.target}_{self.rung.name}_{self.effort.name}_seed{self.seed}"
+        start = f"_from{digest(self.known)}" if self.known else ""
+        return f"search_{self.target}_{self.rung.name}_{self.effort.name}_seed{self.seed}{start}"
 
     def execute(self) -> Run:
         """Return one row an end, the best first: deviance, then the place on the searched scale."""
@@ -69,6 +81,9 @@ class Search:
 
         rng = np.random.default_rng([self.seed, 24])
         ends = multi_start(residuals, self.rung, self.effort, rng, soft)
+        if self.known:
+            steps = self.effort.steps[-1]
+            ends.append(refine(residuals, self.rung, np.array(self.known), steps)[1])
         rows = np.array([[least_deviance(residuals(end)), *end] for end in ends])
         rows = rows[np.argsort(rows[:, 0], kind="stable")]
         return Run(("deviance", *self.rung.bounds), rows, time.perf_counter() - begin)

@@ -1,10 +1,19 @@
 """The calibration ladder: rules against closed forms, predictions against samples, recovery."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from numpy.polynomial.legendre import leggauss
 
 from experiments.paper.calibrating import experiment as calibration
-from experiments.paper.calibrating.data import Outcome, format_outcomes, gap, read_outcomes
+from experiments.paper.calibrating.data import (
+    Outcome,
+    format_outcomes,
+    gap,
+    information_criteria,
+    read_outcomes,
+)
 from experiments.paper.calibrating.experiment import OUTCOMES, best_rungs
 from experiments.paper.calibrating.fitting import Budget, Fit, _refine, _residuals, outcome_row
 from experiments.paper.calibrating.ladder import (
@@ -25,15 +34,23 @@ from experiments.paper.calibrating.predictions import (
     surrogate_moments,
     uncertain_box,
 )
+from experiments.paper.calibrating.rigid import (
+    RigidDrive,
+    fit_rigid,
+    gain,
+    inverse_moments,
+    simplest,
+)
 from experiments.paper.calibrating.trade_off import TRAITS, front_traits
 from experiments.paper.scatter import dte_samples
 from experiments.published_values import TABLE_9
 from experiments.runner.campaign import Campaign
 from experiments.runner.committed import committed_file
 from experiments.runner.registry import Context
-from pymoo_hdte.drive import PARAMETERS, PRESETS, preset
+from pymoo_hdte.drive import PARAMETERS, PRESETS, preset, transfer_function
 from pymoo_hdte.problems import RobustDTE
 from pymoo_hdte.surrogate import TruncatedNormal
+from pymoo_hdte.units import ARCSEC
 
 FULL_LADDER = Candidate(EFFECTS, "semi_amplitude", NARROW)
 
@@ -161,6 +178,18 @@ def test_the_committed_ladder_is_what_its_parameters_predict():
         assert np.sum(residuals(searched) ** 2) == pytest.approx(one.chi_square, rel=1e-2)
 
 
+@pytest.mark.nightly
+def test_a_stored_fit_runs_again():
+    rung = Candidate((), "semi_amplitude", NARROW)
+    run = Fit(rung, "table5", 1, calibration.BUDGETS["table5"]).execute()
+    stored = [
+        one.chi_square
+        for one in read_outcomes(committed_file(OUTCOMES, "calibration"))
+        if (one.kind, one.direction, one.candidate, one.seed) == ("fit", "table5", rung, 1)
+    ]
+    assert run.values[:, 0] == pytest.approx(stored, rel=1e-4)
+
+
 def test_the_report_is_made_from_the_committed_ladder(tmp_path):
     result = calibration.run(Context(1, tmp_path, Campaign(tmp_path)))
     numbers = result.tables[0]
@@ -169,7 +198,7 @@ def test_the_report_is_made_from_the_committed_ladder(tmp_path):
     assert all(finding.agrees for finding in checks)
     assert step.verdict == "Missed by the fit"
     assert "-0.022 and +0.021 arcsec by the best rung, by +0.468 and -0.136 in" in step.sentence
-    assert len(result.tables[1].rows) == len(ladder_rungs())
+    assert len(result.tables[2].rows) == len(ladder_rungs())
 
 
 @pytest.mark.nightly
@@ -213,3 +242,57 @@ def test_outcomes_survive_their_csv(tmp_path):
     assert read.candidate == outcome.candidate
     assert read.parameters == pytest.approx(parameters, rel=1e-6)
     assert read.gap(FITS["table8"]) == pytest.approx(gap(outcome.predictions, FITS["table8"]))
+
+
+class TestRigid:
+    @pytest.mark.parametrize("band", [0.05, 0.35])
+    def test_moments_of_an_inverse_are_those_of_quadrature(self, band):
+        nodes, weights = leggauss(20)
+        values = 1.0 / (1.0 + band * nodes)
+        mean = values @ weights / 2.0
+        spread = np.sqrt((values - mean) ** 2 @ weights / 2.0)
+        assert inverse_moments(band) == pytest.approx((mean, spread))
+        assert mean == pytest.approx(np.log((1.0 + band) / (1.0 - band)) / (2.0 * band))
+
+    @pytest.mark.parametrize("bands", [NARROW, WIDE])
+    def test_predictions_are_those_of_samples_of_the_drive(self, bands):
+        drive = RigidDrive(0.05, 8.0, bands)
+        predicted, model = drive.predict(), preset("published")
+        rng, n = np.random.default_rng(1), 20_000
+        theta_s = TruncatedNormal(model.nominal[0] / ARCSEC, 8.0).sample(rng, n)
+        for design, values in {"initial": model.nominal[1:], **TABLE_9}.items():
+            band = BAND["initial" if design == "initial" else "optimum"][bands]
+            drawn = drive.dte_arcsec(theta_s, values[0] * rng.uniform(1.0 - band, 1.0 + band, n))
+            error = drawn.std() / np.sqrt(n)
+            assert abs(predicted[f"mean_{design}"] - drawn.mean()) < 4 * error
+            assert abs(predicted[f"std_{design}"] - drawn.std()) < 4 * error
+        box = uncertain_box(replace(model, kinematic_error=error_of(model, 8.0)), bands)
+        low, high = box.lower, box.upper
+        theta_s, stiffness = rng.uniform(low[:2], high[:2], (n, 2)).T
+        drawn = drive.dte_arcsec(theta_s / ARCSEC, stiffness)
+        assert predicted["box_std"] == pytest.approx(drawn.std(), rel=0.02)
+
+    def test_the_gain_is_twice_that_of_the_transfer_function(self):
+        model = preset("published")
+        drive, orders = model.coefficients(model.nominal[None]), np.array([1.0, 2.02])
+        gains = np.abs(transfer_function(drive, orders)[0])
+        assert 2.0 * gains.min() < gain() < 2.0 * gains.max()
+
+    @pytest.mark.parametrize("bands", [NARROW, WIDE])
+    def test_no_other_drive_fits_better(self, bands):
+        best = fit_rigid(bands)
+        for share, std in ((1.02, 1.0), (0.98, 1.0), (1.0, 1.02), (1.0, 0.98)):
+            other = RigidDrive(best.torsion_share * share, best.std_arcsec * std, bands)
+            assert other.chi_square > best.chi_square
+
+    def test_two_parameters_are_set_against_nine(self):
+        assert information_criteria(0.6, 9, 9) == pytest.approx((18.6, 0.6 + 9 * np.log(9)))
+        best = best_rungs(read_outcomes(committed_file(OUTCOMES, "calibration")), "table8")
+        assert simplest().bands == WIDE
+        printed = next(one for one in best if not one.candidate.effects)
+        assert (best[0].n_parameters, printed.n_parameters) == (9, 1)
+
+
+def error_of(model, std_arcsec):
+    """Return the static error of a model with another standard deviation."""
+    return replace(model.kinematic_error, std=std_arcsec * ARCSEC)

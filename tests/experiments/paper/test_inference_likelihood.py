@@ -214,7 +214,7 @@ def test_closures_do_what_they_state():
 
 def test_rungs_come_back_from_their_names_and_parameters_from_the_search_space():
     names = [rung.name for rung in all_rungs()]
-    assert len(set(names)) == len(names) == 32 + 2 * (len(CLOSURES) + 2)
+    assert len(set(names)) == len(names) == 32 + 2 * (len(CLOSURES) + 3)
     for rung in all_rungs()[::7]:
         assert rung_named(rung.name) == rung
         low, high = rung.limits

@@ -130,7 +130,7 @@ def test_nine_perturbed_parameters_are_recovered_as_far_as_they_can_be_known(num
 
 def test_the_same_seed_gives_the_same_search_and_the_same_posterior(monkeypatch):
     effort = Effort(2, (1, 1, 1))
-    rung = Rung(Candidate((), "semi_amplitude", NARROW))
+    rung = Rung(Candidate(("load_inertia",), "semi_amplitude", NARROW))
     first, second = (Search(rung, "common", 3, effort).execute() for _ in range(2))
     assert np.array_equal(first.values, second.values)
     assert not np.array_equal(first.values, Search(rung, "common", 4, effort).execute().values)
@@ -140,7 +140,7 @@ def test_the_same_seed_gives_the_same_search_and_the_same_posterior(monkeypatch)
     job = Posterior(rung, "common", tuple(first.values[0, 1:].tolist()), 3, 2)
     once, twice = job.execute(), job.execute()
     assert np.array_equal(once.values, twice.values)
-    deviance = least_deviance(residuals_of(rung, "common", once.values[0, 1:6]))
+    deviance = least_deviance(residuals_of(rung, "common", once.values[0, 1:7]))
     assert once.values[0, 0] == pytest.approx(deviance)
 
 
