@@ -178,8 +178,8 @@ def dominated(model: str) -> str:
     shares = [significant(100.0 * share, 2) for share in sorted(dominating_shares(model).values())]
     return (
         f"{shares[0]} to {shares[-1]} % of random designs are better than each of the paper's "
-        f"optima in mean and deviation at once on the model {model}, so that the paper optimised "
-        "another one"
+        f"optima in mean and deviation at once on the model {model}: the paper optimised another "
+        "model, or a surrogate of runs with errors"
     )
 
 

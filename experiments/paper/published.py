@@ -84,7 +84,7 @@ def run(context: Context) -> Result:
         ),
         models=models_of("published"),
         tables=(_readings(printed), orders, _designs(designs)),
-        first_page={OF_MODELS: _of_the_first_page(printed)},
+        first_page={OF_MODELS: of_the_first_page(printed)},
         pictures=(
             Picture(
                 "gain",
@@ -160,7 +160,8 @@ def printed_equations() -> dict[str, Printed]:
     return found
 
 
-def _of_the_first_page(printed: dict[str, Printed]) -> str:
+def of_the_first_page(printed: dict[str, Printed]) -> str:
+    """Say what the printed equations give under either reading; no full stop."""
     values = " or ".join(
         f"{printed[reading].dte:.1f} (theta_s as a {reading.replace('_', '-')})"
         for reading in READINGS
