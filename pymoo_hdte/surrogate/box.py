@@ -178,7 +178,7 @@ class Box:
         Returns
         -------
         ndarray, shape (n, d)
-            Points of the box; those inside as they were.
+            Points of the box in the variables' own units; those inside as they were.
 
         Raises
         ------
