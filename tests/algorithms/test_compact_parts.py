@@ -113,6 +113,20 @@ def test_the_archive_is_bounded_and_thinned_out_evenly():
     assert np.diff(kept).max() < 0.1
 
 
+@pytest.mark.parametrize(("offered", "kept"), [(20, 20), (21, 21), (22, 11), (40, 11)])
+def test_the_archive_is_thinned_out_once_it_is_more_than_full(offered, kept):
+    """Then to what it leaves, the ends of the front among it, and no pair nearer than before."""
+    archive = FrontArchive(21, most_spread, left=11)
+    line = np.linspace(0.0, 1.0, offered)
+    offer(archive, np.column_stack([line, 1.0 - line]))
+    members = archive.members.get("F")
+    assert len(members) == kept
+    assert (members[:, 0].min(), members[:, 0].max()) == (0.0, 1.0)
+    gaps = np.diff(np.sort(members[:, 0]))
+    # Halved or more, a line of even steps has none between neighbours of less than two of them.
+    assert gaps.min() >= (1.0 if kept == offered else 1.999) / (offered - 1) * (1.0 - 1e-9)
+
+
 def test_the_archive_forgets_what_is_no_longer_feasible():
     """As constraint handling that grows stricter needs."""
     archive = FrontArchive(10, most_spread)
@@ -265,3 +279,36 @@ def test_model_steps_do_not_depend_on_the_units_of_variables(rng):
     steps = fixed(X, X, X, rng)
     assert steps.any()
     assert not steps[:, 2].any()
+
+
+def _step_after(told, here, seed=3):
+    """Steps of a move that was told points, batch by batch."""
+    move = ModelStep()
+    for X, F in told:
+        for rows in np.array_split(np.arange(len(X)), max(1, len(X) // 50)):
+            move.learn(Points(X[rows], F[rows], np.zeros(len(rows))))
+    return move(here, here, here, np.random.default_rng(seed))
+
+
+@pytest.mark.parametrize("before", [300, 900, 1100, 1900])
+def test_models_of_a_problem_that_changed_are_those_of_its_latest_thousand_points(rng, before):
+    """As the class of the swarm states for callbacks."""
+    (old, *_), (new, _, lowest) = _quadratics(rng), _quadratics(rng)
+    X = lowest.mean(axis=0) + rng.standard_normal((before + 1000, D))
+    here = X[-10:]
+    latest = X[before:], new(X[before:])
+    steps = _step_after([(X[:before], old(X[:before])), latest], here)
+    assert steps.any()
+    np.testing.assert_allclose(steps, _step_after([latest], here), rtol=1e-6, atol=1e-9)
+
+
+def test_models_are_fitted_to_the_points_nearest_to_the_leader(rng):
+    """What is far away is of another shape, and does not enter."""
+    objectives, _, lowest = _quadratics(rng)
+    near = lowest.mean(axis=0) + rng.standard_normal((3 * D + 20, D))
+    far = near + 1e3
+    here = near[:10]
+    told = [(far, rng.random((len(far), 2))), (near, objectives(near))]
+    expected = _step_after(told[1:], here)
+    assert expected.any()
+    np.testing.assert_allclose(_step_after(told, here), expected, rtol=1e-6, atol=1e-9)

@@ -45,6 +45,28 @@ def test_a_model_that_has_no_step_yet_does_not_evaluate_the_same_again():
     assert len(np.unique(visited, axis=0)) == len(visited) == 8
 
 
+class Noted(Parabolas):
+    """A problem that notes where it was evaluated."""
+
+    def __init__(self):
+        super().__init__()
+        self.asked = []
+
+    def _evaluate(self, x, out, *args, **kwargs):
+        self.asked.append(np.array(x))
+        super()._evaluate(x, out, *args, **kwargs)
+
+
+@pytest.mark.parametrize("kwargs", [{}, {"pop_size": 12, "n_offsprings": 5}])
+def test_models_learn_every_evaluated_point_once_and_in_its_turn(kwargs):
+    problem = Noted()
+    algorithm = run(problem, 300, **kwargs).algorithm
+    (model,) = (move for move in algorithm.moves if isinstance(move, ModelStep))
+    asked = np.vstack(algorithm.problem.asked)
+    np.testing.assert_array_equal(model._known.X, asked)
+    np.testing.assert_array_equal(model._known.F, Parabolas().evaluate(asked))
+
+
 # --- result and archive ---------------------------------------------------------------------------
 
 

@@ -119,3 +119,17 @@ def test_without_any_neighbour_nothing_changes(soft):
     alone = harmonic_balance(coefficients, steps=1)
     assert not alone.converged.any()
     assert continued_from_neighbours(coefficients, alone) is alone
+
+
+def test_what_is_found_beside_designs_that_stay_lost_is_their_own_steady_state(soft):
+    """Near zero torque some are not found from their neighbours either."""
+    fast = soft.at(280.0, 2.0)
+    designs = around(soft, 40)
+    coefficients = fast.coefficients(designs)
+    from_rest = harmonic_balance(coefficients)
+    reached = continued_from_neighbours(coefficients, from_rest).converged
+    alone = from_rest.converged
+    assert 0 < alone.sum() < reached.sum() < len(designs)
+    dte = fast.dte_where_found(designs)
+    assert np.array_equal(np.isfinite(dte), reached)
+    assert dte[alone] == pytest.approx(fast.dte_arcsec(designs[alone]), rel=1e-6)

@@ -1,5 +1,6 @@
 """What forbids a plain name."""
 
+import math
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -8,7 +9,7 @@ import pytest
 
 from pymoo_hdte.discrepancy.engine import choice
 from pymoo_hdte.discrepancy.engine.candidate import Candidate, Layout
-from pymoo_hdte.discrepancy.engine.doubts import doubts_of
+from pymoo_hdte.discrepancy.engine.doubts import doubts_of, varies
 from pymoo_hdte.discrepancy.engine.excess import Vote
 from pymoo_hdte.discrepancy.engine.fitted_sets import FittedSets
 from pymoo_hdte.discrepancy.engine.hypothesis import Hypothesis, alike, contains, label_of
@@ -499,3 +500,18 @@ def test_a_play_that_stood_for_an_error_that_grows_with_load_is_denied():
 def test_records_deny_a_change_with_which_their_prediction_diverges_and_none_that_prevents_it():
     assert Vote(1.0, np.inf, np.inf).denies(RULES, 1.0)
     assert not Vote(1.0, 0.0, np.inf).denies(RULES, 1.0)
+
+
+@pytest.mark.parametrize("correlation", [0.0, 0.9])
+def test_a_line_that_is_noise_in_both_parts_is_seen_as_rarely_as_a_value(correlation):
+    """Beyond a radius of r deviations lies exp(-r^2 / 2) of a plane, erfc(k / sqrt 2) of a line."""
+    both_sides = math.erfc(RULES.certain_deviations / math.sqrt(2.0))
+    radius = math.sqrt(-2.0 * math.log(both_sides))
+    covariance = 0.04 * np.array([[1.0, correlation], [correlation, 1.0]])
+    turns = np.linspace(0.0, 2.0 * np.pi, 12, endpoint=False)
+    border = radius * np.column_stack([np.cos(turns), np.sin(turns)])
+    border = border @ np.linalg.cholesky(covariance).T
+    line = SimpleNamespace(lines=[[0, 1]])
+    for parts in border:
+        assert varies(line, 1.001 * parts, covariance, RULES)
+        assert not varies(line, 0.999 * parts, covariance, RULES)

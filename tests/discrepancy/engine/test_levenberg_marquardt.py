@@ -14,6 +14,7 @@ from pymoo_hdte.discrepancy.engine.levenberg_marquardt import (
     SETTLED,
     Minimum,
     _arrived,
+    _step,
     is_hopeless,
     minimum,
     moved,
@@ -268,3 +269,81 @@ def test_each_line_of_the_error_of_a_drive_has_its_amplitude_and_its_phase():
     found = [(base[size].name, base[phase].name) for size, phase in Unknowns(base, ()).lines]
     lines = range(len(BELIEVED.error_orders))
     assert found == [(f"error_amplitude_{line}", f"error_phase_{line}") for line in lines]
+
+
+class Linear:
+    """Residuals J (x - best) that are linear in three unknowns."""
+
+    scale, lower, upper = np.ones(3), np.full(3, -1e3), np.full(3, 1e3)
+    lines = np.empty((0, 2), dtype=int)
+
+    def __init__(self, rng):
+        self.matrix, self.best = 10.0 * rng.normal(size=(7, 3)), rng.normal(size=3)
+
+    def residuals(self, values):
+        return self.matrix @ (values - self.best)
+
+    def jacobian(self, values):
+        return self.matrix
+
+
+@pytest.mark.parametrize("damping", [1e-3, 1.0, 30.0])
+def test_a_damped_step_has_its_closed_form_and_brings_all_that_it_promises(damping, rng):
+    """Of linear residuals; the next one is then damped ten times less."""
+    problem, start = Linear(rng), np.array([3.0, -2.0, 1.0])
+    residuals, size = problem.residuals(start), np.array([1.0, 5.0, 20.0])
+    ended = _step(problem, start, residuals, problem.matrix, size, damping)
+    curvature = problem.matrix.T @ problem.matrix + damping * np.diag(size**2)
+    step = np.linalg.solve(curvature, -problem.matrix.T @ residuals)
+    assert ended.values - start == pytest.approx(step)
+    assert ended.share == pytest.approx(1.0)
+    assert ended.damping == pytest.approx(0.1 * damping)
+
+
+class Saturated:
+    """A residual that saturates: steps without damping lead ever farther beyond 1.4."""
+
+    scale, lower, upper = np.ones(1), np.full(1, -1e12), np.full(1, 1e12)
+    lines = np.empty((0, 2), dtype=int)
+
+    def residuals(self, values):
+        return WEIGHT * np.arctan(values)
+
+    def jacobian(self, values):
+        return WEIGHT / (1.0 + values[:, None] ** 2)
+
+
+@pytest.mark.parametrize("start", [20.0, -300.0])
+def test_damping_grows_until_a_step_leads_down(start):
+    ended = minimum(Saturated(), np.array([start]), 40)
+    assert ended.values == pytest.approx([0.0], abs=NEAR / WEIGHT)
+
+
+class Valley:
+    """Rosenbrock's curved valley, its unknowns counted in other units."""
+
+    lines = np.empty((0, 2), dtype=int)
+
+    def __init__(self, units):
+        self.units, self.scale, self.visited = units, np.ones(2), []
+        self.lower, self.upper = np.full(2, -1e9), np.full(2, 1e9)
+
+    def residuals(self, values):
+        x, y = values * self.units
+        self.visited.append((x, y))
+        return np.array([100.0 * (y - x**2), 10.0 * (1.0 - x)])
+
+    def jacobian(self, values):
+        x, _ = values * self.units
+        return np.array([[-200.0 * x, 100.0], [-10.0, 0.0]]) * self.units
+
+
+def test_damping_does_not_depend_on_the_units_of_unknowns():
+    """As long as derivatives are computed: what a step shows of them is updated in given units."""
+    first_steps = []
+    for units in (np.ones(2), np.array([2.0**-6, 2.0**5])):
+        problem = Valley(units)
+        ended = minimum(problem, np.array([-1.2, 1.0]) / units, 40)
+        assert ended.values * units == pytest.approx([1.0, 1.0], abs=NEAR)
+        first_steps.append(problem.visited[:2])
+    np.testing.assert_allclose(first_steps[1], first_steps[0], rtol=1e-9)

@@ -92,6 +92,7 @@ def test_a_simulator_that_fails_in_half_of_the_box_is_refused_with_its_region():
         (lambda x: "a", "what the simulator returns is 'a'"),
         (lambda x: 1j * x, "what the simulator returns"),
         (lambda x: 1e200 * x, "choose another unit"),
+        (lambda x: 1e-150 * x, "choose another unit"),
         (lambda x: {"y" if x < 0.7 else "z": x}, "names of the responses"),
     ],
 )
@@ -211,3 +212,12 @@ def test_runs_and_memory_are_told_before_the_first_run(capsys):
 
     with pytest.raises(KeyboardInterrupt):
         robust_problem(told, *PLAIN)
+
+
+@pytest.mark.parametrize("unit", [1e-90, 1.0, 1e90])
+def test_moments_scale_with_the_unit_of_a_response(unit):
+    """A product with uniform noise on 0 to 1: mean x / 2, deviation x / sqrt(12)."""
+    designs, noise = {"x": Design(0.5, 1.0)}, {"a": chaospy.Uniform(0.0, 1.0)}
+    problem = quiet(lambda x, a: unit * x * a, designs, noise)
+    moments = problem.evaluate(np.array([[0.7]]))[0] / unit
+    assert moments == pytest.approx([0.35, 0.7 / np.sqrt(12.0)], rel=1e-6)

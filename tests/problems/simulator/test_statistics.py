@@ -1,5 +1,7 @@
 """Statistics of a response against closed forms, their gradients and their stated errors."""
 
+from itertools import product
+
 import chaospy
 import numpy as np
 import pytest
@@ -160,3 +162,12 @@ def test_a_probability_has_no_gradient(problem):
 def test_a_statistic_that_makes_no_sense_is_refused(wrong):
     with pytest.raises(InvalidInput):
         wrong()
+
+
+@pytest.mark.parametrize("k", [-2.0, -0.5, 0.0, 3.0])
+def test_the_band_of_a_sum_is_what_the_worst_signs_of_its_errors_do(k):
+    """A lower limit is as uncertain as an upper one."""
+    of_mean, of_std = np.array([0.3, 0.1]), np.array([0.2, 0.4])
+    changes = [sign * of_mean + k * other * of_std for sign, other in product((-1, 1), repeat=2)]
+    band = MeanPlusStd(k).half_width(of_mean, of_std, None)
+    assert band == pytest.approx(np.max(changes, axis=0))
