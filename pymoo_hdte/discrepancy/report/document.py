@@ -242,7 +242,7 @@ def _line(
     amplitude, phase = line_with_variance(cosine, sine, covariance)
     prefix = next(one for one in reversed(HARMONIC_NAMES) if name.startswith(one))
     return {
-        name: quantity(*amplitude, _unit(candidate, name.removeprefix(prefix))),
+        name: quantity(*amplitude, _unit(candidate, name)),
         f"{prefix}phase": quantity(*phase, _unit(candidate, "phase")),
     }
 
