@@ -9,8 +9,8 @@ from pymoo_hdte.checks import InvalidInput, real_number
 LARGEST_FACTOR = 1e6
 """Of a believed value: nobody is further off who knows its unit."""
 SMALLEST_SHARE = 1.0 / LARGEST_FACTOR
-"""Of a believed value in a fit: a mass of zero moves at once and cannot be simulated, and a value of
-zero has no tolerance to be believed within."""
+"""Of a believed value, the least in a fit: a mass of zero cannot be simulated, and a value of zero
+has no tolerance to be believed within."""
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ from analysed_campaigns import ripple_analysis
 from measured_oscillator import nothing, with_held_out
 
 from pymoo_hdte.discrepancy import read_mechanism_model
+from pymoo_hdte.discrepancy.drive.parameters import base_parameters
 from pymoo_hdte.discrepancy.drive.proof import prove
 from pymoo_hdte.discrepancy.drive.revision import drive_model
 from pymoo_hdte.discrepancy.engine.fitting import fit
@@ -88,3 +89,17 @@ def test_a_drive_is_proved_and_revised(bound):
         assert np.isfinite([gap.after for gap in proof.channels.values()]).all()
         model = drive_model(finding.campaign, chosen.fit, "revised", "at a bound")
         assert np.all(np.isfinite(model.dte_arcsec(model.nominal[None])))
+
+
+@BOUNDS
+@pytest.mark.parametrize("name", ["damping", "input_damping", "output_damping", "load_inertia"])
+def test_a_drive_is_revised_where_nothing_is_believed(name, bound):
+    finding = ripple_analysis()
+    believed = replace(finding.campaign.believed, **{name: 0.0})
+    campaign, fitted = replace(finding.campaign, believed=believed), finding.verdict.chosen.fit
+    unknowns = base_parameters(believed, campaign.rig, [0.0] * len(believed.error_orders), 0.0)
+    (parameter,) = [one for one in unknowns if one.name == name]
+    values = fitted.values.copy()
+    values[[one.name for one in fitted.parameters].index(name)] = getattr(parameter, bound)
+    model = drive_model(campaign, replace(fitted, values=values), "revised", "at a bound")
+    assert np.all(np.isfinite(model.dte_arcsec(model.nominal[None])))
