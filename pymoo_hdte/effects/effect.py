@@ -20,6 +20,7 @@ from pymoo_hdte.effects.guess import Guess, Sizes, check_response
 from pymoo_hdte.effects.law import PORTS
 from pymoo_hdte.effects.quantities import si_unit, with_unit
 from pymoo_hdte.effects.sentence_blanks import check_sentence
+from pymoo_hdte.effects.unknowns import number_of
 from pymoo_hdte.io.fields import Fields
 
 Place = tuple[str, str, float | None]
@@ -174,9 +175,14 @@ class Effect:
         allowed = "laws of registered effects only"
         raise InvalidInput(f"{self.name}.guess", type(part).__name__, allowed)
 
-    def unit(self, unknown: str) -> str:
-        """Return the SI unit of a number, of an unknown of a guess or of a phase; 1 for none."""
-        return si_unit({"phase": "angle", **self.of_fit, **self.quantities}.get(unknown, ""))
+    def unit(self, unknown: str, of_guess: Mapping[str, str] | None = None) -> str:
+        """Return the SI unit of a number, of an unknown of a guess or of a phase; 1 for none.
+
+        An unknown may be a line of any order: ``"second_amplitude"`` is an amplitude. Quantities
+        ``of_guess`` come first.
+        """
+        stated = {"phase": "angle", **self.of_fit, **self.quantities, **(of_guess or {})}
+        return si_unit(stated.get(unknown, stated.get(number_of(unknown), "")))
 
     def law_of(self, values: Mapping[str, float]) -> Any:
         """Return the law with these numbers.

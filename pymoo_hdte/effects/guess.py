@@ -6,8 +6,9 @@ machine, which it knows by its `Sizes` only.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -158,6 +159,9 @@ class Guess:
     among : int
         Number of guesses from which it differs by a number only that no fit follows, as the time of
         a change; itself counted.
+    quantities : mapping of str to str
+        Of its unknowns, where they are other ones than the effect states: an error of a reading has
+        the unit of what is read.
     """
 
     unknowns: tuple[Parameter, ...]
@@ -169,6 +173,7 @@ class Guess:
     instead_of: tuple[str, ...] = ()
     name: str = ""
     among: int = 1
+    quantities: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def begins(self) -> tuple[tuple[float, ...], ...]:
@@ -187,6 +192,7 @@ def guess_of_lines(
     form: str = "",
     sentence: str = "",
     name: str = "",
+    quantities: Mapping[str, str] = MappingProxyType({}),
 ) -> Guess:
     """Return a guess of what is no more than lines at the orders of a family.
 
@@ -200,6 +206,7 @@ def guess_of_lines(
     line : callable
         From order, amplitude and phase to a law (or another change of a drive).
     form, sentence, name : str
+    quantities : mapping of str to str
         As of `Guess`.
     """
     unknowns = family.waves(strength, largest, typical)
@@ -208,7 +215,7 @@ def guess_of_lines(
         return tuple(line(*one) for one in family.lines(values))
 
     starts = starts_along_each(unknowns)
-    return Guess(unknowns, starts, build, family, form, sentence, name=name)
+    return Guess(unknowns, starts, build, family, form, sentence, name=name, quantities=quantities)
 
 
 def check_response(name: str, parts: Sequence[Any], sizes: Sizes) -> None:

@@ -127,6 +127,7 @@ register(
         "load do: springs that slip close every small loop, the other two creep from one to the "
         "next, and LuGre's changes with the speed.",
         _slipping,
+        of_fit={"exponent": "", "share": ""},
     )
 )
 

@@ -8,6 +8,7 @@ and not two.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
@@ -22,6 +23,10 @@ _HARMONIC_SHARE = 0.2
 """Typical size of a further harmonic, as a share of the first."""
 _COSINE, _SINE = "_cosine", "_sine"
 """Endings of the names of the two parts of a line."""
+
+
+_OF_A_LINE = re.compile(rf"({'|'.join(filter(None, HARMONIC_NAMES))}|order_[\d.e+-]+_)")
+"""How names of lines begin: of the harmonics of an order, and of orders that are no multiples."""
 
 
 @dataclass(frozen=True)
@@ -112,6 +117,22 @@ def _parts(name: str, start: float, largest: float, size: float) -> list[Paramet
         Parameter(f"{name}{part}", begin, -largest, largest, size, linear=True)
         for part, begin in ((_COSINE, start), (_SINE, 0.0))
     ]
+
+
+def number_of(name: str) -> str:
+    """Return the number of an effect that a line of it is, whichever harmonic or order.
+
+    Parameters
+    ----------
+    name : str
+        Of a line or of another unknown.
+
+    Examples
+    --------
+    >>> number_of("second_amplitude"), number_of("order_2.02_level"), number_of("order")
+    ('amplitude', 'level', 'order')
+    """
+    return _OF_A_LINE.sub("", name, count=1) if _OF_A_LINE.match(name) else name
 
 
 def starts_along_each(parameters: Sequence[Parameter]) -> tuple[tuple[float, ...], ...]:

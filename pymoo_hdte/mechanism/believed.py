@@ -8,6 +8,9 @@ from pymoo_hdte.checks import InvalidInput, real_number
 
 LARGEST_FACTOR = 1e6
 """Of a believed value: nobody is further off who knows its unit."""
+SMALLEST_SHARE = 1.0 / LARGEST_FACTOR
+"""Of a believed value, the least in a fit: a mass of zero cannot be simulated, and a value of zero
+has no tolerance to be believed within."""
 
 
 @dataclass(frozen=True)
@@ -57,6 +60,19 @@ class BelievedValue:
         ends = (1.0 - self.tolerance) / self.factor, (1.0 + self.tolerance) * self.factor
         least, most = sorted(self.value * end for end in ends)
         return least, most
+
+    @property
+    def fit_limits(self) -> tuple[float, float]:
+        """The least and the largest value of a fit, SI: `limits` without zero.
+
+        Examples
+        --------
+        >>> BelievedValue(2.0, tolerance=1.0).fit_limits
+        (2e-06, 4.0)
+        """
+        least, most = self.limits
+        nothing = SMALLEST_SHARE * self.value
+        return (max(least, nothing), most) if self.value > 0.0 else (least, min(most, nothing))
 
 
 NOTHING = BelievedValue(0.0)

@@ -5,6 +5,7 @@ from types import SimpleNamespace
 import pytest
 
 from pymoo_hdte.discrepancy.report.mechanism_values import ripples
+from pymoo_hdte.effects import effect_named
 from pymoo_hdte.mechanism import BelievedValue, Input, Mechanism, Port
 from pymoo_hdte.mechanism.quantity_units import base_unit, unit_of_number
 
@@ -57,3 +58,11 @@ def test_a_motor_whose_scale_is_not_known_gives_no_force_in_newtons():
         turning.inertias, turning.ports, [Input("counts", {"q": 1.0}, scaled=False)], angles=("q",)
     )
     assert unit_of_number(counted, "bearing", "amplitude", "N.m") == "SI"
+
+
+@pytest.mark.parametrize(("angles", "unit"), [(("q",), "N.m"), ((), "N"), (None, "SI")])
+@pytest.mark.parametrize("line", ["amplitude", "second_amplitude", "order_2.02_amplitude"])
+def test_a_line_of_a_ripple_is_a_force_whichever_its_order(line, angles, unit):
+    of_shaft = effect_named("torque_ripple").unit(line)
+    assert unit_of_number(one_coordinate(angles), "bearing", line, of_shaft) == unit
+    assert unit_of_number(one_coordinate(angles), "bearing", f"{line}_phase", "1") == "rad"

@@ -20,13 +20,12 @@ from numpy.typing import NDArray
 from pymoo_hdte.discrepancy.campaign.line_fit import CHANNELS
 from pymoo_hdte.discrepancy.drive.analysis import DriveFinding
 from pymoo_hdte.discrepancy.drive.features import MEANS
-from pymoo_hdte.discrepancy.drive.parameters import by_order
+from pymoo_hdte.discrepancy.drive.parameters import labels_by_order
 from pymoo_hdte.discrepancy.drive.planned_tests import Grid, Model, separation
 from pymoo_hdte.discrepancy.engine.candidate import labels_apart
 from pymoo_hdte.discrepancy.engine.fitting import Fit
 from pymoo_hdte.discrepancy.engine.verdict import Verdict
 from pymoo_hdte.drive.effects import ENCODER_LINE
-from pymoo_hdte.effects.sentence_blanks import in_words
 
 TESTS = ("running", "torsion_sweep", "reclocked_encoder", "none")
 
@@ -78,7 +77,7 @@ def next_experiment(finding: DriveFinding) -> Proposal:
         Of `analysis.examine_drive`.
     """
     proposal, orders = _proposed(finding), finding.campaign.believed.error_orders
-    return replace(proposal, description=by_order(in_words(proposal.description), orders))
+    return replace(proposal, description=labels_by_order(proposal.description, orders))
 
 
 def _proposed(finding: DriveFinding) -> Proposal:

@@ -16,6 +16,7 @@ from pymoo_hdte.discrepancy.campaign.known_values import (
     known_values,
     known_words,
 )
+from pymoo_hdte.effects.sentence_blanks import in_words
 from pymoo_hdte.effects.unknowns import Parameter
 
 __all__ = ["MECHANICAL", "READING", "base_parameters"]
@@ -46,6 +47,7 @@ _UNITS = {
     "output_torque_zero": "N.m",
 }
 """SI units of the base parameters, by name; those of lines without their number."""
+_OF_LINES = ("error_amplitude", "error_phase")
 
 
 def base_unit(name: str) -> str:
@@ -68,25 +70,41 @@ def words_of(name: str, error_orders: Sequence[float]) -> str:
     if "." in name:
         return known_words(name)
     kind, _, line = name.rpartition("_")
-    if kind in ("error_amplitude", "error_phase"):
+    if kind in _OF_LINES:
         part = kind.removeprefix("error_")
         return f"{part} of order {error_orders[int(line)]:.4g} of the static error"
     return name.replace("_", " ")
 
 
-def by_order(text: str, error_orders: Sequence[float]) -> str:
-    """Return a text in which lines of the static error have their order, not their number.
+def name_by_order(name: str, error_orders: Sequence[float]) -> str:
+    """Return the name of a base parameter, that of a line with its order instead of its number.
 
     Examples
     --------
-    >>> by_order("error_amplitude_1", (1.0, 2.0)), by_order("error phase 0, damping", (1.0,))
-    ('error amplitude of order 2', 'error phase of order 1, damping')
+    >>> name_by_order("error_amplitude_1", (1.0, 2.0)), name_by_order("load_inertia", (1.0,))
+    ('error amplitude of order 2', 'load inertia')
+    """
+    kind, _, line = name.rpartition("_")
+    if kind in _OF_LINES:
+        name = f"{kind} of order {error_orders[int(line)]:.4g}"
+    return name.replace("_", " ")
+
+
+def labels_by_order(text: str, error_orders: Sequence[float]) -> str:
+    """Return a text with labels of candidates in words, lines of the static error by their order.
+
+    It is no text for sentences of effects, which may hold any words.
+
+    Examples
+    --------
+    >>> labels_by_order("parameter:error_amplitude_1 or eyring_drag:input", (1.0, 2.0))
+    'error amplitude of order 2 (out of tolerance) or eyring drag (input)'
     """
 
-    def named(line: re.Match[str]) -> str:
-        return f"error {line[1]} of order {error_orders[int(line[2])]:.4g}"
+    def named(label: re.Match[str]) -> str:
+        return f"{name_by_order(label[1], error_orders)} (out of tolerance)"
 
-    return re.sub(r"error[ _](amplitude|phase)[ _](\d+)", named, text)
+    return in_words(re.sub(r"\bparameter:(error_(?:amplitude|phase)_\d+)", named, text))
 
 
 def base_parameters(

@@ -75,6 +75,8 @@ def drive_model(campaign: Campaign, fitted: Fit, name: str, description: str) ->
     """
     names = [parameter.name for parameter in fitted.parameters]
     values = dict(zip(names, fitted.values.tolist(), strict=True))
+    # One that is believed to be nothing is fitted within 1e-12 of it, to either side.
+    values["load_inertia"] = max(values["load_inertia"], 0.0)
     believed = campaign.believed
     lines = range(len(believed.error_orders))
     amplitudes = [values[f"error_amplitude_{line}"] for line in lines]

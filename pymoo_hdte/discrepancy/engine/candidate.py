@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import reduce
+from functools import partial, reduce
 from typing import Any
 
 import numpy as np
@@ -212,7 +212,7 @@ def candidate_of(
         remembers=effect.remembers,
         instead_of=guess.instead_of,
         among=guess.among,
-        unit=effect.unit,
+        unit=partial(effect.unit, of_guess=guess.quantities),
     )
 
 

@@ -55,7 +55,7 @@ class WhitenedBalances:
         found = []
         for name, one in self.mechanism.quantities.items():
             if not one.known:
-                least, most = one.limits
+                least, most = one.fit_limits
                 found.append(Parameter(name, one.value, least, most, (most - least) / 2.0))
         for port in self.mechanism.ports:
             if port.read or port.followed:

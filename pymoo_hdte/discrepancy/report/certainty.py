@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from pymoo_hdte.discrepancy.drive.analysis import DriveFinding
 from pymoo_hdte.discrepancy.drive.evidence import PARTS
-from pymoo_hdte.discrepancy.drive.parameters import words_of
+from pymoo_hdte.discrepancy.drive.parameters import labels_by_order, words_of
 from pymoo_hdte.discrepancy.engine.fitting import Fit
 from pymoo_hdte.discrepancy.engine.hypothesis import (
     Hypothesis,
@@ -24,7 +26,7 @@ from pymoo_hdte.reports.html import number, percent
 
 def how_sure(finding: DriveFinding) -> str:
     """Return how sure the verdict is, in words."""
-    verdict = finding.verdict
+    verdict, orders = finding.verdict, finding.campaign.believed.error_orders
     limit = adequate(verdict.degrees_of_freedom, verdict.rules)
     residual = verdict.base.chi_square / verdict.degrees_of_freedom
     if verdict.status == "adequate":
@@ -44,13 +46,13 @@ def how_sure(finding: DriveFinding) -> str:
     if verdict.status == "unlisted":
         certain = "That something is missing is certain; what it is, is not."
         if not verdict.comes_near:
-            most = in_words(verdict.chosen.label)
+            most = labels_by_order(verdict.chosen.label, orders)
             return f"{certain} The most that was explained is {share}, by {most}."
         return (
             f"{certain} The nearest known effect, "
-            f"{in_words(verdict.chosen.label)}, explains {share} of the misfit, "
+            f"{labels_by_order(verdict.chosen.label, orders)}, explains {share} of the misfit, "
             f"{_too_little(finding, verdict.chosen)}."
-            + "".join(f" Against it: {in_words(one)}." for one in verdict.doubts)
+            + "".join(f" Against it: {labels_by_order(one, orders)}." for one in verdict.doubts)
         )
     return " ".join(_evidence(finding, verdict.chosen, share))
 
@@ -89,15 +91,16 @@ def how_sure_of_records(finding: MechanismFinding) -> str:
     return " ".join(words)
 
 
-def _next_best(best: Hypothesis, chosen: Hypothesis) -> str:
+def _next_best(best: Hypothesis, chosen: Hypothesis, error_orders: Sequence[float] = ()) -> str:
     """Return what the best other set explains; where that is the same, the BIC tells them apart."""
     share, gap = percent(best.explained), best.bic - chosen.bic
+    label = labels_by_order(best.label, error_orders)
     if share == percent(chosen.explained):
         share = "as much to a tenth of a per cent"
     elif gap > 0.0 and best.explained < chosen.explained:
-        return f"The best other explanation, {in_words(best.label)}, explains {share}."
+        return f"The best other explanation, {label}, explains {share}."
     return (
-        f"The best other explanation, {in_words(best.label)}, explains {share}; its BIC is "
+        f"The best other explanation, {label}, explains {share}; its BIC is "
         f"{number(abs(gap))} {'above' if gap > 0.0 else 'below'}."
     )
 
@@ -129,6 +132,7 @@ def _evidence(finding: DriveFinding, chosen: Hypothesis, share: str) -> list[str
             "That is more than noise: its form is not quite right or more is missing, and values "
             "may be off by more than their intervals say."
         )
+    orders = finding.campaign.believed.error_orders
     others = _others(verdict, chosen)
     if verdict.equivalent:
         shares = ", ".join(percent(hypothesis.explained) for hypothesis in verdict.equivalent)
@@ -140,15 +144,16 @@ def _evidence(finding: DriveFinding, chosen: Hypothesis, share: str) -> list[str
         )
     elif others:
         best = min(others, key=lambda hypothesis: hypothesis.bic)
-        words.append(_next_best(best, chosen))
+        words.append(_next_best(best, chosen, orders))
     bounded = [
-        one.name
-        for one, side in zip(chosen.fit.parameters, chosen.fit.bound_sides, strict=True)
+        words_of(one.name, orders) if row < chosen.fit.n_base else one.name.replace("_", " ")
+        for row, (one, side) in enumerate(
+            zip(chosen.fit.parameters, chosen.fit.bound_sides, strict=True)
+        )
         if one.limited_at(side)
     ]
     if bounded:
-        orders = finding.campaign.believed.error_orders
-        names = ", ".join(words_of(name, orders) for name in bounded)
+        names = ", ".join(bounded)
         words.append(f"At the bound of its range, and therefore uncertain: {names}.")
     if far := _far_from_stated(chosen.fit, verdict.rules):
         words.append(f"A sensor is far from what is stated of it, and values with it: {far}.")

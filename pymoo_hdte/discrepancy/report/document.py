@@ -15,7 +15,7 @@ from pymoo_hdte.discrepancy.drive.evidence import PARTS
 from pymoo_hdte.discrepancy.drive.misfit.map import Location
 from pymoo_hdte.discrepancy.drive.misfit.relevance import relevance
 from pymoo_hdte.discrepancy.drive.next_test import Proposal
-from pymoo_hdte.discrepancy.drive.parameters import base_unit, by_order
+from pymoo_hdte.discrepancy.drive.parameters import base_unit, labels_by_order
 from pymoo_hdte.discrepancy.engine.candidate import Candidate, labels_apart
 from pymoo_hdte.discrepancy.engine.fitting import Fit
 from pymoo_hdte.discrepancy.engine.hypothesis import (
@@ -26,7 +26,7 @@ from pymoo_hdte.discrepancy.engine.hypothesis import (
 )
 from pymoo_hdte.discrepancy.engine.rules import Rules
 from pymoo_hdte.discrepancy.engine.verdict import Verdict
-from pymoo_hdte.effects.sentence_blanks import in_words, joined_sentences
+from pymoo_hdte.effects.sentence_blanks import joined_sentences
 from pymoo_hdte.effects.unknowns import HARMONIC_NAMES, Parameter, line_with_variance
 
 SCHEMA_VERSION = 1
@@ -60,9 +60,9 @@ def verdict_document(
         "schema_version": SCHEMA_VERSION,
         "campaign": finding.campaign.title,
         "status": verdict.status,
-        "sentence": by_order(sentence(verdict), orders),
+        "sentence": sentence(verdict, orders),
         "probability": verdict.probability,
-        "doubts": [by_order(in_words(one), orders) for one in verdict.doubts],
+        "doubts": [labels_by_order(one, orders) for one in verdict.doubts],
         "effects": effects_of(verdict),
         "relevance": None if matters is None else matters.as_dict(),
         "alternatives": _alternatives(verdict),
@@ -105,8 +105,8 @@ def believed_in_words(document: Mapping[str, Any]) -> list[str]:
     return found
 
 
-def sentence(verdict: Verdict) -> str:
-    """Return the verdict in words."""
+def sentence(verdict: Verdict, error_orders: Sequence[float] = ()) -> str:
+    """Return the verdict in words; lines of the static error of a drive by their orders."""
     chosen = verdict.chosen
     if verdict.status == "adequate":
         return "Nothing is missing: the believed drive explains the records within its tolerances."
@@ -119,25 +119,26 @@ def sentence(verdict: Verdict) -> str:
         missing = "Something is missing that no known effect explains"
         if not verdict.comes_near:
             return f"{missing}, not even half of it."
-        return f"{missing}. The nearest is {in_words(chosen.label)}."
+        return f"{missing}. The nearest is {labels_by_order(chosen.label, error_orders)}."
     if verdict.status == "class" and verdict.equivalent:
-        what = f"{what} {_or_else([chosen, *verdict.equivalent])}"
+        what = f"{what} {_or_else([chosen, *verdict.equivalent], error_orders)}"
     if verdict.doubts:
-        doubts = in_words("; ".join(verdict.doubts))
+        doubts = labels_by_order("; ".join(verdict.doubts), error_orders)
         return f"{what} That is not all, or not quite right: {doubts}."
     return what
 
 
-def _or_else(sets: Sequence[Hypothesis]) -> str:
+def _or_else(sets: Sequence[Hypothesis], error_orders: Sequence[float]) -> str:
     """Return in words what the sets of a class say beside the first; what all share is left out.
 
     A part of the first is told with it because it leaves doubts alone.
     """
-    first, *others = labels_apart([one.candidates for one in sets])
-    place = "" if first == sets[0].label else f", in place of {in_words(first)}"
+    labels = labels_apart([one.candidates for one in sets])
+    first, *others = (labels_by_order(one, error_orders) for one in labels)
+    place = "" if labels[0] == sets[0].label else f", in place of {first}"
     whole = label_of(sets[0].candidates)
     alone = [" alone, which leaves doubts" * (label_of(one.candidates) < whole) for one in sets[1:]]
-    listed = "; or ".join(in_words(one) + how for one, how in zip(others, alone, strict=True))
+    listed = "; or ".join(one + how for one, how in zip(others, alone, strict=True))
     return f"Or, which these data cannot tell from it{place}: {listed}."
 
 
@@ -241,7 +242,7 @@ def _line(
     amplitude, phase = line_with_variance(cosine, sine, covariance)
     prefix = next(one for one in reversed(HARMONIC_NAMES) if name.startswith(one))
     return {
-        name: quantity(*amplitude, _unit(candidate, name.removeprefix(prefix))),
+        name: quantity(*amplitude, _unit(candidate, name)),
         f"{prefix}phase": quantity(*phase, _unit(candidate, "phase")),
     }
 

@@ -11,14 +11,12 @@ import numpy as np
 from pymoo_hdte.discrepancy.campaign.campaign import Campaign
 from pymoo_hdte.discrepancy.drive.analysis import DriveFinding
 from pymoo_hdte.discrepancy.drive.gap import Gap
-from pymoo_hdte.discrepancy.drive.parameters import by_order, words_of
+from pymoo_hdte.discrepancy.drive.parameters import labels_by_order, name_by_order, words_of
 from pymoo_hdte.discrepancy.drive.proof import Proof
-from pymoo_hdte.discrepancy.engine.hypothesis import (
-    Hypothesis,
-)
+from pymoo_hdte.discrepancy.engine.fitting import Fit
+from pymoo_hdte.discrepancy.engine.hypothesis import Hypothesis
 from pymoo_hdte.discrepancy.engine.verdict import Verdict
 from pymoo_hdte.discrepancy.report.document import base_parameters
-from pymoo_hdte.effects.sentence_blanks import in_words
 from pymoo_hdte.effects.unknowns import HARMONIC_NAMES, Parameter
 from pymoo_hdte.reports.html import percent
 from pymoo_hdte.units import ARCSEC, REVOLUTION_PER_MINUTE
@@ -106,7 +104,7 @@ def effect_rows(
             value, low, high = (
                 number / size for number in (quantity["value"], *quantity["interval95"])
             )
-            words = by_order(name, error_orders).replace("_", " ")
+            words = name_by_order(name, error_orders) if not label else name.replace("_", " ")
             rows.append(EffectRow(label, words, value, low, high, unit))
     return rows
 
@@ -122,12 +120,12 @@ def hypothesis_rows(verdict: Verdict, error_orders: Sequence[float]) -> list[Hyp
     best = min(hypothesis.bic for hypothesis in hypotheses)
     return [
         HypothesisRow(
-            by_order(in_words(hypothesis.label), error_orders),
+            labels_by_order(hypothesis.label, error_orders),
             _role(verdict, hypothesis),
             hypothesis.fit.chi_square,
             percent(hypothesis.explained),
             hypothesis.bic - best,
-            by_order(", ".join(hypothesis.fit.at_bounds), error_orders).replace("_", " ") or "none",
+            ", ".join(_bounded(hypothesis.fit, error_orders)) or "none",
         )
         for hypothesis in hypotheses
     ]
@@ -183,12 +181,13 @@ def _parameter_row(
     name, unit, size = parameter.name, _shown(entry["unit"]), 1.0
     if name == "offset" or name.startswith("error_amplitude_"):
         unit, size = "arcsec", ARCSEC
-    words = words_of(name, ()) if "." in name else by_order(name, campaign.believed.error_orders)
+    orders = campaign.believed.error_orders
+    words = words_of(name, ()) if "." in name else name_by_order(name, orders)
     low, high = (end / size for end in entry["interval95"])
     # Phases and the constant of the encoders have no believed value.
     free = parameter.name == "offset" or parameter.name.startswith("error_phase_")
     return ParameterRow(
-        words.replace("_", " "),
+        words,
         unit,
         None if free else parameter.start / size,
         entry["value"] / size,
@@ -197,6 +196,15 @@ def _parameter_row(
         None if free else parameter.upper / size,
         entry["at_bound"],
     )
+
+
+def _bounded(fitted: Fit, error_orders: Sequence[float]) -> list[str]:
+    """Return the unknowns of a fit that ended at a bound, in words."""
+    return [
+        name_by_order(one.name, error_orders) if row < fitted.n_base else one.name.replace("_", " ")
+        for row, (one, side) in enumerate(zip(fitted.parameters, fitted.bound_sides, strict=True))
+        if side != 0.0
+    ]
 
 
 def _shown(unit: str) -> str:

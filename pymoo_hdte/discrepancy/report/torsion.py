@@ -134,15 +134,14 @@ def _about(value: float, variance: float) -> list[float]:
 
 
 def _unit(candidate: Candidate, name: str) -> str:
-    """Return the unit of a parameter of a candidate; that of its last word for a line's.
+    """Return the unit of a parameter of a candidate.
 
     An angle of the gear is in arcseconds, a phase is not.
     """
     if candidate.unit is None:
         return "SI"
-    unit = candidate.unit(name)
-    unit = candidate.unit(name.rpartition("_")[2]) if unit == "1" else unit
-    return "arcsec" if unit == "rad" and not name.endswith("phase") else unit
+    unit = "phase" if name.endswith("phase") else candidate.unit(name)
+    return {"rad": "arcsec", "phase": "rad"}.get(unit, unit)
 
 
 def _shown(parameter: dict[str, Any], unit: str) -> dict[str, Any]:

@@ -11,7 +11,6 @@ from pymoo_hdte.discrepancy.drive.analysis import DriveFinding
 from pymoo_hdte.discrepancy.drive.coverage import campaign_limits
 from pymoo_hdte.discrepancy.drive.misfit.map import Location
 from pymoo_hdte.discrepancy.drive.next_test import Proposal
-from pymoo_hdte.discrepancy.drive.parameters import by_order
 from pymoo_hdte.discrepancy.drive.proof import Proof
 from pymoo_hdte.discrepancy.drive.revision import (
     MODEL_FILE,
@@ -165,7 +164,7 @@ def _page(
         proof=proof,
         status=STATUSES[finding.verdict.status],
         effects=effect_rows(document["effects"], orders),
-        certainty=by_order(how_sure(finding), orders),
+        certainty=how_sure(finding),
         next_test=document["next_experiment"]["description"],
         pictures=pictures,
         hypotheses=hypothesis_rows(finding.verdict, orders),

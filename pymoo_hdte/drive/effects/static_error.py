@@ -120,6 +120,7 @@ def _of_reading(sizes: Sizes) -> list[Guess]:
             torque_line,
             form=family.form,
             sentence=sentence,
+            quantities={"amplitude": "torque"},
         )
         for family in sizes.lines
     ]

@@ -1,6 +1,6 @@
 """The rules of the verdict: each explained, checked and derived; the verdict follows a change."""
 
-from dataclasses import fields, replace
+from dataclasses import dataclass, fields, replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -17,6 +17,7 @@ from pymoo_hdte.discrepancy.engine.candidate import Layout
 from pymoo_hdte.discrepancy.engine.fitting import fit
 from pymoo_hdte.discrepancy.engine.hypothesis import alike
 from pymoo_hdte.discrepancy.engine.rules import RULES, Rules
+from pymoo_hdte.discrepancy.engine.thresholds.fields import RuleSet, rule
 from pymoo_hdte.discrepancy.engine.verdict import judge
 from pymoo_hdte.discrepancy.mechanism.analysis import examine_mechanism
 from pymoo_hdte.discrepancy.mechanism.evidence import measured_data
@@ -58,6 +59,18 @@ def test_every_rule_says_what_it_means_and_where_it_comes_from(one):
 
 def test_all_fields_are_rules():
     assert [one.name for one in RULES.explained()] == [one.name for one in fields(Rules)]
+
+
+def test_a_rule_is_declared_once():
+    """Two rules of one name stood in two classes, and the second won silently."""
+    declared = [field for one in Rules.__mro__ for field in vars(one).get("__annotations__", ())]
+    assert len(declared) == len(set(declared)) == len(fields(Rules))
+    again = {"bic_gain": rule(7.0, "1", "Again.", "By nobody.")}
+    with pytest.raises(TypeError, match="bic_gain"):
+        type("Redeclared", (Rules,), again | {"__annotations__": {"bic_gain": "float"}})
+    alone = type("Alone", (RuleSet,), again | {"__annotations__": {"bic_gain": "float"}})
+    with pytest.raises(TypeError, match="bic_gain"):
+        type("Joined", (Rules, dataclass(frozen=True, kw_only=True)(alone)), {})
 
 
 @pytest.mark.parametrize("one", fields(Rules), ids=lambda one: one.name)

@@ -195,6 +195,14 @@ def test_how_the_amplitude_changes_with_the_speed_is_said(power, words):
     torque = torque + 0.02 * generator.standard_normal(len(TIME))
     one = find_ripples(JOINT, [record(q, torque, generator)], CUTOFF).found[0]
     assert one.trend.startswith(f"It {words}")
+    (plain,) = find_ripples(joint(), [record(q, torque, generator)], CUTOFF).found
+    turns = f"{one.order / GEAR.ratio:.4g} per input turn"
+    for told, without in ((one.sentence, plain.sentence), (one.words, plain.words)):
+        assert turns in told
+        assert "input turn" not in without
+    of_gear, of_none = (each.as_dicts()[0]["beyond_band"] for each in (one, plain))
+    assert of_gear["per_input_turn"] == one.order / GEAR.ratio
+    assert "per_input_turn" not in of_none
     assert "202 is 2 per input turn" in one.meaning
 
 

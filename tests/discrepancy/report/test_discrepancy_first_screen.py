@@ -298,7 +298,8 @@ def test_what_is_as_likely_at_another_order_was_not_rejected(bic, role, of_class
 
     def fitted(name, order, bic=0.0):
         names = frozenset({(name, "mesh")})
-        fit = SimpleNamespace(chi_square=1.0, at_bounds=("error_amplitude_1",))
+        line = SimpleNamespace(name="error_amplitude_1")
+        fit = SimpleNamespace(chi_square=1.0, parameters=[line], bound_sides=[1.0], n_base=1)
         label = f"{name}:mesh@{order}"
         return SimpleNamespace(names=names, label=label, fit=fit, explained=1.0, bic=bic)
 

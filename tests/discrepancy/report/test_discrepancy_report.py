@@ -313,3 +313,38 @@ def test_ends_are_printed_within_a_twentieth_of_the_width(middle, relative):
     for end in (lower, upper):
         printed = float(np.format_float_positional(end, digits(lower, upper), fractional=False))
         assert abs(printed - end) <= 0.051 * (upper - lower)
+
+
+def test_words_of_a_user_s_effect_are_no_lines_of_the_static_error(ripple, location, tmp_path):
+    """A sentence with "error phase 5" ended the report in IndexError; names of numbers did too."""
+    told, chosen = "Commutation error phase 5 of the motor at the input.", ripple.verdict.chosen
+    fitted, base = chosen.fit, len(ripple.data.base)
+    # One unknown in the place of the ripple's, at its bound.
+    unknown = replace(fitted.parameters[base], name="error_phase_5", upper=fitted.values[base])
+    own = replace(
+        chosen.candidates[0],
+        name="error_phase",
+        sentence=told,
+        parameters=(replace(unknown, linear=False),),
+        build=lambda values: (),
+        unit=lambda name: "rad",
+    )
+    alone = replace(
+        fitted,
+        candidates=(own,),
+        parameters=(*fitted.parameters[:base], *own.parameters),
+        values=fitted.values[: base + 1],
+        jacobian=fitted.jacobian[:, : base + 1],
+    )
+    verdict = replace(
+        ripple.verdict,
+        chosen=replace(chosen, fit=alone),
+        doubts=(f"{unknown.name} of {own.label} ended at a bound",),
+        status="partial",
+    )
+    document = write_report(
+        replace(ripple, verdict=verdict), location, None, PROPOSAL, not_tried, tmp_path / "own"
+    )
+    assert document["sentence"].startswith(told)
+    assert document["effects"][0]["sentence"] == told
+    assert "error phase 5" in (tmp_path / "own" / "report.html").read_text()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import Field, dataclass, field, fields
 from typing import Any
@@ -69,7 +70,17 @@ class RuleSet:
     ------
     InvalidInput
         For a value that is no number or that its field does not allow.
+    TypeError
+        Where a class is made that declares a field of another one again, or inherits two of a name.
     """
+
+    def __init_subclass__(cls) -> None:
+        own = [name for name, value in vars(cls).items() if isinstance(value, Field)]
+        inherited = [one.name for base in cls.__bases__ for one in fields(base)]
+        declared = Counter([*own, *inherited])
+        # Of two fields of a name one would win silently, with the meaning and bounds of the other.
+        if twice := [name for name, count in declared.items() if count > 1]:
+            raise TypeError(f"rules of {cls.__name__} declared twice: {', '.join(twice)}")
 
     def __post_init__(self) -> None:
         for one in fields(self):

@@ -261,7 +261,7 @@ class RecordRules(RuleSet):
         "half of the mean keeps 93 % of the amplitude, at 0.45, near the Nyquist frequency, 57 %.",
         at_most=0.5,
     )
-    slow_share: float = rule(
+    slow_rows_share: float = rule(
         0.1,
         "share of the moving rows",
         "The highest order that is tried beyond the band is within it in this share of the rows.",

@@ -140,7 +140,7 @@ def _tried(
     resolution = 2.0 * np.pi / widest
     speed = np.concatenate([np.abs(one.speed) for one in bands])
     # The slow tail of the rows would ask for orders that the others cannot show.
-    slow = np.quantile(speed[speed > 0.01 * speed.max()], rules.slow_share)
+    slow = np.quantile(speed[speed > 0.01 * speed.max()], rules.slow_rows_share)
     highest = max(one.highest for one in bands) * 2.0 * np.pi / slow
     lowest = max(
         resolution * rules.fewest_periods,

@@ -59,6 +59,8 @@ class Ripple:
         of the order by which the longest travel has one cycle more.
     variance : float
         Of the order.
+    ratio : float
+        Turns of the gear's input per turn of the port; 0 where no gear is stated.
     meaning : str
         What the gear says of the order; empty if nothing.
     frequencies : (float, float)
@@ -81,6 +83,7 @@ class Ripple:
     order: float
     resolution: float
     variance: float
+    ratio: float
     meaning: str
     frequencies: Pair
     parts: tuple[Part, ...]
@@ -92,8 +95,9 @@ class Ripple:
 
     @property
     def words(self) -> str:
-        """Its order, and what the gear says of it."""
-        return f"{self.order:.5g}{f' ({self.meaning})' if self.meaning else ''}"
+        """Its order, how often that is in a turn of the input, and what the gear says of it."""
+        told = "; ".join(filter(None, (_per_input_turn(self.order, self.ratio), self.meaning)))
+        return f"{self.order:.5g} ({told})" if told else f"{self.order:.5g}"
 
     @property
     def sentence(self) -> str:
@@ -105,6 +109,8 @@ class Ripple:
             told.append(f"A part of it {_OTHER[names[1]]}.")
         if self.ways == 1:
             told.append(_one_way(self.port))
+        if self.ratio:
+            told.append(f"That is {_per_input_turn(self.order, self.ratio)}.")
         if self.meaning:
             told.append(f"Within the resolution of the travel, {self.meaning}.")
         low, high = self.frequencies
@@ -129,6 +135,7 @@ class Ripple:
                 "beyond_band": {
                     "frequencies_Hz": list(self.frequencies),
                     "resolution": self.resolution,
+                    **({"per_input_turn": self.order / self.ratio} if self.ratio else {}),
                     "amplitude_over_speed": self.speeds.tolist(),
                     "fitted": list(self.fitted),
                     "held_out": None if self.held_out is None else list(self.held_out),
@@ -216,39 +223,48 @@ def find_ripples(
             shown = ripple.held_out is None or _share(ripple.held_out) >= rules.ripple_share
             (here if shown else lost).append(ripple)
         found += here
-        limits += _limits(port.name, search, here, lost)
+        limits += _limits(port, search, here, lost)
     return Ripples(tuple(found), tuple(limits))
 
 
 def _limits(
-    port: str, search: SeenOrders, found: Sequence[Ripple], lost: Sequence[Ripple]
+    port: Port, search: SeenOrders, found: Sequence[Ripple], lost: Sequence[Ripple]
 ) -> list[str]:
     """Return what was seen at a port and is not named, or cannot be told, in sentences."""
+
+    def ripple(orders: Sequence[float]) -> str:
+        turns = listed([_per_input_turn(one, ratio) for one in orders])
+        return f"Ripple at the {name}, {orders_in_words(orders)}{f' ({turns})' if ratio else ''},"
+
     limits = []
+    name, ratio = port.name, port.gear.ratio if port.gear else 0.0
     if search.cut:
         highest = np.format_float_positional(search.highest, 4, fractional=False, trim="-")
-        limits.append(f"Orders at the {port} were searched up to {highest} only.")
+        limits.append(f"Orders at the {name} were searched up to {highest} only.")
     if any(one.ways == 1 for one in found):
-        limits.append(_one_way(port))
+        limits.append(_one_way(name))
     if lost:
-        orders = orders_in_words([one.order for one in lost])
         limits.append(
-            f"Ripple at the {port}, {orders}, is seen, but to take it away makes the forces "
+            f"{ripple([one.order for one in lost])} is seen, but to take it away makes the forces "
             "of the held-out records no smaller: it is not named."
         )
     if search.undecided:
-        orders = orders_in_words(search.undecided)
         limits.append(
-            f"Ripple at the {port}, {orders}, is seen at one speed or is weak, so that "
+            f"{ripple(search.undecided)} is seen at one speed or is weak, so that "
             "these records do not tell it from a frequency: it is not named."
         )
     if search.fixed:
         lines = ", ".join(f"{one:.3g}" for one in search.fixed)
         limits.append(
-            f"The force at the {port} has lines at {lines} Hz, which these records show as "
+            f"The force at the {name} has lines at {lines} Hz, which these records show as "
             "frequencies and not as orders of its position."
         )
     return limits
+
+
+def _per_input_turn(order: float, ratio: float) -> str:
+    """Return how often an order is in a turn of the gear's input; empty without a gear."""
+    return f"{order / ratio:.4g} per input turn" if ratio else ""
 
 
 def _one_way(port: str) -> str:
@@ -277,6 +293,7 @@ def _ripple(
         seen.order,
         seen.resolution,
         size.variance,
+        port.gear.ratio if port.gear else 0.0,
         port.gear.meaning(seen.order, seen.resolution + half) if port.gear else "",
         (per_speed * float(speed.min()), per_speed * float(speed.max())),
         size.parts,
