@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 from places import README, ROOT
 
-from experiments.paper.page import PAGE, in_three_sentences, page
+from experiments.paper_page import PAGE, in_three_sentences, page
 from pymoo_hdte.problems import RobustDTE
 
 
 def test_the_page_is_what_the_experiments_say():
     written = PAGE.read_text(encoding="utf-8").splitlines()
-    assert written == page().splitlines(), "run python -m experiments.paper.page"
+    assert written == page().splitlines(), "run python -m experiments.paper_page"
 
 
 @pytest.mark.parametrize("text", [README, (ROOT / "paper.md").read_text(encoding="utf-8")])

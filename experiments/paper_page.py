@@ -1,6 +1,6 @@
 """The page on the paper's numbers, ``docs/paper.md``, from stored outcomes and quick computations.
 
-``python -m experiments.paper.page`` writes it anew; a test holds the file against `page`, so that
+``python -m experiments.paper_page`` writes it anew; a test holds the file against `page`, so that
 no number on it can differ from what the experiments say.
 """
 
@@ -38,7 +38,7 @@ from experiments.studies import cost
 from pymoo_hdte.decision import PREFERENCES, WeightedUtopia
 from pymoo_hdte.problems import RobustDTE
 
-PAGE = Path(__file__).parents[2] / "docs" / "paper.md"
+PAGE = Path(__file__).parents[1] / "docs" / "paper.md"
 MODEL = "calibrated"
 ORDER = 3
 """Order of the surrogate that the paper chose."""
@@ -47,7 +47,7 @@ ORDER = 3
 def page() -> str:
     """Return the text of the page."""
     environment = Environment(
-        loader=FileSystemLoader(Path(__file__).parents[1] / "templates"),
+        loader=FileSystemLoader(Path(__file__).parent / "templates"),
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
