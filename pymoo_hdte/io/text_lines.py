@@ -150,9 +150,7 @@ def _quotes(lines: list[str]) -> int:
     return sum(map(str.count, lines, repeat('"')))
 
 
-def _lines(
-    path: Path, kind: str, raw: BinaryIO, size: int, budget: Budget
-) -> Iterator[list[str]]:
+def _lines(path: Path, kind: str, raw: BinaryIO, size: int, budget: Budget) -> Iterator[list[str]]:
     packed = path.suffix == ".gz"
     binary = cast("BinaryIO", gzip.GzipFile(fileobj=raw)) if packed else raw
     # With the surrogates of bytes that are no text, so that their line can be told.

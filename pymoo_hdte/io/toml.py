@@ -103,7 +103,9 @@ def _parsed(path: Path, named: str) -> tuple[str, dict[str, Any]]:
     with path.open("rb") as file:
         content = file.read(LARGEST_TOML + 1)
     if len(content) > LARGEST_TOML:
-        raise InvalidInput(named, f"more than {LARGEST_TOML} bytes", f"at most {LARGEST_TOML} bytes")
+        raise InvalidInput(
+            named, f"more than {LARGEST_TOML} bytes", f"at most {LARGEST_TOML} bytes"
+        )
     try:
         text = io.TextIOWrapper(io.BytesIO(content), encoding="utf-8").read()
         if _DEEP_KEY.search(text):

@@ -98,7 +98,9 @@ def test_matlab_arrays_that_expand_are_refused_before_they_do(tmp_path):
 
 def test_matlab_arrays_that_expand_together_are_refused(tmp_path, monkeypatch):
     monkeypatch.setenv("PYMOO_HDTE_MOST_BYTES", "50_000")
-    refused(matlab(tmp_path / "t.mat", t=np.zeros(4_000), q=np.zeros(4_000)), "matlab", "MOST_BYTES")
+    refused(
+        matlab(tmp_path / "t.mat", t=np.zeros(4_000), q=np.zeros(4_000)), "matlab", "MOST_BYTES"
+    )
 
 
 def test_matlab_arrays_that_nobody_asked_for_are_not_expanded(tmp_path):

@@ -20,7 +20,7 @@ except ImportError:
 SUM_ERROR = 1e-12
 """Relative error of the sums over rows, for two rows in one transform that of the larger."""
 
-_WIDTH = 15
+_WIDTH = 16
 """Points of the grid under a kernel: 10^(1 - width) is its error at twice as many points as waves."""
 _SHAPE = 2.3 * _WIDTH
 _NODES = 100

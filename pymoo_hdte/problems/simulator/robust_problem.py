@@ -298,7 +298,9 @@ def _check_statistics(
             raise InvalidInput(field, given, allowed + _hint(field, given))
         for place, one in enumerate(given):
             if not isinstance(one, kind):
-                raise InvalidInput(f"{field}[{place}]", one, f"a {kind.__name__}{_hint(field, one)}")
+                raise InvalidInput(
+                    f"{field}[{place}]", one, f"a {kind.__name__}{_hint(field, one)}"
+                )
     if not objectives:
         raise InvalidInput("objectives", objectives, "one or more")
 

@@ -330,7 +330,14 @@ def test_a_file_whose_names_of_responses_are_damaged_keeps_its_runs(tmp_path, wh
 def test_a_file_of_no_runs_is_refused_and_left_alone(tmp_path):
     file = tmp_path / "notes.txt"
     others = '{"inputs": [1, 2], "mine": true}', '{"inputs": ["x", "a"], "mine": true}'
-    for text in ("[" * 100_000 + "\n", "my notes\n", "my notes", '{"inputs": 3}\n', '{"inputs": ["y"]}\n', *others):
+    for text in (
+        "[" * 100_000 + "\n",
+        "my notes\n",
+        "my notes",
+        '{"inputs": 3}\n',
+        '{"inputs": ["y"]}\n',
+        *others,
+    ):
         file.write_text(text)
         with pytest.raises(InvalidInput, match="cache"):
             RunFile(file, NAMES, None)
