@@ -31,8 +31,8 @@ class Budget:
     bytes : int
         After decompression, of a text or of all arrays of a MATLAB file that are read.
     rows : int
-        Lines of a text, or length of an array; each number that is read takes 8 bytes of memory, and
-        as much again while it is read.
+        Lines of a text, or length of an array; each number that is read takes 8 bytes of memory,
+        and as much again while it is read.
     characters : int
         Of a line with its end, of the lines of a quoted cell, and of blank lines at a stretch.
 

@@ -121,8 +121,9 @@ def read_table(
     Rows at uneven times are brought to even steps, as `even_steps` has it.
 
     Raises `OSError` if the file cannot be read and `InvalidInput`, with file and line (MATLAB:
-    row), if it is damaged, larger than its `Budget` or the memory allows, a column is missing, ragged or holds text or a huge number, too few
-    rows are finite or too many at a time are not, or time does not rise or leaves a gap.
+    row), if it is damaged, larger than its `Budget` or the memory allows, a column is missing,
+    ragged or holds text or a huge number, too few rows are finite or too many at a time are not, or
+    time does not rise or leaves a gap.
     """
     read = read_columns(path, layout, gaps=True, seen=seen)
     rows = _part_of(read, part)

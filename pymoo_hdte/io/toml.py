@@ -17,7 +17,6 @@ from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.io.budget import LARGEST_TOML, regular_file
 from pymoo_hdte.io.fields import Fields
 
-
 _DEEPEST_KEY = 50
 _PART = r"""(?:[\w-]+|"[^"\n]*"|'[^'\n]*')[ \t]*\.[ \t]*"""
 _DEEP_KEY = re.compile(rf"(?<![\w-])(?:{_PART}){{{_DEEPEST_KEY}}}")

@@ -1,4 +1,4 @@
-"""Files that are written whole: no link is followed, and permissions are those of any other file."""
+"""Files written whole: no link is followed, and permissions are those of any other file."""
 
 import os
 import secrets

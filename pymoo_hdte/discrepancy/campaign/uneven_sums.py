@@ -21,7 +21,7 @@ SUM_ERROR = 1e-12
 """Relative error of the sums over rows, for two rows in one transform that of the larger."""
 
 _WIDTH = 16
-"""Points of the grid under a kernel: 10^(1 - width) is its error at twice as many points as waves."""
+"""Points of the grid under a kernel: with twice as many points as waves it errs 10^(1 - width)."""
 _SHAPE = 2.3 * _WIDTH
 _NODES = 100
 """Of the Gauss rule for the transform of the kernel, which is smooth."""

@@ -30,15 +30,16 @@ the most damaged lines that are told one by one."""
 _SHOWN = 80
 """Characters of the reason why a line is damaged; by hand."""
 _DAMAGED = (ValueError, TypeError, OverflowError, RecursionError)
-"""What is raised by a line that is no JSON, or other JSON than a run file has: no text in UTF-8, too
-many digits, nested too deeply, a number beyond those of floats, another type."""
+"""What is raised by a line that is no JSON, or other JSON than a run file has: no text in UTF-8,
+too many digits, nested too deeply, a number beyond those of floats, another type."""
 
 
 class RunFile:
     """Finished runs on disk, one line each, written before the next is waited for.
 
     The file only grows. A line that a killed process left unfinished is dropped, and a damaged one
-    is left out: their runs are made again. Numbers are kept to the last bit. While it is open no other process may open it, except on Windows.
+    is left out: their runs are made again. Numbers are kept to the last bit. While it is open no
+    other process may open it, except on Windows.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Sums over uneven angles: finufft and the way without it equal the direct sum to the same error."""
+"""Sums over uneven angles: with finufft and without they equal the direct sum to one error."""
 
 import numpy as np
 import pytest
