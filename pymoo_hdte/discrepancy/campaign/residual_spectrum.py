@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial, reduce
+from functools import reduce
 
-import finufft
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -14,14 +13,12 @@ from pymoo_hdte.discrepancy.campaign.believed import Rig
 from pymoo_hdte.discrepancy.campaign.line_basis import LineFit, nyquist_order
 from pymoo_hdte.discrepancy.campaign.line_fit import row_covariance
 from pymoo_hdte.discrepancy.campaign.records import RunningRecord
+from pymoo_hdte.discrepancy.campaign.uneven_sums import sums_at_lines, sums_at_whole_lines
 from pymoo_hdte.discrepancy.engine.rules import RULES
 
 # Numerical limits of a linear fit; the verdict does not depend on them.
 LEAST_SEPARATION = 0.1
 """Least share of a line's power that is independent of the fitted lines."""
-
-SUM_ERROR = 1e-12
-"""Relative error of the sums over rows, for two rows in one transform that of the larger."""
 
 
 def residual_spectrum(
@@ -112,11 +109,9 @@ class _Sums:
         products = _whole_sums(rows, angle, multiples)
         squares = _whole_sums(one, 2.0 * angle, multiples)
         if others.size:
-            # Type 3: neither the angles nor the lines need be evenly spaced.
-            transform = partial(finufft.nufft1d3, isign=1, eps=SUM_ERROR, nthreads=1)
-            more = transform(angle, rows.astype(complex, order="C"), others)
+            more = sums_at_lines(angle, rows.astype(complex, order="C"), others)
             products = np.hstack([products, more])
-            more = transform(angle, one.astype(complex), 2.0 * others)
+            more = sums_at_lines(angle, one.astype(complex), 2.0 * others)
             squares = np.hstack([squares, more])
         return cls(products, squares[0])
 
@@ -151,7 +146,7 @@ def _whole_sums(
     half = (len(rows) + 1) // 2
     pairs = rows[:half].astype(complex, order="C")
     pairs.imag[: len(rows) - half] = rows[half:]
-    sums = finufft.nufft1d1(angle, pairs, 2 * count + 1, isign=1, eps=SUM_ERROR, nthreads=1)
+    sums = sums_at_whole_lines(angle, pairs, count)
     above, below = sums[..., count + 1 :], sums[..., :count][..., ::-1].conj()
     found = np.vstack([above + below, -1j * (above - below)])[: len(rows)] / 2.0
     return np.asarray(found, dtype=complex)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import os
 import sys
 import warnings
@@ -89,7 +90,8 @@ def robust_problem(
     Parameters
     ----------
     simulator : callable
-        Takes the inputs by name; returns a number, a mapping of names to numbers, or a sequence.
+        Takes all designs and all noise by name; returns a number, a mapping of names to numbers, or
+        a sequence.
     designs : mapping of str to Design
         Design variables with their bounds and scatter.
     noise : mapping, optional
@@ -101,8 +103,9 @@ def robust_problem(
     constraints : sequence of RobustConstraint
         As ``Quantile(0.99, response="stress") <= 250e6``.
     accuracy : float
-        Largest error of mean and standard deviation, as a share of the standard deviation, above 0.
-        Where that is below a tenth of its median over the designs, of this tenth.
+        Largest error of mean and standard deviation, as a share of the standard deviation, above 0
+        and below 1: 0.01 for 1 %. Where the standard deviation is below a tenth of its median over
+        the designs, of this tenth.
     budget : int
         Most points; a failing one is run up to ``tries`` times.
     positive : sequence of str, or bool
@@ -164,7 +167,8 @@ def robust_problem(
     5.02
     """
     inputs = Inputs(designs, {} if noise is None else noise)
-    accuracy = real_number("accuracy", accuracy, above=0.0)
+    _check_signature(simulator, inputs.names)
+    accuracy = _share("accuracy", accuracy)
     least = least_runs(len(inputs.axes))
     budget = whole_number("budget", budget, least)
     _check_statistics(objectives, constraints)
@@ -246,15 +250,69 @@ def _announce(inputs: Inputs, least: int, budget: int) -> tqdm:
     return tqdm(total=budget, desc="runs", unit="run", mininterval=1.0)
 
 
+def _share(field: str, given: Any) -> float:
+    """Return a share above 0 and below 1; whoever means per cent is told how to write them."""
+    share = real_number(field, given, above=0.0)
+    if share >= 1.0:
+        allowed = f"above 0 and below 1, a share: {share / 100.0:g} for {share:g} %"
+        raise InvalidInput(field, given, allowed)
+    return share
+
+
+def _check_signature(simulator: Callable[..., Any], names: Sequence[str]) -> None:
+    """Refuse a simulator that cannot be called with these inputs, as far as it tells."""
+    if not callable(simulator):
+        raise InvalidInput("simulator", simulator, "a function of the designs and the noise")
+    try:
+        # What a decorator wraps is not what is called.
+        signature = inspect.signature(simulator, follow_wrapped=False)
+    except (TypeError, ValueError):
+        return
+    parameters = signature.parameters.values()
+    named = [one for one in parameters if one.kind in (one.POSITIONAL_OR_KEYWORD, one.KEYWORD_ONLY)]
+    optional = (inspect.Parameter.VAR_POSITIONAL, inspect.Parameter.VAR_KEYWORD)
+    takes = {one.name for one in named}
+    anything = any(one.kind is one.VAR_KEYWORD for one in parameters)
+    surplus = [] if anything else [name for name in names if name not in takes]
+    missing = [
+        one.name
+        for one in parameters
+        if one.default is one.empty and one.kind not in optional and one.name not in names
+    ]
+    if surplus or missing:
+        reasons = [f"it takes no {', '.join(surplus)}"] if surplus else []
+        reasons += [f"it needs {', '.join(missing)}"] if missing else []
+        allowed = f"those of designs and noise ({', '.join(names)}); {' and '.join(reasons)}"
+        raise InvalidInput("arguments of the simulator", str(signature), allowed)
+
+
 def _check_statistics(
     objectives: Sequence[Statistic], constraints: Sequence[RobustConstraint]
 ) -> None:
-    kinds = (("objectives", objectives, Statistic), ("constraints", constraints, RobustConstraint))
-    for field, given, kind in kinds:
-        if not isinstance(given, Sequence) or not all(isinstance(one, kind) for one in given):
-            raise InvalidInput(field, given, f"a sequence of {kind.__name__}s")
+    for field, given, kind in (
+        ("objectives", objectives, Statistic),
+        ("constraints", constraints, RobustConstraint),
+    ):
+        allowed = f"a list of {kind.__name__}s"
+        if not isinstance(given, Sequence):
+            raise InvalidInput(field, given, allowed + _hint(field, given))
+        for place, one in enumerate(given):
+            if not isinstance(one, kind):
+                raise InvalidInput(
+                    f"{field}[{place}]", one, f"a {kind.__name__}{_hint(field, one)}"
+                )
     if not objectives:
         raise InvalidInput("objectives", objectives, "one or more")
+
+
+def _hint(field: str, given: Any) -> str:
+    """Return what was probably meant, as the end of a sentence."""
+    if field == "constraints" and isinstance(given, Statistic):
+        name = type(given).__name__
+        return f", as {name}(...) <= bound or {name}(...) >= bound make it"
+    if field == "objectives" and isinstance(given, RobustConstraint):
+        return "; a statistic with a bound belongs into constraints"
+    return ""
 
 
 def _tell_failures(problem: SimulatorProblem) -> None:

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import json
+import math
 import os
+import stat
 import sys
+import warnings
 import weakref
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -22,14 +25,21 @@ if sys.platform != "win32":
 _SAME = 1e-6
 """Relative difference of two runs of one simulator, on two machines say; set by hand."""
 _ASKED = 5
-"""Runs of a file that are made again, one after the other, until one does not fail; by hand."""
+"""Runs of a file that are made again, one after the other, until one does not fail; by hand. Also
+the most damaged lines that are told one by one."""
+_SHOWN = 80
+"""Characters of the reason why a line is damaged; by hand."""
+_DAMAGED = (ValueError, TypeError, OverflowError, RecursionError)
+"""What is raised by a line that is no JSON, or other JSON than a run file has: no text in UTF-8,
+too many digits, nested too deeply, a number beyond those of floats, another type."""
 
 
 class RunFile:
     """Finished runs on disk, one line each, written before the next is waited for.
 
-    The file only grows. A line that a killed process left unfinished is dropped. Numbers are kept
-    to the last bit. While it is open no other process may open it, except on Windows.
+    The file only grows. A line that a killed process left unfinished is dropped, and a damaged one
+    is left out: their runs are made again. Numbers are kept to the last bit. While it is open no
+    other process may open it, except on Windows.
 
     Parameters
     ----------
@@ -60,6 +70,11 @@ class RunFile:
         to it.
     OSError
         If it cannot be read or written.
+
+    Warns
+    -----
+    RuntimeWarning
+        If lines are damaged; tells their numbers, from 1.
     """
 
     def __init__(
@@ -72,6 +87,7 @@ class RunFile:
         self.order: dict[tuple[float, ...], int] = {}
         self.responses: tuple[str, ...] = ()
         self.goes_on = self._finished = False
+        self._width = 0  # How many responses a run gave; 0 before the first.
         self._open_alone()
         contents = self._contents()
         whole = contents[: contents.rfind(b"\n") + 1]
@@ -97,6 +113,8 @@ class RunFile:
         binary = getattr(os, "O_BINARY", 0)
         self._descriptor = os.open(self.path, os.O_RDWR | os.O_CREAT | os.O_APPEND | binary, 0o666)
         weakref.finalize(self, os.close, self._descriptor)
+        if not stat.S_ISREG(os.fstat(self._descriptor).st_mode):
+            raise InvalidInput("cache", str(self.path), "a regular file, no pipe or device")
         if sys.platform == "win32":
             return
         try:
@@ -115,39 +133,64 @@ class RunFile:
         return b"".join(parts)
 
     def _read(self, contents: bytes) -> None:
+        head, *lines = contents.split(b"\n")[:-1]
         try:
-            head, *lines = contents.decode().split("\n")[:-1]
-            header = json.loads(head)
-            found = header["inputs"]
-        except (ValueError, KeyError, TypeError):
+            header = json.loads(head.decode())
+            names = header["inputs"]
+        except (*_DAMAGED, KeyError):
             raise InvalidInput("cache", str(self.path), "a file of finished runs") from None
-        if found != list(self._names):
+        if names != list(self._names):
             raise InvalidInput("cache", str(self.path), f"runs of the inputs {self._names}")
+        damaged = []
         for number, line in enumerate(lines, 2):
             try:
-                self._read_line(json.loads(line))
-            except (ValueError, KeyError, TypeError):
-                allowed = f"a file of finished runs; line {number} is damaged"
-                raise InvalidInput("cache", str(self.path), allowed) from None
+                self._read_line(json.loads(line.decode()))
+            except _DAMAGED as error:
+                damaged.append((number, str(error) or type(error).__name__))
+        if damaged:
+            self._tell_damaged(damaged)
         known = self._simulator is not None and header.get("simulator") == self._simulator
-        self.goes_on = known and not self._finished
+        # Without the names of the responses a run has to be made again, which tells them.
+        named = bool(self.responses) or not self.runs
+        self.goes_on = known and named and not self._finished
 
-    def _read_line(self, run: dict[str, Any]) -> None:
-        self._finished = "finished" in run
-        if "responses" in run:
-            self.responses = tuple(run["responses"])
-        elif "at" in run:
-            at = tuple(map(float.fromhex, run["at"]))
-            self.order.setdefault(at, len(self.order))
-            if "failed" in run:
-                self.failures[at] = str(run["failed"])
+    def _read_line(self, line: Any) -> None:
+        """Take in what a line says, or raise one of `_DAMAGED` and take in nothing."""
+        if not isinstance(line, dict):
+            raise ValueError("it is no table")
+        if "responses" in line:
+            responses = tuple(_texts(line["responses"]))
+            if self.responses not in ((), responses) or self._width not in (0, len(responses)):
+                raise ValueError("it names other responses than the lines above")
+            self.responses, self._width = responses, len(responses)
+        elif "at" in line:
+            at = tuple(map(float.fromhex, _texts(line["at"])))
+            if len(at) != len(self._names) or not all(map(math.isfinite, at)):
+                raise ValueError(f"it has no {len(self._names)} finite inputs")
+            if "failed" in line:
+                (self.failures[at],) = _texts([line["failed"]])
             else:
-                self.runs[at] = run["gave"]
+                gave = _numbers(line.get("gave"))
+                if self._width not in (0, len(gave)):
+                    raise ValueError(f"it has {len(gave)} responses in place of {self._width}")
+                self.runs[at], self._width = gave, len(gave)
+            self.order.setdefault(at, len(self.order))
+        elif "finished" not in line:
+            raise ValueError("it is neither a run nor a remark on one")
+        self._finished = "finished" in line
+
+    def _tell_damaged(self, damaged: Sequence[tuple[int, str]]) -> None:
+        told = "; ".join(f"line {number} ({why[:_SHOWN]})" for number, why in damaged[:_ASKED])
+        more = f" and {len(damaged) - _ASKED} more" if len(damaged) > _ASKED else ""
+        message = (
+            f"{self.path}: damaged lines are left out, and their runs are made again: {told}{more}"
+        )
+        warnings.warn(message, RuntimeWarning, stacklevel=5)
 
     def keep(self, at: tuple[float, ...], gave: Any, responses: tuple[str, ...]) -> None:
         """Write a run to the disk, before the first the names of the responses."""
         if not self.responses:
-            self.responses = responses
+            self.responses, self._width = responses, len(responses)
             self._append({"responses": list(responses)})
         self.runs[at] = gave
         self.order.setdefault(at, len(self.order))
@@ -211,3 +254,20 @@ class RunFile:
         while left:
             left = left[os.write(self._descriptor, left) :]
         os.fsync(self._descriptor)
+
+
+def _texts(given: Any) -> list[str]:
+    """Return a list of texts, or raise `TypeError`."""
+    if not isinstance(given, list) or not all(isinstance(one, str) for one in given):
+        raise TypeError("it has no list of texts where there should be one")
+    return given
+
+
+def _numbers(given: Any) -> list[float]:
+    """Return a list of finite numbers as floats, or raise one of `_DAMAGED`."""
+    if not isinstance(given, list) or not all(type(one) in (int, float) for one in given):
+        raise TypeError("it has no list of numbers where there should be one")
+    values = [float(one) for one in given]
+    if not values or not all(map(math.isfinite, values)):
+        raise ValueError("it has no response, or one that is not finite")
+    return values

@@ -268,20 +268,76 @@ def test_runs_that_cannot_be_made_again_are_not_taken(tmp_path):
     study(tmp_path, lambda x, a: math.nan if (x, a) == first else x * a)
 
 
-def test_a_damaged_line_is_refused_and_the_file_left_alone(tmp_path, whole):
+DAMAGED = {
+    "cut": b'{"at": ["0x1',
+    "no number": b'{"at": ["x", "y"], "gave": [1.0]}',
+    "too few inputs": b'{"at": ["0x1p0"], "gave": [1.0]}',
+    "inputs that are no list": b'{"at": 3, "gave": [1.0]}',
+    "inputs that are no texts": b'{"at": [1.0, 2.0], "gave": [1.0]}',
+    "endless inputs": b'{"at": ["inf", "nan"], "gave": [1.0]}',
+    "inputs beyond all floats": b'{"at": ["0x1p9999", "0x1p0"], "gave": [1.0]}',
+    "nothing given": b'{"at": ["0x1p0", "0x1p0"], "gone": 1}',
+    "too many responses": b'{"at": ["0x1p0", "0x1p0"], "gave": [1.0, 2.0]}',
+    "text as a response": b'{"at": ["0x1p0", "0x1p0"], "gave": ["1.0"]}',
+    "truth as a response": b'{"at": ["0x1p0", "0x1p0"], "gave": [true]}',
+    "null as a response": b'{"at": ["0x1p0", "0x1p0"], "gave": null}',
+    "a table as a response": b'{"at": ["0x1p0", "0x1p0"], "gave": {"response": 1.0}}',
+    "NaN as a response": b'{"at": ["0x1p0", "0x1p0"], "gave": [NaN]}',
+    "a whole number beyond all floats": b'{"at": ["0x1p0", "0x1p0"], "gave": [1%s]}' % (b"0" * 400),
+    "more digits than Python reads": b'{"at": ["0x1p0", "0x1p0"], "gave": [1%s]}' % (b"0" * 9999),
+    "a failure without words": b'{"at": ["0x1p0", "0x1p0"], "failed": {"why": 1}}',
+    "responses that are no list": b'{"responses": 3}',
+    "responses that are no texts": b'{"responses": [[1]]}',
+    "other responses": b'{"responses": ["stress"]}',
+    "a number": b"3",
+    "a list": b"[1, 2]",
+    "unknown": b'{"other": 1}',
+    "nested too deeply": b"[" * 100_000,
+    "nested too deeply, whole": b'{"at": %s%s}' % (b"[" * 100_000, b"]" * 100_000),
+    "no text": b'{"at": ["0x1p0", "0x1p0"], "failed": "\xff\xfe"}',
+    "UTF-16": '{"finished": true}'.encode("utf-16"),
+    "empty": b"",
+}
+
+
+@pytest.mark.parametrize("kind", DAMAGED)
+def test_a_damaged_line_is_told_and_left_out_and_its_run_made_again(tmp_path, whole, kind):
     lines = (whole / RUNS).read_bytes().split(b"\n")
-    for damaged in (b'{"at": ["0x1', b'{"at": ["x"], "gave": [1]}', b'{"at": [], "gone": 1}', b"3"):
-        contents = b"\n".join([*lines[:5], damaged, *lines[6:]])
-        (tmp_path / RUNS).write_bytes(contents)
-        with pytest.raises(InvalidInput, match=r"cache.*line 6"):
-            RunFile(tmp_path / RUNS, NAMES, None)
-        assert (tmp_path / RUNS).read_bytes() == contents
+    contents = b"\n".join([*lines[:5], DAMAGED[kind], *lines[6:]])
+    (tmp_path / RUNS).write_bytes(contents)
+    with pytest.warns(RuntimeWarning, match="line 6"):
+        file = RunFile(tmp_path / RUNS, NAMES, None)
+    assert (tmp_path / RUNS).read_bytes() == contents
+    del file
+    before = len(calls(whole))
+    with pytest.warns(RuntimeWarning, match="line 6"):
+        study(tmp_path, partial(noting, str(whole / "log")))
+    # The run of the damaged line, and the first one, as the study had come to its end.
+    assert len(calls(whole)) - before == 2
+    assert (tmp_path / PROBLEM).read_bytes() == (whole / PROBLEM).read_bytes()
+
+
+def test_a_file_whose_names_of_responses_are_damaged_keeps_its_runs(tmp_path, whole):
+    lines = (whole / RUNS).read_bytes().split(b"\n")
+    (tmp_path / RUNS).write_bytes(b"\n".join([lines[0], b'{"responses": nul', *lines[2:-2], b""]))
+    before = len(calls(whole))
+    with pytest.warns(RuntimeWarning, match="line 2"):
+        study(tmp_path, partial(noting, str(whole / "log")))
+    assert len(calls(whole)) - before == 1
+    assert (tmp_path / PROBLEM).read_bytes() == (whole / PROBLEM).read_bytes()
 
 
 def test_a_file_of_no_runs_is_refused_and_left_alone(tmp_path):
     file = tmp_path / "notes.txt"
     others = '{"inputs": [1, 2], "mine": true}', '{"inputs": ["x", "a"], "mine": true}'
-    for text in ("my notes\n", "my notes", '{"inputs": 3}\n', '{"inputs": ["y"]}\n', *others):
+    for text in (
+        "[" * 100_000 + "\n",
+        "my notes\n",
+        "my notes",
+        '{"inputs": 3}\n',
+        '{"inputs": ["y"]}\n',
+        *others,
+    ):
         file.write_text(text)
         with pytest.raises(InvalidInput, match="cache"):
             RunFile(file, NAMES, None)

@@ -1,7 +1,9 @@
 """Anyone's simulator as a robust problem: accuracy, gradients, refusals, bad arguments."""
 
 import copy
+import math
 import pickle
+from functools import partial, wraps
 
 import chaospy
 import numpy as np
@@ -16,6 +18,7 @@ from pymoo_hdte.problems import (
     Design,
     Mean,
     MeanPlusStd,
+    Quantile,
     Robust,
     Std,
     UntrustedSurrogate,
@@ -103,16 +106,17 @@ def test_prediction_is_near_the_simulator(beam):
 
 
 @pytest.mark.parametrize(
-    ("options", "words"),
+    ("simulator", "options", "words"),
     [
-        ({"budget": 60, "accuracy": 1e-3}, "error of the .* after 60 runs is .* at most 0.001"),
-        ({"budget": 60, "positive": True, "accuracy": 99.0}, "positive response is -"),
+        (cantilever, {"accuracy": 1e-3}, "error of the .* after 60 runs is .* at most 0.001"),
+        (lambda b, h, F, E: b - 0.01, {"positive": True}, "positive response is -"),
     ],
 )
-def test_what_cannot_be_trusted_is_refused_with_the_region(options, words):
+def test_what_cannot_be_trusted_is_refused_with_the_region(simulator, options, words):
     sizes = {name: Design(0.008, 0.05, tolerance=0.02) for name in "bh"}
+    options = {"budget": 60} | options
     with pytest.raises(UntrustedSurrogate, match=words) as refusal:
-        quiet(cantilever, sizes, {"F": FORCE, "E": MODULUS}, **options)
+        quiet(simulator, sizes, {"F": FORCE, "E": MODULUS}, **options)
     assert set(refusal.value.region) & {"b", "h"}
     assert "so where" in str(refusal.value)
     assert str(pickle.loads(pickle.dumps(refusal.value))) == str(refusal.value)
@@ -154,10 +158,18 @@ def test_a_design_that_makes_no_sense_is_refused(arguments, words):
     ("options", "words"),
     [
         ({"accuracy": 0.0}, "accuracy"),
+        ({"accuracy": 1}, "0.01 for 1 %"),
+        ({"accuracy": 5.0}, "0.05 for 5 %"),
         ({"budget": 5}, "budget"),
         ({"objectives": []}, "objectives"),
         ({"objectives": [Mean(response="stress")]}, "stress"),
-        ({"constraints": [Mean()]}, "constraints"),
+        ({"constraints": [Mean(), Mean() <= 1.0]}, r"constraints\[0\].*Mean.*<="),
+        ({"constraints": [Quantile(0.99)]}, r"constraints\[0\].*Quantile.*<="),
+        ({"constraints": Quantile(0.99)}, "constraints.*<="),
+        ({"constraints": Quantile(0.99) <= 1.0}, "constraints.*list"),
+        ({"constraints": [3.0]}, r"constraints\[0\]"),
+        ({"objectives": [Mean() <= 1.0]}, r"objectives\[0\].*constraints"),
+        ({"objectives": Mean()}, "objectives.*list"),
         ({"positive": ["stress"]}, "positive"),
         ({"noise": {"b": FORCE}}, "names of the inputs"),
         ({"noise": {("F", "E"): FORCE}}, "joint distribution"),
@@ -171,6 +183,67 @@ def test_bad_arguments_are_refused_by_name(options, words):
     given = {"designs": SIZES, "noise": {}} | options
     with pytest.raises(InvalidInput, match=words):
         quiet(lambda b, h: b + h, **given)
+
+
+class Plate:
+    """A simulator that is an object."""
+
+    def __call__(self, b, load):
+        return b * load
+
+
+@pytest.mark.parametrize(
+    ("simulator", "inputs", "words"),
+    [
+        (lambda b, load: b * load, "b", "needs load"),
+        (lambda b, *, load: b * load, "b", "needs load"),
+        (lambda b, load, **more: b * load, "b", "needs load"),
+        (partial(lambda b, load, force: b, force=2.0), "b", "needs load"),
+        (Plate(), "b", "needs load"),
+        (Plate().__call__, "b", "needs load"),
+        (lambda b, /: b, "b", "takes no b"),
+        (lambda b: b, "bh", "takes no h"),
+        (lambda b, load: b, "bh", "takes no h.*needs load"),
+        (math.sqrt, "b", "takes no b.*needs x"),
+    ],
+)
+def test_inputs_that_do_not_fit_the_signature_are_told_before_any_run(
+    tmp_path, simulator, inputs, words
+):
+    calls = []
+
+    def never(**given):
+        calls.append(given)
+        return simulator(**given)
+
+    with pytest.raises(InvalidInput, match=words):
+        quiet(simulator, {name: SIZES[name] for name in inputs}, cache=tmp_path / "runs.jsonl")
+    assert not list(tmp_path.iterdir())
+    # Python itself would refuse these calls.
+    with pytest.raises(TypeError):
+        never(**dict.fromkeys(inputs, 1.0))
+
+
+def test_simulators_that_tell_nothing_of_their_arguments_are_called_as_before():
+    def plain(b, load):
+        return b * load
+
+    @wraps(plain)
+    def adapted(**given):
+        return plain(load=2.0, **given)
+
+    class Sealed:
+        __signature__ = "none of Python's"
+
+        def __call__(self, b):
+            return 2.0 * b
+
+    for simulator in (
+        adapted, lambda **given: 2.0 * given["b"], partial(plain, load=2.0), Sealed(),
+        lambda b, load=2.0: b * load,
+    ):  # fmt: skip
+        problem = quiet(simulator, {"b": SIZES["b"]})
+        assert problem.evaluate(np.array([0.03]))[0] == pytest.approx(0.06, rel=1e-6)
 
 
 def test_a_heavy_tail_goes_through_its_normal_coordinate():
