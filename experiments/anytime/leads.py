@@ -6,15 +6,21 @@ from typing import NamedTuple
 
 import numpy as np
 
-from experiments.anytime.data import OF_TABLE_7, Contested, Scores, cases
+from experiments.anytime.data import OF_TABLE_7, Case, Contested, Scores, cases
 from experiments.anytime.duels import COMPARED, duels
-from experiments.anytime.tables import OURS, STATED, WHERE, drawn, exactly
+from experiments.anytime.measures import RETURNED
+from experiments.anytime.tables import OURS, SCALE, STATED, WHERE, drawn, exactly
 from experiments.comparison.runs import AS_PRINTED
 from experiments.runner.result import Cell, Column, Finding, Table
 
 RIVALS = ("MOPSO", "A-MOPSO", "MP-MOPSO", "NSGA-II")
 BUDGETS = (200, 2000)
 """Range of evaluations counted: before the first, sets of two designs; after, all are alike."""
+
+
+AWAY = 0.05
+"""Normalised IGD above which a run misses the front: the distance at which Table 7's page counts a
+piece of the front as lost."""
 
 
 class Lead(NamedTuple):
@@ -54,6 +60,22 @@ def cells_in_order(scores: Scores, contested: Contested) -> tuple[int, int]:
         if _counts(population, budget)
     ]
     return int(np.sum(ordered)), len(ordered)
+
+
+def runs_that_find(scores: Scores, contested: Contested, algorithm: str) -> tuple[int, int]:
+    """Return how many runs at the stated setting find the true front, and of how many."""
+    case = Case(*contested, RETURNED, *STATED, algorithm)
+    igd = scores.of(case, f"igd_{SCALE.suffix}")
+    return int(np.sum(igd <= AWAY)), len(igd)
+
+
+def who_finds(scores: Scores, contested: Contested) -> str:
+    """Say which algorithms of Table 7 find the front at the stated setting; no full stop."""
+    parts = []
+    for algorithm in OF_TABLE_7:
+        found, runs = runs_that_find(scores, contested, algorithm)
+        parts.append(f"{algorithm} in {'all' if found == runs else f'{found} of'} {runs} runs")
+    return f"the front is found by {', '.join(parts[:-1])} and {parts[-1]}"
 
 
 def _counts(population: int, evaluations: int) -> bool:

@@ -233,7 +233,7 @@ def test_residual_spectrum_shows_the_unlisted_line_only():
     assert amplitudes[2].max() == pytest.approx(0.3 * np.sqrt(N_ROWS / 4.0), abs=2.0)
     away = np.abs(orders - 3.0) > 0.02
     np.testing.assert_allclose(amplitudes[2][away], before[2][away], atol=0.6)
-    np.testing.assert_array_equal(amplitudes[:2], before[:2])
+    np.testing.assert_allclose(amplitudes[:2], before[:2], rtol=1e-12)
     assert not np.any(np.isclose(orders, 204 / RATIO))
 
 
@@ -298,4 +298,4 @@ def test_blocks_of_rows_give_the_lines_and_spectrum_of_all_rows(monkeypatch):
         size = largest[:, None] if field.name == "phasors" else np.abs(one).max()
         assert np.all(np.abs(other - one) <= 1e-12 * size)
     np.testing.assert_array_equal(spectra[1][0], spectra[0][0])
-    np.testing.assert_allclose(spectra[1][1], spectra[0][1], rtol=1e-8, atol=1e-9)
+    np.testing.assert_allclose(spectra[1][1], spectra[0][1], rtol=1e-7, atol=1e-9)

@@ -208,8 +208,10 @@ class TestStoredOutcome:
                 today = dict(zip(MEASURES, found[counted, algorithm, 2], strict=True))
                 for name in ("size", *COMPARED.values()):
                     stored = scores.of(case, name)
-                    same.append(stored[1] == pytest.approx(today[name], rel=1e-3))
-                    assert 0.5 * np.nanmin(stored) <= today[name] <= 2.0 * np.nanmax(stored)
+                    same.append(stored[1] == pytest.approx(today[name], rel=1e-3, nan_ok=True))
+                    # A set of two designs has no Spacing, now or then.
+                    if np.isfinite(today[name]):
+                        assert 0.5 * np.nanmin(stored) <= today[name] <= 2.0 * np.nanmax(stored)
         assert np.mean(same) > 0.7
 
     @pytest.mark.parametrize(
