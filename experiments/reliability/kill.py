@@ -21,6 +21,7 @@ import numpy as np
 
 from experiments.runner.campaign import Run
 from experiments.runner.store import TIMES
+from pymoo_hdte.io import whole_file
 
 SEED = 20261123
 ROOT = Path(__file__).parents[2]
@@ -157,20 +158,20 @@ def whole(path: Path) -> bool:
 
 def _die_at(step: int) -> None:
     """Have this process killed in one of the steps in which `write_atomically` writes files."""
-    write, replace, left = Path.write_bytes, os.replace, iter(range(step - 1, -1, -1))
+    write, replace, left = whole_file.write_all, os.replace, iter(range(step - 1, -1, -1))
 
-    def half_written(path: Path, content: bytes) -> int:
+    def half_written(descriptor: int, content: bytes) -> None:
         if next(left, None) == 0:
-            write(path, content[: len(content) // 2])
+            write(descriptor, content[: len(content) // 2])
             os.kill(os.getpid(), signal.SIGKILL)
-        return write(path, content)
+        write(descriptor, content)
 
     def not_named(source: Path, target: Path) -> None:
         if next(left, None) == 0:
             os.kill(os.getpid(), signal.SIGKILL)
         replace(source, target)
 
-    Path.write_bytes, os.replace = half_written, not_named  # type: ignore[method-assign,assignment]
+    whole_file.write_all, os.replace = half_written, not_named  # type: ignore[assignment]
 
 
 if __name__ == "__main__":

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import make_interp_spline
 
 from pymoo_hdte.checks import InvalidInput, real_number
+from pymoo_hdte.io.budget import memory_told, regular_file
 from pymoo_hdte.io.even_steps import LONGEST_STEP, even_steps, is_even
 from pymoo_hdte.io.layout import CHANNEL_UNITS, Channel, TableLayout, layout_from_fields
 from pymoo_hdte.io.matlab import read_vectors
@@ -120,7 +121,7 @@ def read_table(
     Rows at uneven times are brought to even steps, as `even_steps` has it.
 
     Raises `OSError` if the file cannot be read and `InvalidInput`, with file and line (MATLAB:
-    row), if it is damaged, a column is missing, ragged or holds text or a huge number, too few
+    row), if it is damaged, larger than its `Budget` or the memory allows, a column is missing, ragged or holds text or a huge number, too few
     rows are finite or too many at a time are not, or time does not rise or leaves a gap.
     """
     read = read_columns(path, layout, gaps=True, seen=seen)
@@ -189,7 +190,9 @@ def check_sha256(path: Path, expected: str) -> None:
     """Raise `InvalidInput` unless the sha256 of a file begins with these 8 or more digits."""
     if not isinstance(expected, str) or not re.fullmatch("[0-9a-fA-F]{8,64}", expected):
         raise InvalidInput("expected sha256", expected, "8 to 64 hexadecimal digits")
-    actual = hashlib.sha256(path.read_bytes()).hexdigest()
+    regular_file(path)
+    with path.open("rb") as file:
+        actual = hashlib.file_digest(file, "sha256").hexdigest()
     if not actual.startswith(expected.lower()):
         raise InvalidInput(f"{path.name}: sha256", actual, f"one that begins with {expected}")
 
@@ -215,6 +218,11 @@ def read_columns(
     OSError
         If the file cannot be read.
     """
+    with memory_told(path):
+        return _columns(path, layout, gaps, seen)
+
+
+def _columns(path: Path, layout: TableLayout, gaps: bool, seen: Seen | None) -> Columns:
     mapped = [*([layout.time] if layout.time else []), *layout.channels.values()]
     names: list[Any] = list(dict.fromkeys(channel.column for channel in mapped))
     if layout.format == "matlab" or (layout.format == "csv" and path.suffix == ".mat"):

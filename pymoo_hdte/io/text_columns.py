@@ -19,6 +19,9 @@ from pymoo_hdte.io.text_lines import Block, Row
 DECIMALS = {"point": ".", "comma": ","}
 """What may stand before the decimals of a number, by name."""
 
+_MOST_COMPARED = 1000
+"""Titles among which one is looked for that is like a missing one, which takes a while each."""
+
 
 @dataclass(frozen=True, eq=False)
 class TextTable:
@@ -69,6 +72,8 @@ class TextTable:
         titles = [one for one in self.titles if isinstance(one, str)]
         if titles and all(map(begins_as_number, titles)):
             return "; a file without titles has columns that are called by numbers, from 0"
+        if len(titles) > _MOST_COMPARED:
+            return ""
         near = [(name, get_close_matches(str(name), titles, 1, 0.4)) for name in missing]
         found = [f"is {name} {one[0]!r}?" for name, one in near if one]
         return f"; {' '.join(found)}" if found else ""

@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import BinaryIO, cast
 
 from pymoo_hdte.checks import InvalidInput
+from pymoo_hdte.io.budget import Budget, regular_file
 
 BLOCK = 1 << 22
 """Characters of a block."""
@@ -72,25 +73,33 @@ def line_blocks(
     Raises
     ------
     InvalidInput
-        For a file that is no such text, or not compressed as its name says.
+        For a file that is no such text, not compressed as its name says, or above its `Budget`.
     OSError
         If it cannot be read.
     """
+    budget, size_of_file = Budget.now(), regular_file(path)
+    if path.suffix != ".gz":
+        budget.check("bytes", size_of_file, path.name)
     with path.open("rb") as raw:
         blank: list[str] = []
-        start, done = 1, 0
-        for lines in _lines(path, kind, raw, size):
-            lines = blank + lines
+        start, done, characters = 1, 0, 0
+        for lines in _lines(path, kind, raw, size, budget):
             kept = len(lines)
             while kept and not lines[kept - 1].strip():
                 kept -= 1
-            blank = lines[kept:]
             if seen:
                 seen(raw.tell() - done)
                 done = raw.tell()
+            further = lines[kept:]
             if kept:
-                yield range(start, start + kept), lines[:kept]
-                start += kept
+                lines = blank + lines[:kept]
+                budget.check("rows", start + len(lines) - 1, f"{path.name}: lines")
+                yield range(start, start + len(lines)), lines
+                start += len(lines)
+                blank, characters = [], 0
+            blank += further
+            characters += sum(map(len, further)) + len(further)
+            budget.check("characters", characters, f"{path.name}, line {start}: blank lines")
 
 
 def lines_below(blocks: Iterable[Lines], line: int, skip: int) -> Iterator[Lines]:
@@ -104,37 +113,68 @@ def lines_below(blocks: Iterable[Lines], line: int, skip: int) -> Iterator[Lines
 
 def unquoted_rows(file: str, blocks: Iterator[Lines], mark: str) -> Iterator[Block]:
     """Yield rows, cut into cells in blocks with quotes; a quoted cell may have several lines."""
-    for numbers, lines in blocks:
+    most = Budget.now().characters
+    rest: Lines | None = None
+    while block := rest or next(blocks, None):
+        rest = None
+        numbers, lines = block
         quotes = _quotes(lines)
         if not quotes:
             yield numbers, cast("list[Row]", lines)
             continue
-        numbers, lines = list(numbers), list(lines)
-        # A cell that begins in this block may end in another.
-        while quotes % 2 and (further := next(blocks, None)):
-            numbers += further[0]
-            lines += further[1]
-            quotes += _quotes(further[1])
+        if quotes % 2:
+            # A cell that begins in this block may end in another.
+            further, ends = _to_the_end(blocks, most)
+            numbers, lines = [*numbers, *further[0][:ends]], [*lines, *further[1][:ends]]
+            rest = (further[0][ends:], further[1][ends:]) if ends < len(further[1]) else None
         yield _cut(file, numbers, lines, mark)
+
+
+def _to_the_end(blocks: Iterator[Lines], most: int) -> tuple[Lines, int]:
+    """Return lines in which an open cell may end, and how many it takes: 0 if it does not end."""
+    numbers: list[int] = []
+    lines: list[str] = []
+    characters = 0
+    while characters <= most and (block := next(blocks, None)):
+        for count, line in enumerate(block[1], len(lines) + 1):
+            characters += len(line) + 1
+            if line.count('"') % 2 or characters > most:
+                ends = count if line.count('"') % 2 else 0
+                return ([*numbers, *block[0]], [*lines, *block[1]]), ends
+        numbers += block[0]
+        lines += block[1]
+    return (numbers, lines), len(lines)
 
 
 def _quotes(lines: list[str]) -> int:
     return sum(map(str.count, lines, repeat('"')))
 
 
-def _lines(path: Path, kind: str, raw: BinaryIO, size: int) -> Iterator[list[str]]:
+def _lines(
+    path: Path, kind: str, raw: BinaryIO, size: int, budget: Budget
+) -> Iterator[list[str]]:
     packed = path.suffix == ".gz"
     binary = cast("BinaryIO", gzip.GzipFile(fileobj=raw)) if packed else raw
     # With the surrogates of bytes that are no text, so that their line can be told.
     text = io.TextIOWrapper(binary, "utf-8-sig", "surrogateescape")
     rest, done = "", 0
+
+    def long(length: int, line: int) -> None:
+        budget.check("characters", length, f"{path.name}, line {line}: a line")
+
     try:
         while found := text.read(size):
+            budget.check("bytes", binary.tell(), f"{path.name}, expanded")
             whole, end, rest = (rest + found).rpartition("\n")
             if end:
                 _check(path, kind, whole, done)
-                done += whole.count("\n") + 1
-                yield whole.split("\n")
+                lines = whole.split("\n")
+                lengths = list(map(len, lines))
+                longest = max(lengths)
+                long(longest + 1, done + lengths.index(longest) + 1)
+                done += len(lines)
+                yield lines
+            long(len(rest), done + 1)
     except (gzip.BadGzipFile, EOFError, zlib.error) as error:
         raise InvalidInput(path.name, str(error), f"gzip-compressed {kind} in UTF-8") from None
     finally:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import re
 import tomllib
 from collections.abc import Iterator, Mapping
@@ -13,7 +14,14 @@ import numpy as np
 import tomli_w
 
 from pymoo_hdte.checks import InvalidInput
+from pymoo_hdte.io.budget import LARGEST_TOML, regular_file
 from pymoo_hdte.io.fields import Fields
+
+
+_DEEPEST_KEY = 50
+_PART = r"""(?:[\w-]+|"[^"\n]*"|'[^'\n]*')[ \t]*\.[ \t]*"""
+_DEEP_KEY = re.compile(rf"(?<![\w-])(?:{_PART}){{{_DEEPEST_KEY}}}")
+"""The time of tomllib grows with the square of a key's parts: 40,000 of them take a minute."""
 
 
 def toml_text(table: Mapping[str, Any]) -> str:
@@ -60,7 +68,7 @@ def read_toml(path: Path) -> Fields:
     Raises
     ------
     InvalidInput
-        If the file is not valid TOML.
+        If the file is not valid TOML, larger than `budget.LARGEST_TOML`, a pipe or a device.
     OSError
         If it cannot be read.
     """
@@ -74,7 +82,7 @@ def toml_with_lines(path: Path) -> Iterator[Fields]:
     Raises
     ------
     InvalidInput
-        If the file is not valid TOML, or whatever is raised inside the block.
+        As `read_toml`, or whatever is raised inside the block.
     OSError
         If it cannot be read.
     """
@@ -91,8 +99,15 @@ def toml_with_lines(path: Path) -> Iterator[Fields]:
 
 def _parsed(path: Path, named: str) -> tuple[str, dict[str, Any]]:
     """Return the text of a file and its top table."""
+    regular_file(path)
+    with path.open("rb") as file:
+        content = file.read(LARGEST_TOML + 1)
+    if len(content) > LARGEST_TOML:
+        raise InvalidInput(named, f"more than {LARGEST_TOML} bytes", f"at most {LARGEST_TOML} bytes")
     try:
-        text = path.read_text(encoding="utf-8")
+        text = io.TextIOWrapper(io.BytesIO(content), encoding="utf-8").read()
+        if _DEEP_KEY.search(text):
+            raise ValueError(f"a key of more than {_DEEPEST_KEY} parts")
         return text, tomllib.loads(text)
     except (ValueError, RecursionError) as error:
         # Besides invalid TOML: too many digits for Python, and brackets nested too deeply.

@@ -3,7 +3,12 @@
 from __future__ import annotations
 
 import os
+import secrets
 from pathlib import Path
+
+_NEW_FILE = os.O_WRONLY | os.O_CREAT | os.O_EXCL
+_FLAGS = _NEW_FILE | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_BINARY", 0)
+"""Of a file that is not there yet: no link that somebody has put in its place is followed."""
 
 
 def write_whole(path: Path, content: bytes) -> None:
@@ -14,10 +19,24 @@ def write_whole(path: Path, content: bytes) -> None:
     OSError
         If it cannot be written; what was there before is then still there.
     """
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+    # A name that nobody can foresee; tempfile would make a file that others must not read.
+    temporary = path.with_name(f".{path.name}.{secrets.token_hex(8)}.tmp")
+    descriptor = os.open(temporary, _FLAGS, 0o666)
     try:
-        temporary.write_bytes(content)
+        write_all(descriptor, content)
         os.replace(temporary, path)
     finally:
         # On a full disk a partial file remains, which would keep the disk full.
         temporary.unlink(missing_ok=True)
+
+
+def write_all(descriptor: int, content: bytes) -> None:
+    """Write to an open file and close it.
+
+    Raises
+    ------
+    OSError
+        If it cannot be written.
+    """
+    with os.fdopen(descriptor, "wb") as file:
+        file.write(content)

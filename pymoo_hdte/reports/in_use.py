@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 import platform
+import stat
 import sys
 import time
 from collections.abc import Iterator
@@ -20,6 +22,8 @@ if sys.platform != "win32":
 
 _TRIES = 100
 """How often a folder that vanishes while a file is opened in it is made again; by hand."""
+_LINK = (errno.ELOOP, errno.EMLINK)
+"""What systems say of a link that is not followed: Linux and macOS, FreeBSD."""
 
 
 @contextmanager
@@ -41,7 +45,8 @@ def in_use(file: Path, field: str, folder: Path) -> Iterator[None]:
     Raises
     ------
     InvalidInput
-        If another process holds it; the message names that process.
+        If another process holds it; the message names that process. If the file is there as a link
+        or anything but a regular file.
     OSError
         If the file cannot be made.
     """
@@ -71,11 +76,11 @@ def in_use(file: Path, field: str, folder: Path) -> Iterator[None]:
 def _locked(file: Path, field: str, folder: Path) -> IO[str]:
     """Return the open file with its lock, as soon as it is the file of that name."""
     while True:
-        lock = _opened(file)
+        lock = _opened(file, field, folder)
         try:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
             with suppress(FileNotFoundError):
-                if os.path.samestat(file.stat(), os.fstat(lock.fileno())):
+                if os.path.samestat(file.lstat(), os.fstat(lock.fileno())):
                     return lock
         except BlockingIOError:
             allowed = f"a folder that no other command writes to; {_holder(lock)}"
@@ -84,16 +89,28 @@ def _locked(file: Path, field: str, folder: Path) -> IO[str]:
         lock.close()
 
 
-def _opened(file: Path) -> IO[str]:
+def _opened(file: Path, field: str, folder: Path) -> IO[str]:
+    # It will be overwritten, and with it whatever a link leads to or shares its content.
+    allowed = f"a folder where {file.name} is no link, pipe or device, since it is overwritten"
+    flags = os.O_RDWR | os.O_CREAT | os.O_APPEND | os.O_NOFOLLOW | os.O_NONBLOCK
     for left in reversed(range(_TRIES)):
         try:
             file.parent.mkdir(parents=True, exist_ok=True)
-            return open(file, "a+", encoding="utf-8")
+            descriptor = os.open(file, flags, 0o666)
+            break
         except (FileNotFoundError, FileExistsError):
             # Whoever held it may just be removing the folders that it made.
             if not left:
                 raise
-    raise AssertionError
+        except OSError as error:
+            if error.errno not in _LINK:
+                raise
+            raise InvalidInput(field, str(folder), allowed) from None
+    status = os.fstat(descriptor)
+    if not stat.S_ISREG(status.st_mode) or status.st_nlink > 1:
+        os.close(descriptor)
+        raise InvalidInput(field, str(folder), allowed)
+    return os.fdopen(descriptor, "a+", encoding="utf-8")
 
 
 def _describe(lock: IO[str]) -> None:

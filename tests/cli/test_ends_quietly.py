@@ -130,6 +130,23 @@ def test_a_folder_in_use_is_refused_with_the_process_that_holds_it(tmp_path):
     assert not file.exists()
 
 
+@pytest.mark.parametrize("kind", ["symbolic", "dangling", "hard", "pipe"])
+def test_nothing_is_written_through_what_somebody_put_in_the_place_of_the_lock(tmp_path, kind):
+    target, lock = tmp_path / "thesis.txt", tmp_path / ".out.in-use"
+    target.write_text("years of work")
+    if kind == "hard":
+        os.link(target, lock)
+    elif kind == "pipe":
+        os.mkfifo(lock)
+    else:
+        lock.symlink_to(target if kind == "symbolic" else tmp_path / "nowhere")
+    holding = in_use(lock, "folder of the report", tmp_path / "out")
+    with pytest.raises(InvalidInput, match="in-use"), holding:
+        pass
+    assert target.read_text() == "years of work"
+    assert {one.name for one in tmp_path.iterdir()} == {"thesis.txt", ".out.in-use"}
+
+
 def test_folders_made_for_the_lock_go_with_it(tmp_path):
     again = in_use(tmp_path / "a" / "b" / "lock", "folder", tmp_path)
     with in_use(tmp_path / "a" / "b" / "lock", "folder", tmp_path):

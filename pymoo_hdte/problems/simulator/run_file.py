@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import stat
 import sys
 import weakref
 from collections.abc import Callable
@@ -97,6 +98,8 @@ class RunFile:
         binary = getattr(os, "O_BINARY", 0)
         self._descriptor = os.open(self.path, os.O_RDWR | os.O_CREAT | os.O_APPEND | binary, 0o666)
         weakref.finalize(self, os.close, self._descriptor)
+        if not stat.S_ISREG(os.fstat(self._descriptor).st_mode):
+            raise InvalidInput("cache", str(self.path), "a regular file, no pipe or device")
         if sys.platform == "win32":
             return
         try:
