@@ -1,4 +1,4 @@
-"""Measured tables in MATLAB files, CSV and plain text, mapped to channels in SI by a layout."""
+"""Measured tables in files of text or of arrays, mapped to channels in SI by a layout."""
 
 from __future__ import annotations
 
@@ -14,12 +14,13 @@ from numpy.typing import NDArray
 from scipy.interpolate import make_interp_spline
 
 from pymoo_hdte.checks import InvalidInput, real_number
+from pymoo_hdte.io.array_files import READERS, format_of, read_arrays
 from pymoo_hdte.io.budget import memory_told, regular_file
 from pymoo_hdte.io.even_steps import LONGEST_STEP, even_steps, is_even
 from pymoo_hdte.io.layout import CHANNEL_UNITS, Channel, TableLayout, layout_from_fields
-from pymoo_hdte.io.matlab import read_vectors
 from pymoo_hdte.io.parts import Part
 from pymoo_hdte.io.text_columns import TextTable, column_label
+from pymoo_hdte.io.text_header import numbered
 from pymoo_hdte.io.text_lines import Seen
 from pymoo_hdte.io.text_table import LARGEST, read_text_table
 from pymoo_hdte.units import ORIGINS
@@ -42,9 +43,11 @@ class Columns:
     raw : dict of str or int to ndarray, shape (n,)
         By title, or by number in a plain table.
     text : TextTable or None
-        None for a MATLAB file.
+        None for a file of arrays.
     length : int
         Number of rows.
+    above : int
+        Rows of a file without text that stand above the first of numbers.
     """
 
     path: Path
@@ -52,6 +55,7 @@ class Columns:
     raw: dict[Any, NDArray[np.float64]]
     text: TextTable | None
     length: int
+    above: int = 0
 
     def si(self, channel: Channel, rows: slice = slice(None)) -> NDArray[np.float64]:
         """Return a channel in SI, shape (n,); what is not finite is interpolated if any is."""
@@ -82,7 +86,7 @@ class Columns:
 
     def place(self, row: int, what: str | None = None) -> str:
         """Return where in the file a row stands, for errors about it or about one of its cells."""
-        row_of_file = row + self.layout.skip_rows + 1
+        row_of_file = row + self.above + self.layout.skip_rows + 1
         place = f"line {self.text.lines[row]}" if self.text else f"row {row_of_file}"
         return f"{self.path.name}, {place}" + ("" if what is None else f": {what}")
 
@@ -91,8 +95,8 @@ class Columns:
         """Where all rows stand."""
         if self.text:
             return f"{self.path.name}, lines {self.text.lines[0]} to {self.text.lines[-1]}"
-        first = self.layout.skip_rows + 1
-        last = self.layout.skip_rows + self.length
+        first = self.above + self.layout.skip_rows + 1
+        last = first + self.length - 1
         return f"{self.path.name}, rows {first} to {last}"
 
 
@@ -225,27 +229,37 @@ def read_columns(
 def _columns(path: Path, layout: TableLayout, gaps: bool, seen: Seen | None) -> Columns:
     mapped = [*([layout.time] if layout.time else []), *layout.channels.values()]
     names: list[Any] = list(dict.fromkeys(channel.column for channel in mapped))
-    if layout.format == "matlab" or (layout.format == "csv" and path.suffix == ".mat"):
-        vectors = read_vectors(path, names)
+    form = format_of(path, layout.format)
+    if form in READERS:
+        arrays = read_arrays(path, form, [str(name) for name in names])
         if seen:
             seen(path.stat().st_size)
-        raw = {name: vectors[name][layout.skip_rows :] for name in names}
-        read = Columns(path, layout, raw, None, len(raw[names[0]]))
+        raw = {name: arrays.vectors[str(name)][layout.skip_rows :] for name in names}
+        read = Columns(path, layout, raw, None, len(raw[names[0]]), arrays.above)
         for name in names if not gaps else ():
             for row in np.flatnonzero(~np.isfinite(raw[name]))[:1]:
                 place = read.place(int(row), column_label(name))
                 raise InvalidInput(place, float(raw[name][row]), "a finite number")
         return read
-    titled = layout.format == "csv"
+    titled = form == "csv"
+    counted = titled and any(isinstance(name, int) for name in names)
+    if counted and not all(isinstance(name, int) for name in names):
+        raise InvalidInput(f"{path.name}: columns", names, "titles for all, or numbers for all")
     table = read_text_table(
         path,
         titled=titled,
         skip_rows=layout.skip_rows,
-        wanted=[str(name) for name in names] if titled else (),
+        wanted=names if titled else (),
         delimiter=layout.delimiter,
         decimal=layout.decimal,
+        encoding=layout.encoding,
         seen=seen,
     )
+    if counted:
+        titles = {name: numbered(name) for name in names}
+        found = table.numbers(list(titles.values()), gaps=gaps)
+        raw = {name: found[title] for name, title in titles.items()}
+        return Columns(path, layout, raw, table, len(raw[names[0]]))
     for channel in mapped:
         _check_unit(table, channel)
     raw = table.numbers(names, gaps=gaps)

@@ -15,6 +15,7 @@ import tomli_w
 
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.io.budget import LARGEST_TOML, regular_file
+from pymoo_hdte.io.encodings import decoded
 from pymoo_hdte.io.fields import Fields
 
 
@@ -105,7 +106,7 @@ def _parsed(path: Path, named: str) -> tuple[str, dict[str, Any]]:
     if len(content) > LARGEST_TOML:
         raise InvalidInput(named, f"more than {LARGEST_TOML} bytes", f"at most {LARGEST_TOML} bytes")
     try:
-        text = io.TextIOWrapper(io.BytesIO(content), encoding="utf-8").read()
+        text = io.StringIO(decoded(content), newline=None).read()
         if _DEEP_KEY.search(text):
             raise ValueError(f"a key of more than {_DEEPEST_KEY} parts")
         return text, tomllib.loads(text)
