@@ -28,7 +28,9 @@ Exit codes: 0 a verdict was reached, whatever it is; 2 the input is at fault."""
 
 
 def _add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("campaign", type=Path, metavar="CAMPAIGN", help="folder of the campaign")
+    parser.add_argument(
+        "campaign", type=Path, metavar="CAMPAIGN", help="folder of the campaign, or its .toml file"
+    )
     parser.add_argument(
         "--data", type=Path, metavar="DIR", help="folder of the records that rig.toml names"
     )
@@ -91,6 +93,8 @@ def _measured(folder: Path, data: Path | None, progress: Callable[[int, int], No
     from pymoo_hdte.discrepancy.campaign.format import CAMPAIGN_FILE
     from pymoo_hdte.discrepancy.mechanism.files import RIG_FILE
 
+    if folder.name == CAMPAIGN_FILE and folder.is_file():
+        folder = folder.parent
     if (folder / RIG_FILE).is_file() or folder.suffix == ".toml":
         return read_rig(folder, data, progress)
     if data is not None:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import hashlib
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -125,9 +126,32 @@ def read_table(
     Rows at uneven times are brought to even steps, as `even_steps` has it.
 
     Raises `OSError` if the file cannot be read and `InvalidInput`, with file and line (MATLAB:
-    row), if it is damaged, larger than its `Budget` or the memory allows, a column is missing, ragged or holds text or a huge number, too few
-    rows are finite or too many at a time are not, or time does not rise or leaves a gap.
+    row), if it is damaged, larger than its `Budget` or the memory allows, a column is missing,
+    ragged or holds text or a huge number, too few rows are finite or too many at a time are not, or
+    time does not rise or leaves a gap.
     """
+    return _tables(path, layout, seen, part, split=False)[0]
+
+
+def read_unbroken_tables(
+    path: Path, layout: TableLayout, seen: Seen | None = None, part: Part | None = None
+) -> list[Table]:
+    """Read the mapped columns as `read_table` does; a gap in time begins another table.
+
+    Of more gaps than one in `ROWS_PER_FILLED` rows the file is refused, as by `read_table`. Tables
+    shorter than one row in as many are left out.
+
+    Returns
+    -------
+    list of Table
+        At least one; each remark says how the file was divided.
+    """
+    return _tables(path, layout, seen, part, split=True)
+
+
+def _tables(
+    path: Path, layout: TableLayout, seen: Seen | None, part: Part | None, split: bool
+) -> list[Table]:
     read = read_columns(path, layout, gaps=True, seen=seen)
     rows = _part_of(read, part)
     columns = {name: raw[rows] for name, raw in read.raw.items()}
@@ -162,7 +186,9 @@ def read_table(
     time, dropped = read.time[kept], int(np.count_nonzero(~finite))
     steps = np.diff(time)
     mean, usual = float(np.mean(steps)), float(np.median(steps))
-    for row in np.flatnonzero((steps <= 0.0) | (steps > LONGEST_STEP * mean))[:1]:
+    falls, leaps = steps <= 0.0, steps > LONGEST_STEP * mean
+    pieces = _pieces(steps, usual) if split and leaps.any() and not falls.any() else []
+    for row in np.flatnonzero(falls | leaps)[:1] if not pieces else ():
         allowed = (
             f"rising by the median step, {usual:g} s, within 1 %, or unevenly, by at most "
             f"{LONGEST_STEP * mean:.4g} s, {LONGEST_STEP:g} mean steps; or take a sample_rate, or "
@@ -170,6 +196,44 @@ def read_table(
         )
         column = layout.time.column if layout.time else next(iter(columns))
         raise refuse(start + int(row) + 1, column, allowed)
+    if not pieces:
+        return [_even_table(read, kept, dropped)]
+    first = int(np.argmax(steps > LONGEST_STEP * usual))
+    out = len(time) - sum(piece.stop - piece.start for piece in pieces)
+    said = (
+        f"{path.name} leaves gaps of up to {1e3 * float(steps.max()):.4g} ms between rows that are "
+        f"{1e3 * usual:.4g} ms apart, the first after {read.place(kept.start + first)}. The rows "
+        f"between gaps are records of their own, {len(pieces)} in number."
+    ) + (f" Rows of shorter parts are left out: {out}." if out else "")
+    tables = [
+        _even_table(
+            read,
+            slice(kept.start + piece.start, kept.start + piece.stop),
+            0 if number else dropped,
+        )
+        for number, piece in enumerate(pieces)
+    ]
+    return [replace(one, remark=f"{said} {one.remark}".strip()) for one in tables]
+
+
+def _pieces(steps: NDArray[np.float64], usual: float) -> list[slice]:
+    """Return the rows between gaps in time that are long enough to use; none if gaps are many."""
+    ends = np.flatnonzero(steps > LONGEST_STEP * usual) + 1
+    rows = len(steps) + 1
+    if len(ends) * ROWS_PER_FILLED >= rows:
+        return []
+    limits = [0, *ends.tolist(), rows]
+    least = max(FEWEST_ROWS, rows // ROWS_PER_FILLED)
+    return [
+        slice(first, last)
+        for first, last in pairwise(limits)
+        if last - first >= least
+    ]
+
+
+def _even_table(read: Columns, kept: slice, dropped: int) -> Table:
+    """Return rows without a gap in time, at even steps."""
+    layout, time = read.layout, read.time[kept]
     # Turns of an angle that wraps, and rates, count from the first row of the file.
     signals = {name: read.si(channel)[kept] for name, channel in layout.channels.items()}
     remark, interpolated = "", False

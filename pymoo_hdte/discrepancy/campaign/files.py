@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from pymoo_hdte.checks import InvalidInput
+from pymoo_hdte.checks import Complaints, InvalidInput, complaints_of
 from pymoo_hdte.discrepancy.campaign.believed import BelievedDrive, Rig
 from pymoo_hdte.discrepancy.campaign.believed_model import (
     believed_from_fields,
@@ -49,7 +49,8 @@ def read_campaign(
     Parameters
     ----------
     folder : str or Path
-        With ``campaign.toml`` and a file for each record, as ``docs/campaign_format.md`` says.
+        With ``campaign.toml`` and a file for each record, as ``docs/campaign_format.md`` says; or
+        the path of its ``campaign.toml``.
     rules : Rules
         Thresholds of what `Campaign` refuses.
     progress : callable, optional
@@ -74,6 +75,9 @@ def read_campaign(
     50
     """
     folder = Path(folder)
+    if folder.name == CAMPAIGN_FILE and folder.is_file():
+        folder = folder.parent
+    complaints = Complaints()
     with toml_with_lines(folder / CAMPAIGN_FILE) as top:
         title, drive = top.text("title"), top.text("drive")
         believed = believed_from_fields(top, folder) if top.has("model") else _believed(top)
@@ -89,19 +93,28 @@ def read_campaign(
         shared = layout_from_fields(table, LAYOUT) if table else LAYOUT
         places = [f"{CAMPAIGN_FILE}.record[{index}]" for index in range(len(entries))]
         pairs = list(zip(entries, places, strict=True))
-        paths = [record_path(entry, place, folder) for entry, place in pairs]
+        paths: list[Path] = []
+        for entry, place in pairs:
+            with complaints.noted():
+                paths.append(record_path(entry, place, folder))
+        complaints.finish()
         seen = told(progress, paths)
-        files = [
-            read_record(entry, place, path, believed.ratio, shared, seen)
-            for (entry, place), path in zip(pairs, paths, strict=True)
-        ]
+        files: list[FileOfRecord] = []
+        for (entry, place), path in zip(pairs, paths, strict=True):
+            with complaints.noted():
+                files.append(read_record(entry, place, path, believed.ratio, shared, seen))
+        complaints.finish()
         records = [one.record for one in files]
         running = tuple(record for record in records if isinstance(record, RunningRecord))
         torsion = tuple(record for record in records if isinstance(record, TorsionRecord))
         try:
             return Campaign(title, drive, believed, rig, running, torsion, rules, **enough)
         except InvalidInput as error:
-            raise _placed_in_files(error, files) from None
+            for complaint in complaints_of(error):
+                with complaints.noted():
+                    raise _placed_in_files(complaint, files) from None
+        complaints.finish()
+        raise AssertionError("a campaign that is refused has a reason")
 
 
 def write_campaign(campaign: Campaign, folder: str | Path) -> None:

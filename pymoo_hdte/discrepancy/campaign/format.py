@@ -93,6 +93,9 @@ TEMPERATURE = "temperature"
 """Channel of the drive's temperature, of which a record has the mean; or else its field has it."""
 TEMPERATURE_FIELD = "temperature_C"
 
+TRANSMISSION_ERROR = "transmission_error"
+"""Channel of a measured transmission error, in the place of one of the angles."""
+
 LAYOUT = TableLayout(
     format="csv",
     channels={
@@ -105,8 +108,8 @@ LAYOUT = TableLayout(
         )
         for column, _ in (COLUMNS[channel],)
     }
-    # No column has the temperature unless the campaign says which.
-    | {TEMPERATURE: Channel("", "C")},
+    # No column has these unless the campaign says which.
+    | {TEMPERATURE: Channel("", "C"), TRANSMISSION_ERROR: Channel("", "rad")},
     time=Channel(COLUMNS["time"][0], "s"),
     sample_rate=None,
     skip_rows=0,
