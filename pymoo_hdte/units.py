@@ -113,9 +113,7 @@ _KNOWN = {
     _plain(written): unit for unit, others in _SPELLINGS.items() for written in (unit, *others)
 } | {unit: unit for units in UNITS.values() for unit in units}
 _BROUGHT_IN = {
-    _plain(written): unit
-    for unit, (_, _, others) in FOREIGN.items()
-    for written in (unit, *others)
+    _plain(written): unit for unit, (_, _, others) in FOREIGN.items() for written in (unit, *others)
 }
 
 
@@ -150,9 +148,7 @@ def suggestion(unit: str, units: Collection[str]) -> str:
     if foreign is not None and FOREIGN[foreign][0] in units:
         known, factor, _ = FOREIGN[foreign]
         return f'; for {unit} write unit = "{known}" and scale = {factor:.6g}'
-    folded = {
-        written.casefold(): meant for written, meant in _KNOWN.items() if meant in units
-    }
+    folded = {written.casefold(): meant for written, meant in _KNOWN.items() if meant in units}
     near = get_close_matches(_plain(unit).casefold(), folded, 1)
     return f"; is it {folded[near[0]]!r}?" if near else ""
 

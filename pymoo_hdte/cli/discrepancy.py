@@ -64,12 +64,17 @@ def _run(options: argparse.Namespace, say: Say) -> Outcome:
         for effect in () if options.effects is None else own_effects(options.effects):
             register(effect)
         with told_by_line(options.effects):
-            document = _analysed(options, believed, say)
-    return Outcome(document, _summary(document, options.out))
+            document, hint = _analysed(options, believed, say)
+    return Outcome(document, _summary(document, hint, options.out))
 
 
-def _analysed(options: argparse.Namespace, believed: ModelFiles, say: Say) -> dict[str, Any]:
-    """Analyse a campaign or a rig and write its report; return the verdict's document."""
+def _analysed(
+    options: argparse.Namespace, believed: ModelFiles, say: Say
+) -> tuple[dict[str, Any], str]:
+    """Analyse a campaign or a rig and write its report; return the verdict's document and a hint.
+
+    The hint is on the place of a sensor and often empty.
+    """
     from pymoo_hdte.cli.reading_bar import ReadingBar, SimulationBar
     from pymoo_hdte.discrepancy import analyse
 
@@ -84,7 +89,17 @@ def _analysed(options: argparse.Namespace, believed: ModelFiles, say: Say) -> di
     say("proving it on the records that were held out")
     analysis.prove()
     say("choosing the next test and writing the report")
-    return analysis.report(options.out)
+    document = analysis.report(options.out)
+    return document, _hint(measured, document["status"])
+
+
+def _hint(measured: Any, status: str) -> str:
+    """Return what a verdict of an unknown effect may come from, or nothing."""
+    from pymoo_hdte.discrepancy import Campaign
+    from pymoo_hdte.discrepancy.campaign.sensor_place import sensor_hint
+
+    unknown = isinstance(measured, Campaign) and status == "unlisted"
+    return sensor_hint(measured) if unknown else ""
 
 
 def _measured(folder: Path, data: Path | None, progress: Callable[[int, int], None]) -> Any:
@@ -121,7 +136,7 @@ def _believing(measured: Any, model: Path | None, sheet: Path | None) -> Any:
     return measured.believing(read)
 
 
-def _summary(document: dict[str, Any], out: Path) -> str:
+def _summary(document: dict[str, Any], hint: str, out: Path) -> str:
     torsion: dict[str, Any] = document.get("torsion", {"effects": [], "limits": []})
     names = " + ".join(_name(one) for one in (*document["effects"], *torsion["effects"]))
     lines = [
@@ -133,6 +148,7 @@ def _summary(document: dict[str, Any], out: Path) -> str:
         *document["limits"],
         *_remarks(document.get("record_remarks", [])),
         *torsion["limits"],
+        *([hint] if hint else []),
         f"Next: {document['next_experiment']['description']}",
         *([f"For the torsion: {test}"] if (test := torsion.get("next_experiment")) else []),
         f"Report: {out / PAGE_FILE}",

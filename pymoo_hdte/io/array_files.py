@@ -79,7 +79,9 @@ def _library(name: str, path: Path) -> Any:
         allowed = f'a file that needs {name}, after: pip install "{EXTRA}"'
         if path.suffix == ".mat":
             allowed += "; or save it as v5 or v7"
-        raise InvalidInput(path.name, f"a file for {name}, which is not installed", allowed) from None
+        raise InvalidInput(
+            path.name, f"a file for {name}, which is not installed", allowed
+        ) from None
 
 
 def _checked(
@@ -91,8 +93,10 @@ def _checked(
         values = arrays.get(name)
         shape = None if values is None else list(values.shape)
         right = values is not None and values.dtype.kind in "iuf" and values.size
-        if not right or values.size != max(values.shape) or (
-            found and values.size != next(iter(found.values())).size
+        if (
+            not right
+            or values.size != max(values.shape)
+            or (found and values.size != next(iter(found.values())).size)
         ):
             shown = None if values is None else f"{values.dtype} of shape {shape}"
             allowed = f"a vector of real numbers, all of one length; there are {list(there)}"

@@ -6,7 +6,7 @@ from collections.abc import Collection, Mapping
 from difflib import get_close_matches
 from typing import Any
 
-from pymoo_hdte.checks import InvalidInput, one_of, real_number, whole_number
+from pymoo_hdte.checks import Complaints, InvalidInput, one_of, real_number, whole_number
 from pymoo_hdte.units import UNITS, suggestion, usual_spelling
 
 
@@ -124,6 +124,8 @@ class Fields:
 
     def finish(self) -> None:
         """Raise `InvalidInput` if a field was not asked for: it is misspelt or misplaced."""
-        if self._left:
-            field = next(iter(self._left))
-            raise InvalidInput(self._name(field), self._left[field], "no such field here")
+        complaints = Complaints()
+        for field, value in self._left.items():
+            with complaints.noted():
+                raise InvalidInput(self._name(field), value, "no such field here")
+        complaints.finish()

@@ -156,7 +156,11 @@ def layout_from_fields(table: Fields, usual: TableLayout | None = None) -> Table
     skip_rows = table.whole("skip_rows", 0) if table.has("skip_rows") else skip_rows
     marks = [
         table.choice(name, words) if table.has(name) else (getattr(usual, name) if usual else None)
-        for name, words in (("delimiter", DELIMITERS), ("decimal", DECIMALS), ("encoding", ENCODINGS))
+        for name, words in (
+            ("delimiter", DELIMITERS),
+            ("decimal", DECIMALS),
+            ("encoding", ENCODINGS),
+        )
     ]
     table.finish()
     return TableLayout(form, mapped, time, rate if time is None else None, skip_rows, *marks)

@@ -224,11 +224,7 @@ def _pieces(steps: NDArray[np.float64], usual: float) -> list[slice]:
         return []
     limits = [0, *ends.tolist(), rows]
     least = max(FEWEST_ROWS, rows // ROWS_PER_FILLED)
-    return [
-        slice(first, last)
-        for first, last in pairwise(limits)
-        if last - first >= least
-    ]
+    return [slice(first, last) for first, last in pairwise(limits) if last - first >= least]
 
 
 def _even_table(read: Columns, kept: slice, dropped: int) -> Table:

@@ -1,6 +1,6 @@
 """Lines of a text file in blocks, so that a file of any length takes the memory of a block.
 
-The text is compressed by gzip or plain, with any kind of line end and encoded as `encodings` has it.
+The text is compressed by gzip or plain, with any kind of line end, in any of `ENCODINGS`.
 """
 
 from __future__ import annotations

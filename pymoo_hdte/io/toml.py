@@ -18,7 +18,6 @@ from pymoo_hdte.io.budget import LARGEST_TOML, regular_file
 from pymoo_hdte.io.encodings import decoded
 from pymoo_hdte.io.fields import Fields
 
-
 _DEEPEST_KEY = 50
 _PART = r"""(?:[\w-]+|"[^"\n]*"|'[^'\n]*')[ \t]*\.[ \t]*"""
 _DEEP_KEY = re.compile(rf"(?<![\w-])(?:{_PART}){{{_DEEPEST_KEY}}}")
@@ -113,7 +112,9 @@ def _parsed(path: Path, named: str) -> tuple[str, dict[str, Any]]:
     with path.open("rb") as file:
         content = file.read(LARGEST_TOML + 1)
     if len(content) > LARGEST_TOML:
-        raise InvalidInput(named, f"more than {LARGEST_TOML} bytes", f"at most {LARGEST_TOML} bytes")
+        raise InvalidInput(
+            named, f"more than {LARGEST_TOML} bytes", f"at most {LARGEST_TOML} bytes"
+        )
     try:
         text = io.StringIO(decoded(content), newline=None).read()
         if _DEEP_KEY.search(text):

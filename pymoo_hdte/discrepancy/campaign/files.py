@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +25,7 @@ from pymoo_hdte.discrepancy.campaign.format import (
     GOOD_ENOUGH,
     LAYOUT,
     RIG,
+    SENSOR_PLACES,
 )
 from pymoo_hdte.discrepancy.campaign.record_files import (
     FileOfRecord,
@@ -81,7 +83,10 @@ def read_campaign(
     with toml_with_lines(folder / CAMPAIGN_FILE) as top:
         title, drive = top.text("title"), top.text("drive")
         believed = believed_from_fields(top, folder) if top.has("model") else _believed(top)
-        rig = rig_from_fields(top.table("rig"), f"{CAMPAIGN_FILE}.rig")
+        of_rig = top.table("rig")
+        if _takes_torque_at(of_rig) == "brake":
+            believed = with_load_before_sensor(believed)
+        rig = rig_from_fields(of_rig, f"{CAMPAIGN_FILE}.rig")
         enough = {
             name: top.number(key, above=0.0) * factor
             for name, (key, factor) in GOOD_ENOUGH.items()
@@ -108,13 +113,13 @@ def read_campaign(
         running = tuple(record for record in records if isinstance(record, RunningRecord))
         torsion = tuple(record for record in records if isinstance(record, TorsionRecord))
         try:
-            return Campaign(title, drive, believed, rig, running, torsion, rules, **enough)
+            campaign = Campaign(title, drive, believed, rig, running, torsion, rules, **enough)
         except InvalidInput as error:
             for complaint in complaints_of(error):
                 with complaints.noted():
                     raise _placed_in_files(complaint, files) from None
         complaints.finish()
-        raise AssertionError("a campaign that is refused has a reason")
+        return campaign
 
 
 def write_campaign(campaign: Campaign, folder: str | Path) -> None:
@@ -194,6 +199,29 @@ def _believed(top: Fields) -> BelievedDrive:
         if error.field not in known:
             raise
         raise InvalidInput(f"{place}.{error.field}", error.value, error.allowed) from None
+
+
+def _takes_torque_at(rig: Fields) -> str:
+    return rig.choice("output_torque_at", SENSOR_PLACES) if rig.has("output_torque_at") else "drive"
+
+
+def with_load_before_sensor(believed: BelievedDrive) -> BelievedDrive:
+    """Return a drive whose torque sensor stands behind the load and feels none of its inertia.
+
+    The load inertia is a part of the output inertia then, and the drive moves as before.
+
+    Parameters
+    ----------
+    believed : BelievedDrive
+        With the sensor between output and load.
+    """
+    tolerances = {name: one for name, one in believed.tolerances.items() if name != "load_inertia"}
+    return replace(
+        believed,
+        output_inertia=believed.output_inertia + believed.load_inertia,
+        load_inertia=0.0,
+        tolerances=tolerances,
+    )
 
 
 def rig_from_fields(table: Fields, place: str) -> Rig:

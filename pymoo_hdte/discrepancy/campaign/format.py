@@ -59,6 +59,9 @@ RIG = _named(
     torsion_angle_noise="torsion_angle_noise_arcsec",
 )
 
+SENSOR_PLACES = ("drive", "brake")
+"""Where the torque sensor of the output sits: between drive and load inertia, or behind both."""
+
 GOOD_ENOUGH = _named(
     good_enough_error="good_enough_arcsec",
     good_enough_torque="good_enough_N_m",

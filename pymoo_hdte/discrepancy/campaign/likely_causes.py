@@ -57,7 +57,9 @@ def likely_unit(quantity: str, factor: float, near: float = _NEAR) -> str:
         if base == si_unit(quantity) and abs(size * scale - 1.0) <= near:
             return f"{shown}is the column in {unit}, with scale = {scale:.5g} missing{also}?"
         if base == si_unit(quantity) and abs(size / scale - 1.0) <= near:
-            return f"{shown}is the load in {unit}, or scale = {scale:.5g} there once too often{also}?"
+            return (
+                f"{shown}is the load in {unit}, or scale = {scale:.5g} there once too often{also}?"
+            )
     return ""
 
 

@@ -270,7 +270,9 @@ def _check_torques(
             raise InvalidInput("mean of output_torque", measured, allowed)
     elif not abs(measured - load) <= rules.load_mismatch * abs(load) + slack:
         cause = likely_unit("torque", measured / load) if load else ""
-        raise InvalidInput("mean of output_torque", measured, f"near the load of {load:g} N.m{cause}")
+        raise InvalidInput(
+            "mean of output_torque", measured, f"near the load of {load:g} N.m{cause}"
+        )
     motor = float(np.mean(record.input_torque))
     slack = multiple * rig.input_torque_zero
     if load == 0.0:

@@ -189,8 +189,10 @@ def _temperature(entry: Fields, place: str, layout: TableLayout) -> dict[str, fl
 
 
 def _computed_angle(stated: dict[str, Channel], place: str) -> str:
-    """Return the angle that a column of transmission error stands for: the one without a column."""
-    own = [name for name in ("input_angle", "output_angle") if stated[name] != LAYOUT.channels[name]]
+    """Return the angle without a column, for which one of transmission error stands."""
+    own = [
+        name for name in ("input_angle", "output_angle") if stated[name] != LAYOUT.channels[name]
+    ]
     if len(own) == 2:
         field = f"{place}.table.channels.{TRANSMISSION_ERROR}"
         allowed = "absent beside both input_angle and output_angle, which it follows from"
