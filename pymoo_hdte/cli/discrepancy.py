@@ -64,17 +64,12 @@ def _run(options: argparse.Namespace, say: Say) -> Outcome:
         for effect in () if options.effects is None else own_effects(options.effects):
             register(effect)
         with told_by_line(options.effects):
-            document, hint = _analysed(options, believed, say)
-    return Outcome(document, _summary(document, hint, options.out))
+            document = _analysed(options, believed, say)
+    return Outcome(document, _summary(document, options.out))
 
 
-def _analysed(
-    options: argparse.Namespace, believed: ModelFiles, say: Say
-) -> tuple[dict[str, Any], str]:
-    """Analyse a campaign or a rig and write its report; return the verdict's document and a hint.
-
-    The hint is on the place of a sensor and often empty.
-    """
+def _analysed(options: argparse.Namespace, believed: ModelFiles, say: Say) -> dict[str, Any]:
+    """Analyse a campaign or a rig and write its report; return the verdict's document."""
     from pymoo_hdte.cli.reading_bar import ReadingBar, SimulationBar
     from pymoo_hdte.discrepancy import analyse
 
@@ -90,7 +85,9 @@ def _analysed(
     analysis.prove()
     say("choosing the next test and writing the report")
     document = analysis.report(options.out)
-    return document, _hint(measured, document["status"])
+    if hint := _hint(measured, document["status"]):
+        say(hint)
+    return document
 
 
 def _hint(measured: Any, status: str) -> str:
@@ -136,7 +133,7 @@ def _believing(measured: Any, model: Path | None, sheet: Path | None) -> Any:
     return measured.believing(read)
 
 
-def _summary(document: dict[str, Any], hint: str, out: Path) -> str:
+def _summary(document: dict[str, Any], out: Path) -> str:
     torsion: dict[str, Any] = document.get("torsion", {"effects": [], "limits": []})
     names = " + ".join(_name(one) for one in (*document["effects"], *torsion["effects"]))
     lines = [
@@ -148,7 +145,6 @@ def _summary(document: dict[str, Any], hint: str, out: Path) -> str:
         *document["limits"],
         *_remarks(document.get("record_remarks", [])),
         *torsion["limits"],
-        *([hint] if hint else []),
         f"Next: {document['next_experiment']['description']}",
         *([f"For the torsion: {test}"] if (test := torsion.get("next_experiment")) else []),
         f"Report: {out / PAGE_FILE}",

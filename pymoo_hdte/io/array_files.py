@@ -89,19 +89,19 @@ def _checked(
 ) -> dict[str, NDArray[np.float64]]:
     """Return arrays as vectors, all of one length."""
     found: dict[str, NDArray[np.float64]] = {}
+    length = 0
     for name in names:
         values = arrays.get(name)
-        shape = None if values is None else list(values.shape)
-        right = values is not None and values.dtype.kind in "iuf" and values.size
-        if (
-            not right
-            or values.size != max(values.shape)
-            or (found and values.size != next(iter(found.values())).size)
-        ):
-            shown = None if values is None else f"{values.dtype} of shape {shape}"
+        shown = None
+        if values is not None:
+            shown = f"{values.dtype} of shape {list(values.shape)}"
+            right = values.dtype.kind in "iuf" and values.size == max(values.shape, default=0) > 0
+            if right and values.size == (length or values.size):
+                length = values.size
+                found[name] = np.asarray(values).ravel().astype(float)
+        if name not in found:
             allowed = f"a vector of real numbers, all of one length; there are {list(there)}"
             raise InvalidInput(f"{path.name}: {name}", shown, allowed[:500])
-        found[name] = np.asarray(values).ravel().astype(float)
     return found
 
 
