@@ -144,7 +144,7 @@ def suggestion(unit: str, units: Collection[str]) -> str:
     >>> suggestion("nm", ["N.m", "mN.m"])
     "; is it 'N.m'?"
     """
-    foreign = _BROUGHT_IN.get(_plain(unit))
+    foreign = _BROUGHT_IN.get(_plain(unit)) or _BROUGHT_IN.get(_plain(unit).replace(" ", "."))
     if foreign is not None and FOREIGN[foreign][0] in units:
         known, factor, _ = FOREIGN[foreign]
         return f'; for {unit} write unit = "{known}" and scale = {factor:.6g}'

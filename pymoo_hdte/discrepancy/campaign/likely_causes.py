@@ -39,7 +39,7 @@ def likely_unit(quantity: str, factor: float, near: float = _NEAR) -> str:
     size = abs(factor)
     if not 0.0 < size < math.inf:
         return ""
-    shown = f"; {factor:.3g} times what is expected: "
+    shown = f"; {factor:.4g} times what is expected: "
     minus = "scale = -1.0 missing" if factor < 0.0 else ""
     if abs(size - 1.0) <= near:
         return f"{shown}is {minus}?" if minus else ""
