@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 import numbers
-from collections.abc import Collection
+from collections.abc import Collection, Iterator, Sequence
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -35,6 +36,76 @@ class InvalidInput(ValueError):
 
     def __reduce__(self) -> tuple[Any, ...]:
         return type(self), (self.field, self.value, self.allowed)
+
+
+class SeveralComplaints(InvalidInput):
+    """Several values are not allowed; the message has each of them in a line of its own.
+
+    Field, value and what is allowed are those of the first.
+
+    Attributes
+    ----------
+    complaints : tuple of InvalidInput
+        At least two.
+    """
+
+    def __init__(self, complaints: Sequence[InvalidInput]) -> None:
+        first = complaints[0]
+        super().__init__(first.field, first.value, first.allowed)
+        self.args = ("\n".join(str(one) for one in complaints),)
+        self.complaints = tuple(complaints)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), (self.complaints,)
+
+
+class Complaints:
+    """Collects what is not allowed, so that all of it can be raised at once.
+
+    Examples
+    --------
+    >>> complaints = Complaints()
+    >>> with complaints.noted():
+    ...     real_number("speed", "fast")
+    >>> with complaints.noted():
+    ...     real_number("load", "heavy")
+    >>> complaints.finish()
+    Traceback (most recent call last):
+        ...
+    pymoo_hdte.checks.SeveralComplaints: speed is 'fast', allowed: a finite number
+    load is 'heavy', allowed: a finite number
+    """
+
+    def __init__(self) -> None:
+        self._noted: list[InvalidInput] = []
+
+    @contextmanager
+    def noted(self) -> Iterator[None]:
+        """Keep an `InvalidInput` that leaves the block for later."""
+        try:
+            yield
+        except SeveralComplaints as several:
+            self._noted += several.complaints
+        except InvalidInput as error:
+            self._noted.append(error)
+
+    def finish(self) -> None:
+        """Raise what was noted: as it was if it is one, as `SeveralComplaints` if there are more.
+
+        Raises
+        ------
+        InvalidInput
+            If anything was noted.
+        """
+        if len(self._noted) > 1:
+            raise SeveralComplaints(self._noted)
+        if self._noted:
+            raise self._noted[0]
+
+
+def complaints_of(error: InvalidInput) -> tuple[InvalidInput, ...]:
+    """Return each complaint of an error, itself if it is one."""
+    return error.complaints if isinstance(error, SeveralComplaints) else (error,)
 
 
 def _shown(value: Any) -> str:

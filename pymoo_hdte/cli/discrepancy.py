@@ -28,7 +28,9 @@ Exit codes: 0 a verdict was reached, whatever it is; 2 the input is at fault."""
 
 
 def _add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("campaign", type=Path, metavar="CAMPAIGN", help="folder of the campaign")
+    parser.add_argument(
+        "campaign", type=Path, metavar="CAMPAIGN", help="folder of the campaign, or its .toml file"
+    )
     parser.add_argument(
         "--data", type=Path, metavar="DIR", help="folder of the records that rig.toml names"
     )
@@ -82,7 +84,19 @@ def _analysed(options: argparse.Namespace, believed: ModelFiles, say: Say) -> di
     say("proving it on the records that were held out")
     analysis.prove()
     say("choosing the next test and writing the report")
-    return analysis.report(options.out)
+    document = analysis.report(options.out)
+    if hint := _hint(measured, document["status"]):
+        say(hint)
+    return document
+
+
+def _hint(measured: Any, status: str) -> str:
+    """Return what a verdict of an unknown effect may come from, or nothing."""
+    from pymoo_hdte.discrepancy import Campaign
+    from pymoo_hdte.discrepancy.campaign.sensor_place import sensor_hint
+
+    unknown = isinstance(measured, Campaign) and status == "unlisted"
+    return sensor_hint(measured) if unknown else ""
 
 
 def _measured(folder: Path, data: Path | None, progress: Callable[[int, int], None]) -> Any:
@@ -91,6 +105,8 @@ def _measured(folder: Path, data: Path | None, progress: Callable[[int, int], No
     from pymoo_hdte.discrepancy.campaign.format import CAMPAIGN_FILE
     from pymoo_hdte.discrepancy.mechanism.files import RIG_FILE
 
+    if folder.name == CAMPAIGN_FILE and folder.is_file():
+        folder = folder.parent
     if (folder / RIG_FILE).is_file() or folder.suffix == ".toml":
         return read_rig(folder, data, progress)
     if data is not None:

@@ -6,8 +6,8 @@ from collections.abc import Collection, Mapping
 from difflib import get_close_matches
 from typing import Any
 
-from pymoo_hdte.checks import InvalidInput, one_of, real_number, whole_number
-from pymoo_hdte.units import UNITS
+from pymoo_hdte.checks import Complaints, InvalidInput, one_of, real_number, whole_number
+from pymoo_hdte.units import UNITS, suggestion, usual_spelling
 
 
 class Fields:
@@ -100,11 +100,11 @@ class Fields:
         raw = self.take(field, allowed)
         if not isinstance(raw, Mapping) or set(raw) != {"value", "unit"}:
             raise InvalidInput(self._name(field), raw, allowed)
-        if not isinstance(raw["unit"], str) or raw["unit"] not in units:
-            raise InvalidInput(f"{self._name(field)}.unit", raw["unit"], ", ".join(units))
-        return (
-            real_number(f"{self._name(field)}.value", raw["value"], **limits) * units[raw["unit"]]
-        )
+        unit = usual_spelling(raw["unit"]) if isinstance(raw["unit"], str) else ""
+        if unit not in units:
+            allowed = f"{', '.join(units)}{suggestion(str(raw['unit']), units)}"
+            raise InvalidInput(f"{self._name(field)}.unit", raw["unit"], allowed)
+        return real_number(f"{self._name(field)}.value", raw["value"], **limits) * units[unit]
 
     def names(self) -> tuple[str, ...]:
         """Return the names of the remaining fields."""
@@ -124,6 +124,8 @@ class Fields:
 
     def finish(self) -> None:
         """Raise `InvalidInput` if a field was not asked for: it is misspelt or misplaced."""
-        if self._left:
-            field = next(iter(self._left))
-            raise InvalidInput(self._name(field), self._left[field], "no such field here")
+        complaints = Complaints()
+        for field, value in self._left.items():
+            with complaints.noted():
+                raise InvalidInput(self._name(field), value, "no such field here")
+        complaints.finish()

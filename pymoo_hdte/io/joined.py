@@ -13,7 +13,7 @@ from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.io.even_steps import STEP_SPREAD
 from pymoo_hdte.io.layout import TableLayout
 from pymoo_hdte.io.parts import Part
-from pymoo_hdte.io.tables import FEWEST_ROWS, Table, read_table
+from pymoo_hdte.io.tables import FEWEST_ROWS, Table, read_table, read_unbroken_tables
 from pymoo_hdte.io.text_lines import Seen
 
 _SAME = 1e-3
@@ -78,6 +78,25 @@ def read_joined(
             allowed = "as many in each file, because a sample_rate stands for their times"
             raise InvalidInput("rows of the files", lengths, allowed)
     return _at_the_finest(paths, tables)
+
+
+def read_unbroken(
+    files: Mapping[str, Path],
+    layout: TableLayout,
+    seen: Seen | None = None,
+    part: Part | None = None,
+) -> list[Table]:
+    """Read a record as `read_joined` does; a gap in the time of a single file divides it.
+
+    Returns
+    -------
+    list of Table
+        At least one, as `read_unbroken_tables` has it.
+    """
+    paths = {files[name] for name in layout.channels}
+    if len(paths) > 1:
+        return [read_joined(files, layout, seen, part)]
+    return read_unbroken_tables(paths.pop(), layout, seen, part)
 
 
 def _at_the_finest(paths: Sequence[Path], tables: Sequence[Table]) -> Table:

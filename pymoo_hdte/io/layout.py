@@ -11,13 +11,16 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from pymoo_hdte.checks import InvalidInput, one_of, real_number
+from pymoo_hdte.io.encodings import ENCODINGS
 from pymoo_hdte.io.fields import Fields
 from pymoo_hdte.io.text_columns import DECIMALS
 from pymoo_hdte.io.text_header import DELIMITERS
 from pymoo_hdte.io.text_table import LARGEST
-from pymoo_hdte.units import ORIGINS, UNITS
+from pymoo_hdte.units import ORIGINS, UNITS, suggestion, usual_spelling
 
-FORMATS = ("matlab", "csv", "plain")
+TEXTS = ("csv", "plain")
+"""Formats of text."""
+FORMATS = ("matlab", *TEXTS, "json_lines", "npz", "xlsx", "hdf5")
 MEASURED = (
     *("time", "angle", "length", "speed", "linear speed", "acceleration", "linear acceleration"),
     *("force", "torque", "current", "voltage", "temperature", "ratio"),
@@ -37,7 +40,7 @@ class Channel:
     Attributes
     ----------
     column : str or int
-        Its title, or in a plain table its number from 0; an empty title is that of no column.
+        Its title, or in a table of text its number from 0; an empty title is that of no column.
     unit : str
         One of `CHANNEL_UNITS`, or `COUNTS`.
     scale : float
@@ -107,7 +110,7 @@ class TableLayout:
     """What `layout_from_fields` reads: a time column or a sample rate in Hz, never both.
 
     ``skip_rows`` rows at the start are left out unread: a start-up, or remarks in a plain table.
-    ``delimiter`` and ``decimal`` are as in `read_text_table`.
+    ``delimiter``, ``decimal`` and ``encoding`` are as in `read_text_table`.
     """
 
     format: str
@@ -117,6 +120,7 @@ class TableLayout:
     skip_rows: int
     delimiter: str | None = None
     decimal: str | None = None
+    encoding: str | None = None
 
 
 def layout_from_fields(table: Fields, usual: TableLayout | None = None) -> TableLayout:
@@ -152,7 +156,11 @@ def layout_from_fields(table: Fields, usual: TableLayout | None = None) -> Table
     skip_rows = table.whole("skip_rows", 0) if table.has("skip_rows") else skip_rows
     marks = [
         table.choice(name, words) if table.has(name) else (getattr(usual, name) if usual else None)
-        for name, words in (("delimiter", DELIMITERS), ("decimal", DECIMALS))
+        for name, words in (
+            ("delimiter", DELIMITERS),
+            ("decimal", DECIMALS),
+            ("encoding", ENCODINGS),
+        )
     ]
     table.finish()
     return TableLayout(form, mapped, time, rate if time is None else None, skip_rows, *marks)
@@ -210,7 +218,8 @@ def _units_beside(channel: Channel) -> Collection[str]:
 
 
 def _channel(table: Fields, form: str | None, units: Collection[str]) -> Channel:
-    numbered = table.is_number("column") if form is None else form == "plain"
+    # A CSV file whose titles are missing, or twice there, has columns by number all the same.
+    numbered = form == "plain" or (form in (None, "csv") and table.is_number("column"))
     column = table.whole("column", 0) if numbered else table.text("column")
     unwrap = table.take("unwrap", "") if table.has("unwrap") else False
     if not isinstance(unwrap, bool):
@@ -236,10 +245,13 @@ def _channel(table: Fields, form: str | None, units: Collection[str]) -> Channel
 
 def _unit(table: Fields, units: tuple[str, ...]) -> str:
     """Take the unit; one of another quantity is refused with what it is a unit of."""
-    unit = table.take("unit", f"one of {', '.join(units)}")
-    if isinstance(unit, str) and unit not in units and unit in CHANNEL_UNITS:
+    stated = table.take("unit", f"one of {', '.join(units)}")
+    unit = usual_spelling(stated) if isinstance(stated, str) else ""
+    if unit in units:
+        return unit
+    known = ", ".join(map(repr, units))
+    allowed = f"one of {known}{suggestion(str(stated), units)}"
+    if unit in CHANNEL_UNITS:
         kind = next(one for one in MEASURED if unit in UNITS[one])
-        known = ", ".join(map(repr, units))
         allowed = f"no unit of {kind}, which this column does not hold, but one of {known}"
-        raise InvalidInput(table._name("unit"), unit, allowed)
-    return one_of(table._name("unit"), unit, units)
+    raise InvalidInput(table._name("unit"), stated, allowed)

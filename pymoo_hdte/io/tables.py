@@ -1,11 +1,12 @@
-"""Measured tables in MATLAB files, CSV and plain text, mapped to channels in SI by a layout."""
+"""Measured tables in files of text or of arrays, mapped to channels in SI by a layout."""
 
 from __future__ import annotations
 
 import hashlib
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -14,12 +15,13 @@ from numpy.typing import NDArray
 from scipy.interpolate import make_interp_spline
 
 from pymoo_hdte.checks import InvalidInput, real_number
+from pymoo_hdte.io.array_files import READERS, format_of, read_arrays
 from pymoo_hdte.io.budget import memory_told, regular_file
 from pymoo_hdte.io.even_steps import LONGEST_STEP, even_steps, is_even
 from pymoo_hdte.io.layout import CHANNEL_UNITS, Channel, TableLayout, layout_from_fields
-from pymoo_hdte.io.matlab import read_vectors
 from pymoo_hdte.io.parts import Part
 from pymoo_hdte.io.text_columns import TextTable, column_label
+from pymoo_hdte.io.text_header import numbered
 from pymoo_hdte.io.text_lines import Seen
 from pymoo_hdte.io.text_table import LARGEST, read_text_table
 from pymoo_hdte.units import ORIGINS
@@ -42,9 +44,11 @@ class Columns:
     raw : dict of str or int to ndarray, shape (n,)
         By title, or by number in a plain table.
     text : TextTable or None
-        None for a MATLAB file.
+        None for a file of arrays.
     length : int
         Number of rows.
+    above : int
+        Rows of a file without text that stand above the first of numbers.
     """
 
     path: Path
@@ -52,6 +56,7 @@ class Columns:
     raw: dict[Any, NDArray[np.float64]]
     text: TextTable | None
     length: int
+    above: int = 0
 
     def si(self, channel: Channel, rows: slice = slice(None)) -> NDArray[np.float64]:
         """Return a channel in SI, shape (n,); what is not finite is interpolated if any is."""
@@ -82,7 +87,7 @@ class Columns:
 
     def place(self, row: int, what: str | None = None) -> str:
         """Return where in the file a row stands, for errors about it or about one of its cells."""
-        row_of_file = row + self.layout.skip_rows + 1
+        row_of_file = row + self.above + self.layout.skip_rows + 1
         place = f"line {self.text.lines[row]}" if self.text else f"row {row_of_file}"
         return f"{self.path.name}, {place}" + ("" if what is None else f": {what}")
 
@@ -91,8 +96,8 @@ class Columns:
         """Where all rows stand."""
         if self.text:
             return f"{self.path.name}, lines {self.text.lines[0]} to {self.text.lines[-1]}"
-        first = self.layout.skip_rows + 1
-        last = self.layout.skip_rows + self.length
+        first = self.above + self.layout.skip_rows + 1
+        last = first + self.length - 1
         return f"{self.path.name}, rows {first} to {last}"
 
 
@@ -125,6 +130,28 @@ def read_table(
     ragged or holds text or a huge number, too few rows are finite or too many at a time are not, or
     time does not rise or leaves a gap.
     """
+    return _tables(path, layout, seen, part, split=False)[0]
+
+
+def read_unbroken_tables(
+    path: Path, layout: TableLayout, seen: Seen | None = None, part: Part | None = None
+) -> list[Table]:
+    """Read the mapped columns as `read_table` does; a gap in time begins another table.
+
+    Of more gaps than one in `ROWS_PER_FILLED` rows the file is refused, as by `read_table`. Tables
+    shorter than one row in as many are left out.
+
+    Returns
+    -------
+    list of Table
+        At least one; each remark says how the file was divided.
+    """
+    return _tables(path, layout, seen, part, split=True)
+
+
+def _tables(
+    path: Path, layout: TableLayout, seen: Seen | None, part: Part | None, split: bool
+) -> list[Table]:
     read = read_columns(path, layout, gaps=True, seen=seen)
     rows = _part_of(read, part)
     columns = {name: raw[rows] for name, raw in read.raw.items()}
@@ -159,7 +186,9 @@ def read_table(
     time, dropped = read.time[kept], int(np.count_nonzero(~finite))
     steps = np.diff(time)
     mean, usual = float(np.mean(steps)), float(np.median(steps))
-    for row in np.flatnonzero((steps <= 0.0) | (steps > LONGEST_STEP * mean))[:1]:
+    falls, leaps = steps <= 0.0, steps > LONGEST_STEP * mean
+    pieces = _pieces(steps, usual) if split and leaps.any() and not falls.any() else []
+    for row in np.flatnonzero(falls | leaps)[:1] if not pieces else ():
         allowed = (
             f"rising by the median step, {usual:g} s, within 1 %, or unevenly, by at most "
             f"{LONGEST_STEP * mean:.4g} s, {LONGEST_STEP:g} mean steps; or take a sample_rate, or "
@@ -167,6 +196,40 @@ def read_table(
         )
         column = layout.time.column if layout.time else next(iter(columns))
         raise refuse(start + int(row) + 1, column, allowed)
+    if not pieces:
+        return [_even_table(read, kept, dropped)]
+    first = int(np.argmax(steps > LONGEST_STEP * usual))
+    out = len(time) - sum(piece.stop - piece.start for piece in pieces)
+    said = (
+        f"{path.name} leaves gaps of up to {1e3 * float(steps.max()):.4g} ms between rows that are "
+        f"{1e3 * usual:.4g} ms apart, the first after {read.place(kept.start + first)}. The rows "
+        f"between gaps are records of their own, {len(pieces)} in number."
+    ) + (f" Rows of shorter parts are left out: {out}." if out else "")
+    tables = [
+        _even_table(
+            read,
+            slice(kept.start + piece.start, kept.start + piece.stop),
+            0 if number else dropped,
+        )
+        for number, piece in enumerate(pieces)
+    ]
+    return [replace(one, remark=f"{said} {one.remark}".strip()) for one in tables]
+
+
+def _pieces(steps: NDArray[np.float64], usual: float) -> list[slice]:
+    """Return the rows between gaps in time that are long enough to use; none if gaps are many."""
+    ends = np.flatnonzero(steps > LONGEST_STEP * usual) + 1
+    rows = len(steps) + 1
+    if len(ends) * ROWS_PER_FILLED >= rows:
+        return []
+    limits = [0, *ends.tolist(), rows]
+    least = max(FEWEST_ROWS, rows // ROWS_PER_FILLED)
+    return [slice(first, last) for first, last in pairwise(limits) if last - first >= least]
+
+
+def _even_table(read: Columns, kept: slice, dropped: int) -> Table:
+    """Return rows without a gap in time, at even steps."""
+    layout, time = read.layout, read.time[kept]
     # Turns of an angle that wraps, and rates, count from the first row of the file.
     signals = {name: read.si(channel)[kept] for name, channel in layout.channels.items()}
     remark, interpolated = "", False
@@ -226,27 +289,37 @@ def read_columns(
 def _columns(path: Path, layout: TableLayout, gaps: bool, seen: Seen | None) -> Columns:
     mapped = [*([layout.time] if layout.time else []), *layout.channels.values()]
     names: list[Any] = list(dict.fromkeys(channel.column for channel in mapped))
-    if layout.format == "matlab" or (layout.format == "csv" and path.suffix == ".mat"):
-        vectors = read_vectors(path, names)
+    form = format_of(path, layout.format)
+    if form in READERS:
+        arrays = read_arrays(path, form, [str(name) for name in names])
         if seen:
             seen(path.stat().st_size)
-        raw = {name: vectors[name][layout.skip_rows :] for name in names}
-        read = Columns(path, layout, raw, None, len(raw[names[0]]))
+        raw = {name: arrays.vectors[str(name)][layout.skip_rows :] for name in names}
+        read = Columns(path, layout, raw, None, len(raw[names[0]]), arrays.above)
         for name in names if not gaps else ():
             for row in np.flatnonzero(~np.isfinite(raw[name]))[:1]:
                 place = read.place(int(row), column_label(name))
                 raise InvalidInput(place, float(raw[name][row]), "a finite number")
         return read
-    titled = layout.format == "csv"
+    titled = form == "csv"
+    counted = titled and any(isinstance(name, int) for name in names)
+    if counted and not all(isinstance(name, int) for name in names):
+        raise InvalidInput(f"{path.name}: columns", names, "titles for all, or numbers for all")
     table = read_text_table(
         path,
         titled=titled,
         skip_rows=layout.skip_rows,
-        wanted=[str(name) for name in names] if titled else (),
+        wanted=names if titled else (),
         delimiter=layout.delimiter,
         decimal=layout.decimal,
+        encoding=layout.encoding,
         seen=seen,
     )
+    if counted:
+        titles = {name: numbered(name) for name in names}
+        found = table.numbers(list(titles.values()), gaps=gaps)
+        raw = {name: found[title] for name, title in titles.items()}
+        return Columns(path, layout, raw, table, len(raw[names[0]]))
     for channel in mapped:
         _check_unit(table, channel)
     raw = table.numbers(names, gaps=gaps)

@@ -44,6 +44,34 @@ def plain_header(
     return Header(list(range(len(top.split(mark)))), line, mark, skip_rows)
 
 
+def numbered_header(
+    numbers: Sequence[int],
+    lines: Sequence[str],
+    delimiter: str | None,
+    skip_rows: int,
+    columns: Sequence[int],
+) -> Header:
+    """Return made titles, `numbered`, of a CSV file whose columns are called by numbers.
+
+    Its rows begin with the first line that has a number in each of these columns, counted from 0;
+    titles above it, if any, are not read.
+    """
+    for line, text in zip(numbers, lines[:MOST_LINES_ABOVE], strict=False):
+        for mark in _marks(text, delimiter):
+            cells = [cell.strip(AROUND) for cell in text.split(mark)]
+            if max(columns) < len(cells) and all(begins_as_number(cells[at]) for at in columns):
+                titles = [numbered(at) for at in range(len(cells))]
+                return Header(titles, line - 1, mark, skip_rows)
+    top = lines[0] if lines else ""
+    mark = _marks(top, delimiter)[0]
+    return Header([numbered(at) for at in range(len(top.split(mark)))], 0, mark, skip_rows)
+
+
+def numbered(column: int) -> str:
+    """Return the title of a column without one."""
+    return f"column {column}"
+
+
 def titled_header(
     file: str,
     numbers: Sequence[int],

@@ -1,6 +1,6 @@
 """Lines of a text file in blocks, so that a file of any length takes the memory of a block.
 
-The text is in UTF-8, compressed by gzip or plain, with any kind of line end.
+The text is compressed by gzip or plain, with any kind of line end, in any of `ENCODINGS`.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from typing import BinaryIO, cast
 
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.io.budget import Budget, regular_file
+from pymoo_hdte.io.encodings import ENCODINGS, PROBE, encoding_of, with_cp1252
 
 BLOCK = 1 << 22
 """Characters of a block."""
@@ -55,7 +56,11 @@ def told(progress: Progress | None, paths: Sequence[Path]) -> Seen | None:
 
 
 def line_blocks(
-    path: Path, kind: str, seen: Seen | None = None, size: int = BLOCK
+    path: Path,
+    kind: str,
+    seen: Seen | None = None,
+    size: int = BLOCK,
+    encoding: str | None = None,
 ) -> Iterator[Lines]:
     """Yield lines without their ends, with their numbers; no blank lines at the end.
 
@@ -69,6 +74,8 @@ def line_blocks(
         Called after each block.
     size : int
         Characters of a block, or more where lines are longer.
+    encoding : str, optional
+        One of `encodings.ENCODINGS`; found out by default.
 
     Raises
     ------
@@ -83,7 +90,7 @@ def line_blocks(
     with path.open("rb") as raw:
         blank: list[str] = []
         start, done, characters = 1, 0, 0
-        for lines in _lines(path, kind, raw, size, budget):
+        for lines in _lines(path, kind, raw, size, budget, encoding):
             kept = len(lines)
             while kept and not lines[kept - 1].strip():
                 kept -= 1
@@ -150,18 +157,24 @@ def _quotes(lines: list[str]) -> int:
     return sum(map(str.count, lines, repeat('"')))
 
 
-def _lines(path: Path, kind: str, raw: BinaryIO, size: int, budget: Budget) -> Iterator[list[str]]:
+def _lines(
+    path: Path, kind: str, raw: BinaryIO, size: int, budget: Budget, encoding: str | None
+) -> Iterator[list[str]]:
     packed = path.suffix == ".gz"
     binary = cast("BinaryIO", gzip.GzipFile(fileobj=raw)) if packed else raw
-    # With the surrogates of bytes that are no text, so that their line can be told.
-    text = io.TextIOWrapper(binary, "utf-8-sig", "surrogateescape")
-    rest, done = "", 0
+    text, rest, done = None, "", 0
 
     def long(length: int, line: int) -> None:
         budget.check("characters", length, f"{path.name}, line {line}: a line")
 
     try:
+        start = cast("io.BufferedReader", binary).peek(PROBE)[:PROBE]
+        coded = encoding_of(start, encoding)
+        # With the surrogates of bytes that are no text, so that their line can be told.
+        text = io.TextIOWrapper(binary, coded, "surrogateescape")
+        mixed = encoding is None and coded == ENCODINGS["utf-8"]
         while found := text.read(size):
+            found = with_cp1252(found) if mixed else found
             budget.check("bytes", binary.tell(), f"{path.name}, expanded")
             whole, end, rest = (rest + found).rpartition("\n")
             if end:
@@ -175,8 +188,12 @@ def _lines(path: Path, kind: str, raw: BinaryIO, size: int, budget: Budget) -> I
             long(len(rest), done + 1)
     except (gzip.BadGzipFile, EOFError, zlib.error) as error:
         raise InvalidInput(path.name, str(error), f"gzip-compressed {kind} in UTF-8") from None
+    except UnicodeError as error:
+        allowed = f"{kind} in the encoding {encoding or 'UTF-8'}"
+        raise InvalidInput(path.name, str(error), allowed) from None
     finally:
-        text.detach()
+        if text is not None:
+            text.detach()
     _check(path, kind, rest, done)
     yield [rest]
 
@@ -192,7 +209,8 @@ def _check(path: Path, kind: str, text: str, done: int) -> None:
     # A file whose first line is no text is refused as a whole.
     field = f"{path.name}, line {line + 1}" if line else path.name
     shown = text.split("\n")[above].encode("utf-8", "surrogateescape").decode("utf-8", "replace")
-    raise InvalidInput(field, shown, f"{kind} in UTF-8 without NUL bytes")
+    allowed = f"{kind} in UTF-8, cp1252 or UTF-16 without NUL bytes"
+    raise InvalidInput(field, shown, allowed)
 
 
 def _cut(file: str, numbers: Sequence[int], rows: list[str], mark: str) -> Block:

@@ -1,7 +1,7 @@
 """Tables as text: CSV, compressed by gzip or plain, and columns of numbers without titles.
 
 This is the only reader of such files in the package; an error names the file, its line and the
-column by its title. A CSV file is in UTF-8 and has its titles in one line, the first or the one
+column by its title. A CSV file has its titles in one line, the first or the one
 with the names that are looked for; cells are separated by commas, semicolons or tabs and may be
 quoted. Numbers have a decimal point, or a decimal comma where commas do not separate cells.
 """
@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pymoo_hdte.io.text_columns import DECIMALS, TextTable
-from pymoo_hdte.io.text_header import plain_header, titled_header
+from pymoo_hdte.io.text_header import numbered_header, plain_header, titled_header
 from pymoo_hdte.io.text_lines import (
     BLOCK,
     FIRST_LINES,
@@ -43,9 +43,10 @@ def read_text_table(
     skip_rows: int = 0,
     by_hand: bool = False,
     origin: str | None = None,
-    wanted: Sequence[str] = (),
+    wanted: Sequence[str] | Sequence[int] = (),
     delimiter: str | None = None,
     decimal: str | None = None,
+    encoding: str | None = None,
     seen: Seen | None = None,
 ) -> TextTable:
     """Read the titles of a table of text; its rows are read when they are asked for.
@@ -53,7 +54,7 @@ def read_text_table(
     Parameters
     ----------
     path : Path
-        Of a file in UTF-8; it is compressed if its name ends in ``.gz``.
+        It is compressed if its name ends in ``.gz``.
     titled : bool
         Whether it is CSV. Else it has no titles, and white space, commas or semicolons separate
         its cells.
@@ -64,11 +65,13 @@ def read_text_table(
         a record of an instrument, where each row is an instant, a blank line is a fault.
     origin : str, optional
         A first line that begins with this is left out.
-    wanted : sequence of str
+    wanted : sequence of str, or of int
         Titles. Lines above the first line that has them all are left out, and so is a row of units
-        below it.
+        below it. Or numbers of columns, from 0, whose titles are then made by `numbered`.
     delimiter, decimal : str, optional
         Among `text_header.DELIMITERS` and `DECIMALS`; found out by default.
+    encoding : str, optional
+        One of `encodings.ENCODINGS`; found out by default.
     seen : callable, optional
         Is told how many further bytes have been read.
 
@@ -83,7 +86,7 @@ def read_text_table(
     kind = "CSV text" if titled else "text"
 
     def lines(size: int = FIRST_LINES, told: Seen | None = None) -> Iterator[Lines]:
-        for numbers, block in line_blocks(path, kind, told, size):
+        for numbers, block in line_blocks(path, kind, told, size, encoding):
             if numbers[0] == 1 and origin and block[0].startswith(origin):
                 numbers, block = numbers[1:], block[1:]
             if by_hand:
@@ -95,7 +98,12 @@ def read_text_table(
 
     if titled:
         top = next(lines(), (range(0), []))
-        header = titled_header(path.name, *top, delimiter, skip_rows, wanted)
+        columns = [one for one in wanted if isinstance(one, int)]
+        if columns:
+            header = numbered_header(*top, delimiter, skip_rows, columns)
+        else:
+            titles = [str(one) for one in wanted]
+            header = titled_header(path.name, *top, delimiter, skip_rows, titles)
     else:
         top = next(lines_below(lines(), 0, skip_rows), (range(0), []))
         header = plain_header(*top, delimiter, skip_rows)

@@ -13,8 +13,9 @@ from typing import Any
 import numpy as np
 import tomli_w
 
-from pymoo_hdte.checks import InvalidInput
+from pymoo_hdte.checks import Complaints, InvalidInput, complaints_of
 from pymoo_hdte.io.budget import LARGEST_TOML, regular_file
+from pymoo_hdte.io.encodings import decoded
 from pymoo_hdte.io.fields import Fields
 
 _DEEPEST_KEY = 50
@@ -89,11 +90,20 @@ def toml_with_lines(path: Path) -> Iterator[Fields]:
     try:
         yield Fields(table, path.name)
     except InvalidInput as error:
-        if not error.field.startswith(f"{path.name}."):
-            raise
-        key = error.field.removeprefix(f"{path.name}.")
-        field = f"{path.name}, line {_line_of(text, key)}: {key}"
-        raise InvalidInput(field, error.value, error.allowed) from None
+        complaints = Complaints()
+        for complaint in complaints_of(error):
+            with complaints.noted():
+                raise _with_line(complaint, path, text) from None
+        complaints.finish()
+
+
+def _with_line(error: InvalidInput, path: Path, text: str) -> InvalidInput:
+    """Return an error about a field with its line; another one as it is."""
+    if not error.field.startswith(f"{path.name}."):
+        return error
+    key = error.field.removeprefix(f"{path.name}.")
+    field = f"{path.name}, line {_line_of(text, key)}: {key}"
+    return InvalidInput(field, error.value, error.allowed)
 
 
 def _parsed(path: Path, named: str) -> tuple[str, dict[str, Any]]:
@@ -106,7 +116,7 @@ def _parsed(path: Path, named: str) -> tuple[str, dict[str, Any]]:
             named, f"more than {LARGEST_TOML} bytes", f"at most {LARGEST_TOML} bytes"
         )
     try:
-        text = io.TextIOWrapper(io.BytesIO(content), encoding="utf-8").read()
+        text = io.StringIO(decoded(content), newline=None).read()
         if _DEEP_KEY.search(text):
             raise ValueError(f"a key of more than {_DEEPEST_KEY} parts")
         return text, tomllib.loads(text)

@@ -166,7 +166,7 @@ FAULTS = [
     ("\n0.002,", "\n0_002,", "line 4: t is '0_002', allowed: a number"),
     ("\n0.001,0", "\n0.001,9999999999999999", "line 3: q is 1e+16, allowed: at most 1e+15"),
     ("\n0.002,", "\n0.002\0,", "line 4 is '0.002\\x00"),
-    ("\n0.002,", "\n0.002\udcff,", "line 4 is '0.002\ufffd"),
+    ("\n0.002,", "\n0.002\udc81,", "line 4 is '0.002\ufffd"),
 ]
 
 

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import InitVar, dataclass, replace
 
-from pymoo_hdte.checks import InvalidInput, real_number
+from pymoo_hdte.checks import Complaints, InvalidInput, real_number
 from pymoo_hdte.discrepancy.campaign.believed import MECHANICAL, BelievedDrive, Rig
 from pymoo_hdte.discrepancy.campaign.believed_model import believed_of_model
 from pymoo_hdte.discrepancy.campaign.known_values import known_values
@@ -85,18 +85,22 @@ class Campaign:
             raise InvalidInput("running records", 0, "at least one")
         self._check_each_once()
         largest_load = max(abs(record.load_torque) for record in self.running)
-        try:
-            check_believed(self.believed, rules)
-        except InvalidInput:
-            # An inertia that seems too heavy may hang on a stiffness that is too small.
-            check_stiffness(self.believed, largest_load, rules)
-            raise
+        complaints = Complaints()
+        with complaints.noted():
+            try:
+                check_believed(self.believed, rules)
+            except InvalidInput:
+                # An inertia that seems too heavy may hang on a stiffness that is too small.
+                check_stiffness(self.believed, largest_load, rules)
+                raise
         for record in self.running:
-            with _named(record.name):
+            with complaints.noted(), _named(record.name):
                 check_running(record, self.believed, self.rig, largest_load, rules)
         for sweep in self.torsion:
-            with _named(sweep.name):
+            with complaints.noted(), _named(sweep.name):
                 check_torsion(sweep, self.believed, rules)
+        # Below, what is wrong above would be told in other words.
+        complaints.finish()
         check_stiffness(self.believed, largest_load, rules)
         check_noise(self.running, self.torsion, self.believed, self.rig, rules)
 

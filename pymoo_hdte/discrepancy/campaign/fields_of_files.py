@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import MISSING, fields
 from typing import Any, TypeVar
 
-from pymoo_hdte.checks import InvalidInput, real_number
+from pymoo_hdte.checks import Complaints, InvalidInput, real_number
 from pymoo_hdte.discrepancy.campaign.believed import BelievedDrive, Rig
 from pymoo_hdte.discrepancy.campaign.format import Names
 from pymoo_hdte.discrepancy.campaign.records import RunningRecord, TorsionRecord
@@ -31,11 +31,15 @@ def build(kind: type[Checked], names: Names, table: Fields, place: str, **known:
     """Build a checked object from a table; its errors name the field as the file does."""
     optional = {field.name for field in fields(kind) if field.default is not MISSING}
     values = dict(known)
+    complaints = Complaints()
     for attribute, (key, factor) in names.items():
         if attribute in known or (attribute in optional and not table.has(key)):
             continue
-        values[attribute] = _si(table.take(key, "a number"), f"{place}.{key}", factor)
-    table.finish()
+        with complaints.noted():
+            values[attribute] = _si(table.take(key, "a number"), f"{place}.{key}", factor)
+    with complaints.noted():
+        table.finish()
+    complaints.finish()
     try:
         return kind(**values)
     except InvalidInput as error:

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from pymoo_hdte.checks import InvalidInput
+from pymoo_hdte.checks import Complaints, InvalidInput, complaints_of
 from pymoo_hdte.discrepancy.campaign.believed import BelievedDrive, Rig
 from pymoo_hdte.discrepancy.campaign.believed_model import (
     believed_from_fields,
@@ -24,6 +25,7 @@ from pymoo_hdte.discrepancy.campaign.format import (
     GOOD_ENOUGH,
     LAYOUT,
     RIG,
+    SENSOR_PLACES,
 )
 from pymoo_hdte.discrepancy.campaign.record_files import (
     FileOfRecord,
@@ -49,7 +51,8 @@ def read_campaign(
     Parameters
     ----------
     folder : str or Path
-        With ``campaign.toml`` and a file for each record, as ``docs/campaign_format.md`` says.
+        With ``campaign.toml`` and a file for each record, as ``docs/campaign_format.md`` says; or
+        the path of its ``campaign.toml``.
     rules : Rules
         Thresholds of what `Campaign` refuses.
     progress : callable, optional
@@ -74,10 +77,16 @@ def read_campaign(
     50
     """
     folder = Path(folder)
+    if folder.name == CAMPAIGN_FILE and folder.is_file():
+        folder = folder.parent
+    complaints = Complaints()
     with toml_with_lines(folder / CAMPAIGN_FILE) as top:
         title, drive = top.text("title"), top.text("drive")
         believed = believed_from_fields(top, folder) if top.has("model") else _believed(top)
-        rig = rig_from_fields(top.table("rig"), f"{CAMPAIGN_FILE}.rig")
+        of_rig = top.table("rig")
+        if _takes_torque_at(of_rig) == "brake":
+            believed = with_load_before_sensor(believed)
+        rig = rig_from_fields(of_rig, f"{CAMPAIGN_FILE}.rig")
         enough = {
             name: top.number(key, above=0.0) * factor
             for name, (key, factor) in GOOD_ENOUGH.items()
@@ -89,19 +98,28 @@ def read_campaign(
         shared = layout_from_fields(table, LAYOUT) if table else LAYOUT
         places = [f"{CAMPAIGN_FILE}.record[{index}]" for index in range(len(entries))]
         pairs = list(zip(entries, places, strict=True))
-        paths = [record_path(entry, place, folder) for entry, place in pairs]
+        paths: list[Path] = []
+        for entry, place in pairs:
+            with complaints.noted():
+                paths.append(record_path(entry, place, folder))
+        complaints.finish()
         seen = told(progress, paths)
-        files = [
-            read_record(entry, place, path, believed.ratio, shared, seen)
-            for (entry, place), path in zip(pairs, paths, strict=True)
-        ]
+        files: list[FileOfRecord] = []
+        for (entry, place), path in zip(pairs, paths, strict=True):
+            with complaints.noted():
+                files.append(read_record(entry, place, path, believed.ratio, shared, seen))
+        complaints.finish()
         records = [one.record for one in files]
         running = tuple(record for record in records if isinstance(record, RunningRecord))
         torsion = tuple(record for record in records if isinstance(record, TorsionRecord))
         try:
-            return Campaign(title, drive, believed, rig, running, torsion, rules, **enough)
+            campaign = Campaign(title, drive, believed, rig, running, torsion, rules, **enough)
         except InvalidInput as error:
-            raise _placed_in_files(error, files) from None
+            for complaint in complaints_of(error):
+                with complaints.noted():
+                    raise _placed_in_files(complaint, files) from None
+        complaints.finish()
+        return campaign
 
 
 def write_campaign(campaign: Campaign, folder: str | Path) -> None:
@@ -181,6 +199,29 @@ def _believed(top: Fields) -> BelievedDrive:
         if error.field not in known:
             raise
         raise InvalidInput(f"{place}.{error.field}", error.value, error.allowed) from None
+
+
+def _takes_torque_at(rig: Fields) -> str:
+    return rig.choice("output_torque_at", SENSOR_PLACES) if rig.has("output_torque_at") else "drive"
+
+
+def with_load_before_sensor(believed: BelievedDrive) -> BelievedDrive:
+    """Return a drive whose torque sensor stands behind the load and feels none of its inertia.
+
+    The load inertia is a part of the output inertia then, and the drive moves as before.
+
+    Parameters
+    ----------
+    believed : BelievedDrive
+        With the sensor between output and load.
+    """
+    tolerances = {name: one for name, one in believed.tolerances.items() if name != "load_inertia"}
+    return replace(
+        believed,
+        output_inertia=believed.output_inertia + believed.load_inertia,
+        load_inertia=0.0,
+        tolerances=tolerances,
+    )
 
 
 def rig_from_fields(table: Fields, place: str) -> Rig:

@@ -59,6 +59,9 @@ RIG = _named(
     torsion_angle_noise="torsion_angle_noise_arcsec",
 )
 
+SENSOR_PLACES = ("drive", "brake")
+"""Where the torque sensor of the output sits: between drive and load inertia, or behind both."""
+
 GOOD_ENOUGH = _named(
     good_enough_error="good_enough_arcsec",
     good_enough_torque="good_enough_N_m",
@@ -93,6 +96,9 @@ TEMPERATURE = "temperature"
 """Channel of the drive's temperature, of which a record has the mean; or else its field has it."""
 TEMPERATURE_FIELD = "temperature_C"
 
+TRANSMISSION_ERROR = "transmission_error"
+"""Channel of a measured transmission error, in the place of one of the angles."""
+
 LAYOUT = TableLayout(
     format="csv",
     channels={
@@ -105,8 +111,8 @@ LAYOUT = TableLayout(
         )
         for column, _ in (COLUMNS[channel],)
     }
-    # No column has the temperature unless the campaign says which.
-    | {TEMPERATURE: Channel("", "C")},
+    # No column has these unless the campaign says which.
+    | {TEMPERATURE: Channel("", "C"), TRANSMISSION_ERROR: Channel("", "rad")},
     time=Channel(COLUMNS["time"][0], "s"),
     sample_rate=None,
     skip_rows=0,

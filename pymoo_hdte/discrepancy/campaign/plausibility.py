@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy.campaign.believed import BelievedDrive, Rig
+from pymoo_hdte.discrepancy.campaign.likely_causes import likely_ratio, likely_unit
 from pymoo_hdte.discrepancy.campaign.line_basis import spans_a_turn
 from pymoo_hdte.discrepancy.campaign.records import RunningRecord, TorsionRecord
 from pymoo_hdte.discrepancy.engine.rules import Rules
@@ -23,6 +24,8 @@ from pymoo_hdte.units import ARCSEC
 _LEAP = 2.0
 """Usual steps of an angle that a leap is off by at least, where its record is refused: a turn is
 as many at the fastest motion at which a wrapped angle can be continued."""
+_FRICTION = 0.5
+"""Share of the motor's torque under load, up to which friction may change it."""
 
 
 def check_believed(believed: BelievedDrive, rules: Rules) -> None:
@@ -201,7 +204,10 @@ def _check_travel(record: RunningRecord, ratio: float, rules: Rules) -> None:
             raise InvalidInput("mean speed of input_angle", speed, allowed)
     elif not abs(speed - record.input_speed) <= rules.speed_mismatch * abs(record.input_speed):
         within = f"{100.0 * rules.speed_mismatch:g} %"
-        allowed = f"{record.input_speed:g} rad/s within {within}, the input speed of the record"
+        cause = likely_unit("angle", speed / record.input_speed)
+        allowed = (
+            f"{record.input_speed:g} rad/s within {within}, the input speed of the record{cause}"
+        )
         raise InvalidInput("mean speed of input_angle", speed, allowed)
     if not spans_a_turn(record, ratio):
         allowed = f"at least {2.0 * math.pi * ratio:.6g} rad, one output turn"
@@ -214,8 +220,14 @@ def _check_error(record: RunningRecord, ratio: float, rules: Rules) -> None:
     largest = float(np.quantile(errors, 1.0 - rules.spike_share))
     most = rules.largest_transmission_error
     if not largest <= most:
+        travels = [float(np.ptp(one)) for one in (record.input_angle, record.output_angle)]
+        turns = [float(one[-1] - one[0]) for one in (record.input_angle, record.output_angle)]
+        # Where an angle begins anew, its ends tell nothing.
+        steady = all(0.9 * wide <= abs(turn) for wide, turn in zip(travels, turns, strict=True))
+        cause = likely_ratio(turns[0] / turns[1], ratio) if steady and turns[1] else ""
         allowed = (
             f"at most {most:g} rad at a ratio of {ratio:g}, both angles in rad with one common zero"
+            f"{cause}"
         )
         raise InvalidInput("largest transmission error", largest, allowed)
 
@@ -257,7 +269,10 @@ def _check_torques(
             allowed = f"{lowest:g} to {highest:g} N.m, the range of the record, or the zero beside"
             raise InvalidInput("mean of output_torque", measured, allowed)
     elif not abs(measured - load) <= rules.load_mismatch * abs(load) + slack:
-        raise InvalidInput("mean of output_torque", measured, f"near the load of {load:g} N.m")
+        cause = likely_unit("torque", measured / load) if load else ""
+        raise InvalidInput(
+            "mean of output_torque", measured, f"near the load of {load:g} N.m{cause}"
+        )
     motor = float(np.mean(record.input_torque))
     slack = multiple * rig.input_torque_zero
     if load == 0.0:
@@ -272,5 +287,7 @@ def _check_torques(
     # torque.
     least = rules.load_mismatch * share - slack if load * record.input_speed > 0.0 else -math.inf
     if not (least <= math.copysign(1.0, load) * motor and abs(motor) <= multiple * share + slack):
-        allowed = f"near load / ratio = {load / ratio:.3g} N.m"
+        # Friction takes its share of the motor's torque, so that only large factors are told.
+        cause = likely_unit("torque", motor * ratio / load, _FRICTION)
+        allowed = f"near load / ratio = {load / ratio:.3g} N.m{cause}"
         raise InvalidInput("mean of input_torque", motor, allowed)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import unicodedata
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, fields, replace
@@ -23,13 +24,21 @@ from pymoo_hdte.discrepancy.campaign.format import (
     TEMPERATURE,
     TEMPERATURE_FIELD,
     TORSION,
+    TRANSMISSION_ERROR,
 )
 from pymoo_hdte.discrepancy.campaign.records import ROLES, RunningRecord, TorsionRecord
+from pymoo_hdte.io.array_files import READERS
 from pymoo_hdte.io.fields import Fields
-from pymoo_hdte.io.layout import TableLayout, layout_from_fields, with_zeros
+from pymoo_hdte.io.layout import Channel, TableLayout, layout_from_fields, with_zeros
 from pymoo_hdte.io.tables import Columns, read_columns
 from pymoo_hdte.io.text_lines import Seen
 from pymoo_hdte.units import ORIGINS
+
+_ENDINGS = (
+    *(ENDING, PLAIN_ENDING, ".txt.gz", ".txt"),
+    *(ending for endings, _ in READERS.values() for ending in endings),
+)
+"""Of files of records."""
 
 Channels = dict[str, Any]
 """By attribute of the record: an array (n,), or a number for the temperature."""
@@ -54,9 +63,7 @@ def record_path(entry: Fields, place: str, folder: Path) -> Path:
     """
     file = entry.text("file")
     if not _name_of(file):
-        allowed = (
-            f"letters, digits, '.', '-' and '_', ending in {ENDING}, {PLAIN_ENDING}, .txt or .mat"
-        )
+        allowed = f"a name without folders, ending in {', '.join(_ENDINGS)}"
         raise InvalidInput(f"{place}.file", file, allowed)
     if not (folder / file).is_file():
         raise InvalidInput(f"{place}.file", file, f"a file in {folder}")
@@ -103,6 +110,9 @@ def read_record(
     layout = with_zeros(entry.table("zero"), layout) if entry.has("zero") else layout
     stated = {name: one for name, one in layout.channels.items() if one.column != ""}
     needed = [field.name for field in fields(kind) if field.name in stated]
+    if running and TRANSMISSION_ERROR in stated:
+        needed.remove(_computed_angle(stated, place))
+        needed.append(TRANSMISSION_ERROR)
     layout = replace(layout, channels={name: stated[name] for name in needed})
     known = _ranges(entry, place) | _temperature(entry, place, layout) if running else {}
     columns = read_columns(path, layout, seen=seen)
@@ -131,10 +141,18 @@ def record_table(record: RunningRecord | TorsionRecord) -> dict[str, Any]:
 
 
 def _name_of(file: str) -> str:
-    """Return the name of the record in a file, empty if it cannot be one."""
-    endings = "|".join(map(re.escape, (ENDING, PLAIN_ENDING, ".txt.gz", ".txt", ".mat")))
-    named = re.fullmatch(rf"(\w[\w.-]*?)({endings})", file, re.ASCII)
-    return named[1] if named else ""
+    """Return the name of the record in a file, empty if it cannot be one.
+
+    It is what stands before the ending, in ASCII: other characters become the letter without its
+    accent, or an underscore.
+    """
+    stem = next((file.removesuffix(one) for one in _ENDINGS if file.endswith(one)), "")
+    if not stem or not file.isprintable() or any(mark in file for mark in '/\\:*?"<>|'):
+        return ""
+    letters = unicodedata.normalize("NFKD", stem.replace("ß", "ss"))
+    plain = "".join(one for one in letters if not unicodedata.combining(one))
+    name = re.sub(r"[^\w.-]", "_", plain, flags=re.ASCII)
+    return name if re.match(r"\w", name, re.ASCII) and not stem.startswith(".") else ""
 
 
 def _ranges(entry: Fields, place: str) -> dict[str, Any]:
@@ -170,6 +188,18 @@ def _temperature(entry: Fields, place: str, layout: TableLayout) -> dict[str, fl
     return {TEMPERATURE: found + ORIGINS["C"]}
 
 
+def _computed_angle(stated: dict[str, Channel], place: str) -> str:
+    """Return the angle without a column, for which one of transmission error stands."""
+    own = [
+        name for name in ("input_angle", "output_angle") if stated[name] != LAYOUT.channels[name]
+    ]
+    if len(own) == 2:
+        field = f"{place}.table.channels.{TRANSMISSION_ERROR}"
+        allowed = "absent beside both input_angle and output_angle, which it follows from"
+        raise InvalidInput(field, stated[TRANSMISSION_ERROR].column, allowed)
+    return "input_angle" if own == ["output_angle"] else "output_angle"
+
+
 def _in_si(columns: Columns, ratio: float) -> Channels:
     """Return time and channels of a file in SI; angles that wrap are on one turn with the other."""
     layout = columns.layout
@@ -180,15 +210,20 @@ def _in_si(columns: Columns, ratio: float) -> Channels:
         measured["time"] = columns.si(layout.time)
     elif layout.sample_rate is not None:
         measured["time"] = (layout.skip_rows + np.arange(columns.length)) / layout.sample_rate
+    error = measured.pop(TRANSMISSION_ERROR, None)
+    if error is not None and "input_angle" in measured:
+        return measured | {"output_angle": measured["input_angle"] / ratio - error}
+    if error is not None:
+        return measured | {"input_angle": (measured["output_angle"] + error) * ratio}
     if "input_angle" not in measured:
         return measured
     # The turns before the first row are not known, but the transmission error is far below one.
-    error = float(np.median(measured["input_angle"] / ratio - measured["output_angle"]))
+    middle = float(np.median(measured["input_angle"] / ratio - measured["output_angle"]))
     period = layout.channels["input_angle"].period
     if period is not None:
-        measured["input_angle"] -= period * round(error * ratio / period)
+        measured["input_angle"] -= period * round(middle * ratio / period)
     elif (period := layout.channels["output_angle"].period) is not None:
-        measured["output_angle"] += period * round(error / period)
+        measured["output_angle"] += period * round(middle / period)
     return measured
 
 

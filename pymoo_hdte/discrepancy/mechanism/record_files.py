@@ -9,7 +9,7 @@ from pathlib import Path, PureWindowsPath
 
 from pymoo_hdte.checks import InvalidInput, one_of
 from pymoo_hdte.io.fields import Fields
-from pymoo_hdte.io.joined import read_joined
+from pymoo_hdte.io.joined import read_unbroken
 from pymoo_hdte.io.layout import Channel, TableLayout, layout_from_fields, with_zeros
 from pymoo_hdte.io.parts import Part, part_from_fields
 from pymoo_hdte.io.tables import check_sha256
@@ -112,7 +112,7 @@ def read_records(
     Raises
     ------
     InvalidInput
-        With file and line, for what `read_joined`, `check_sha256` and `Record` refuse, and for a
+        With file and line, for what `read_unbroken`, `check_sha256` and `Record` refuse, and for a
         coordinate of which only the acceleration was measured.
     OSError
         If a file cannot be read.
@@ -121,8 +121,13 @@ def read_records(
         _check_sha256(*listed.sha256, listed.place)
     layout, told = _with_positions(listed, coordinates)
     found = []
-    for name, role, part in listed.parts:
-        table = read_joined(listed.files, layout, seen, part)
+    tables = [
+        (name if len(pieces) == 1 else f"{name}_{number}", role, table)
+        for name, role, part in listed.parts
+        for pieces in (read_unbroken(listed.files, layout, seen, part),)
+        for number, table in enumerate(pieces, 1)
+    ]
+    for name, role, table in tables:
         of_channels = {one: noise[one] for one in noise if one in table.channels}
         remarks = [*([table.remark] if table.remark else []), *told]
         try:

@@ -1,0 +1,64 @@
+"""Where the output's torque sensor sits, as the records show it: before or behind the load."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pymoo_hdte.discrepancy.campaign.campaign import Campaign
+
+_SURE = 5.0
+"""Standard errors between a sensor that feels the load's inertia and one that does not."""
+_HALF = 0.5
+"""Share of the inertia below which the sensor is nearer to the brake."""
+
+
+def inertia_felt(campaign: Campaign) -> tuple[float, float]:
+    """Return the share of the load inertia that the output torque shows, and its standard error.
+
+    At each order of the static error the output swings, and a sensor at the drive feels the load
+    inertia times the acceleration: the share is 1 there and 0 at the brake, both dimensionless.
+
+    Parameters
+    ----------
+    campaign : Campaign
+        With a load inertia.
+
+    Returns
+    -------
+    share, error : float
+        0 and infinity where nothing swings or there is no load inertia.
+    """
+    weights, moments = 0.0, 0.0
+    for record in campaign.running:
+        angle = record.input_angle
+        orders = np.array(campaign.believed.error_orders)
+        phases = np.outer(angle, orders)
+        time = (record.time - record.time.mean()) / max(np.ptp(record.time), 1e-30)
+        basis = np.column_stack([np.ones_like(time), time, np.cos(phases), np.sin(phases)])
+        measured = np.column_stack([record.output_angle, record.output_torque])
+        lines, *_ = np.linalg.lstsq(basis, measured, rcond=None)
+        noise = float(np.std(measured[:, 1] - basis @ lines[:, 1])) + 1e-30
+        speed = (angle[-1] - angle[0]) / (record.time[-1] - record.time[0])
+        swing = np.tile((orders * speed) ** 2, 2) * lines[2:, 0]
+        expected = -campaign.believed.load_inertia * swing
+        # Each coefficient of a line has this weight in least squares.
+        weight = len(time) / (2.0 * noise**2)
+        weights += weight * float(expected @ expected)
+        moments += weight * float(expected @ lines[2:, 1])
+    return (moments / weights, weights**-0.5) if weights > 0.0 else (0.0, np.inf)
+
+
+def sensor_hint(campaign: Campaign) -> str:
+    """Return what to do where the sensor feels no load inertia, in a sentence, or nothing.
+
+    Parameters
+    ----------
+    campaign : Campaign
+    """
+    share, error = inertia_felt(campaign)
+    if not (share < _HALF and 1.0 - share > _SURE * error and abs(share) < _HALF):
+        return ""
+    return (
+        f"The output torque shows {100.0 * abs(share):.0f} % of the believed load inertia: if its "
+        'sensor sits behind the load, put output_torque_at = "brake" into [rig].'
+    )

@@ -1,0 +1,117 @@
+"""Campaigns as people have them: names of files, paths, columns, and where a sensor sits."""
+
+import tomllib
+
+import numpy as np
+import pytest
+import tomli_w
+from small_campaigns import BELIEVED, small_campaign
+
+from pymoo_hdte.checks import InvalidInput, SeveralComplaints
+from pymoo_hdte.discrepancy import read_campaign, write_campaign
+
+
+@pytest.fixture
+def folder(tmp_path):
+    write_campaign(small_campaign(), tmp_path / "Prüfstand 3")
+    return tmp_path / "Prüfstand 3"
+
+
+def changed(folder, change):
+    toml = folder / "campaign.toml"
+    whole = tomllib.loads(toml.read_text(encoding="utf-8"))
+    change(whole)
+    toml.write_text(tomli_w.dumps(whole), encoding="utf-8")
+
+
+def renamed(folder, name):
+    def change(whole):
+        (folder / whole["record"][0]["file"]).rename(folder / name)
+        whole["record"][0]["file"] = name
+
+    changed(folder, change)
+
+
+@pytest.mark.parametrize(
+    ("file", "name"),
+    [
+        ("Öl kalt, 20 Nm.csv.gz", "Ol_kalt__20_Nm"),
+        ("größe 1.csv.gz", "grosse_1"),
+        ("a (2).csv.gz", "a__2_"),
+        ("slow.2-b.csv.gz", "slow.2-b"),
+    ],
+)
+def test_files_with_spaces_and_umlauts(folder, file, name):
+    renamed(folder, file)
+    read = read_campaign(folder)
+    assert read.running[0].name == name
+    write_campaign(read, folder.parent / "again")
+    assert read_campaign(folder.parent / "again").running[0].name == name
+
+
+@pytest.mark.parametrize("file", ["../slow.csv", "a/b.csv", "a\\b.csv", ".csv", ".a.csv", "a.exe"])
+def test_a_file_of_another_folder_is_refused(folder, file):
+    changed(folder, lambda whole: whole["record"][0].update(file=file))
+    with pytest.raises(InvalidInput, match="without folders"):
+        read_campaign(folder)
+
+
+def test_the_path_of_campaign_toml_is_that_of_its_folder(folder):
+    assert read_campaign(folder / "campaign.toml").title == read_campaign(folder).title
+
+
+@pytest.mark.parametrize("missing", ["input_angle", "output_angle"])
+def test_a_transmission_error_stands_for_one_of_the_angles(folder, missing):
+    campaign = small_campaign()
+    stated = {"input_angle": "output_angle", "output_angle": "input_angle"}[missing]
+    rows = {"transmission_error": {"column": "TE", "unit": "arcsec"}}
+    rows[stated] = {"column": "angle", "unit": "deg"}
+    for record in campaign.running:
+        error = np.degrees(record.transmission_error(50.0)) * 3600.0
+        columns = [record.time, np.degrees(getattr(record, stated)), error]
+        columns += [record.input_torque, record.output_torque]
+        text = "time_s,angle,TE,input_torque_Nm,output_torque_Nm\n" + "\n".join(
+            ",".join(map(repr, row)) for row in np.column_stack(columns).tolist()
+        )
+        (folder / f"{record.name}.csv").write_text(text)
+
+    def change(whole):
+        for entry in whole["record"]:
+            if entry["test"] == "running":
+                entry["file"] = entry["file"].removesuffix(".gz")
+                entry["table"] = {"channels": rows}
+
+    changed(folder, change)
+    for ours, theirs in zip(read_campaign(folder).running, campaign.running, strict=True):
+        found, expected = getattr(ours, missing), getattr(theirs, missing)
+        np.testing.assert_allclose(found, expected, rtol=0, atol=1e-10 * np.abs(expected).max())
+
+    other = {missing: {"column": "angle", "unit": "deg"}}
+    changed(folder, lambda whole: whole["record"][0]["table"]["channels"].update(other))
+    with pytest.raises(InvalidInput, match="absent beside both"):
+        read_campaign(folder)
+
+
+def test_all_that_is_wrong_in_a_table_is_told_at_once(folder):
+    def change(whole):
+        whole["believed"] |= {"stiffness_Nm_per_rad": "soft", "colour": 3, "weight": 4}
+        del whole["believed"]["ratio"]
+
+    changed(folder, change)
+    with pytest.raises(SeveralComplaints) as caught:
+        read_campaign(folder)
+    for word in ("stiffness_Nm_per_rad", "colour", "weight", "ratio"):
+        assert sum(word in one.field for one in caught.value.complaints) == 1
+    assert all("line" in one.field for one in caught.value.complaints)
+
+
+def test_a_sensor_at_the_brake_feels_no_inertia_of_the_load(folder):
+    changed(folder, lambda whole: whole["rig"].update(output_torque_at="brake"))
+    read = read_campaign(folder)
+    assert read.believed.load_inertia == 0.0
+    assert read.believed.output_inertia == BELIEVED.output_inertia + BELIEVED.load_inertia
+    changed(folder, lambda whole: whole["rig"].update(output_torque_at="drive"))
+    assert read_campaign(folder).believed.load_inertia == BELIEVED.load_inertia
+    changed(folder, lambda whole: whole["rig"].update(output_torque_at="motor"))
+    with pytest.raises(InvalidInput, match="'drive', 'brake'"):
+        read_campaign(folder)
