@@ -60,9 +60,8 @@ def test_many_gaps_or_a_time_that_falls_are_refused(gaps, tmp_path):
         read_unbroken_tables(path, LAYOUT)
 
 
-def test_a_rig_has_a_record_for_each_part(tmp_path):
-    log(tmp_path / "a.csv", [(900, 7e-3)], further=["u"])
-    rig = {
+def rig_with(*records):
+    return {
         "title": "a mass",
         "coordinates": {"q": {"inertia": {"value": 1.0}}},
         "ports": {"slide": {"motion": {"q": 1.0}, "damping": {"value": 1.0, "tolerance": 1.0}}},
@@ -71,9 +70,25 @@ def test_a_rig_has_a_record_for_each_part(tmp_path):
             "time": {"column": "t", "unit": "s"},
             "channels": {"q": {"column": "q", "unit": "m"}, "u": {"column": "u", "unit": "N"}},
         },
-        "records": [{"file": "a.csv"}],
+        "records": [*records],
     }
+
+
+def test_a_name_that_a_part_has_is_refused(tmp_path):
+    log(tmp_path / "a.csv", [(900, 7e-3)], further=["u"])
+    log(tmp_path / "b.csv", [], further=["u"])
+    rig = rig_with(
+        {"file": "a.csv", "name": "a", "role": "train"},
+        {"file": "b.csv", "name": "a_1", "role": "held_out"},
+    )
     (tmp_path / "rig.toml").write_text(tomli_w.dumps(rig))
+    with pytest.raises(InvalidInput, match="a_1"):
+        read_rig(tmp_path)
+
+
+def test_a_rig_has_a_record_for_each_part(tmp_path):
+    log(tmp_path / "a.csv", [(900, 7e-3)], further=["u"])
+    (tmp_path / "rig.toml").write_text(tomli_w.dumps(rig_with({"file": "a.csv"})))
     records = read_rig(tmp_path).records
     names = ["a_train_1", "a_train_2", "a_held_out"]
     assert [(one.name, one.role) for one in records] == [

@@ -184,11 +184,13 @@ def read_rig(
         # Each part is read on its own, so that a fault outside of it does no harm.
         seen = told(progress, [file for one in listed for _ in one.parts for file in one.paths])
         coordinates = model.mechanism.coordinates
-        records = {
-            record.name: record
-            for one in listed
-            for record in read_records(one, coordinates, noise, seen)
-        }
+        records: dict[str, Record] = {}
+        for one in listed:
+            for record in read_records(one, coordinates, noise, seen):
+                if record.name in records:
+                    allowed = "another name: a record that was divided at a gap has it"
+                    raise InvalidInput(f"{one.place}: name", record.name, allowed)
+                records[record.name] = record
         _check_noise(noise, records, path.name)
     return MeasuredMechanism(
         _with_angles(model.mechanism, listed),
