@@ -4,7 +4,7 @@ import re
 
 import numpy as np
 import pytest
-from places import DOCS, README
+from places import DOCS, README, ROOT
 
 from experiments.blind.data import read_outcomes
 from experiments.blind.experiment import OUTCOMES, SECONDS
@@ -17,9 +17,10 @@ PAGE = (DOCS / "model_and_measurements.md").read_text(encoding="utf-8")
 POOLED = total(recent(read_runs(DATA / RUNS)))
 
 
-def test_the_readme_says_what_came_of_the_blind_campaigns():
+@pytest.mark.parametrize("text", [README, (ROOT / "paper.md").read_text(encoding="utf-8")])
+def test_readme_and_paper_say_what_came_of_the_blind_campaigns(text):
     words = found(POOLED, intervals=False)
-    assert f"{words[0].upper()}{words[1:]}." in " ".join(README.split())
+    assert f"{words[0].upper()}{words[1:]}." in " ".join(text.split())
 
 
 def test_goals_and_states_are_those_of_the_pooled_runs():
