@@ -57,6 +57,8 @@ HELD_OUT = (
     "them. Some of its ideas come from an earlier prototype, though, which had been judged on WFG."
 )
 PEERS_NOTE = (
+    "AMP-MOPSO draws first velocities whose first step ends within the bounds; the printed ones "
+    "would depend on where each problem has its origin. "
     "MOPSO-CD (pymoo) and NSPSO (pygmo) know no constraints: the first is judged by the feasible "
     "part of what it offers, the second does not run there and ranks last. pymoo's MOPSO-CD and "
     "CMOPSO truncate their archives with generators without a seed; here these are seeded. Random "

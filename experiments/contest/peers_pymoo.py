@@ -18,7 +18,7 @@ from pymoo.util.ref_dirs import get_reference_directions
 
 from experiments.comparison.open_runs import seeded_default_rng
 from experiments.contest.offer import POPULATION, Offer
-from pymoo_hdte.algorithms import AMPMOPSO, ElitistSwarm
+from pymoo_hdte.algorithms import AMPMOPSO, ElitistSwarm, FirstStepWithinBounds
 
 _PARTITIONS = {2: 99, 3: 12}
 """Partitions of the directions of NSGA-III: 100 directions for two objectives, 91 for three."""
@@ -41,8 +41,17 @@ PYMOO: dict[str, Callable[[Problem], Algorithm]] = {
 }
 """Peers of pymoo by name, with its defaults beside the size of the population."""
 
+def _amp_mopso(_: Problem) -> Algorithm:
+    """Return the paper's swarm with first velocities that do not depend on a problem's origin.
+
+    Under the printed law the boxes of the benchmark would decide how it starts.
+    """
+    law = FirstStepWithinBounds()
+    return AMPMOPSO(pop_size=POPULATION, archive_size=POPULATION, initial_velocity=law)
+
+
 OWN: dict[str, tuple[Callable[[Problem], Algorithm], bool]] = {
-    "AMP-MOPSO": (lambda _: AMPMOPSO(pop_size=POPULATION, archive_size=POPULATION), True),
+    "AMP-MOPSO": (_amp_mopso, True),
     "ElitistSwarm": (lambda _: ElitistSwarm(pop_size=POPULATION), False),
 }
 """Algorithms of this package by name, and whether they count on the number of generations."""
