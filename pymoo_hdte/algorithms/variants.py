@@ -13,8 +13,9 @@ class MOPSO(ParticleSwarm):
     """Basic swarm: inertia weight falling linearly from 0.9 to 0.4, c1 = c2 = 2, no mutation.
 
     The paper compares with a MOPSO (Table 7) and does not describe it; this one has the archive of
-    AMP-MOPSO and none of its strategies. It follows Coello Coello, Pulido and Lechuga (2004), with
-    crowding in place of their grid and without their mutation. Parameters, errors and choices: see
+    AMP-MOPSO and none of its strategies. Archive and personal bests are those of Coello Coello,
+    Pulido and Lechuga (2004), with crowding in place of their grid and without their mutation.
+    Parameters, errors and choices: see
     `ParticleSwarm`.
 
     Examples
