@@ -41,6 +41,7 @@ PYMOO: dict[str, Callable[[Problem], Algorithm]] = {
 }
 """Peers of pymoo by name, with its defaults beside the size of the population."""
 
+
 def _amp_mopso(_: Problem) -> Algorithm:
     """Return the paper's swarm with first velocities that do not depend on a problem's origin.
 

@@ -1,4 +1,4 @@
-"""The commands of the command line on an input: a whole report, or one line and nothing else."""
+"""The commands of the command line on an input: a whole report, or a line for each complaint."""
 
 from __future__ import annotations
 
@@ -60,10 +60,11 @@ def _run(arguments: list[str], folder: Path, report: ReportFolder) -> None:
     if code == cli.MISTAKE:
         if written or out.exists():
             raise Wrong(f"written in spite of code 2: {written}")
-        line = errors.getvalue()
-        if line.count("\n") != 1 or not line.startswith("pymoo-hdte: error: "):
-            raise Wrong(f"not one line: {line[:200]!r}")
-        raise InvalidInput(arguments[0], None, line.strip())
+        lines = errors.getvalue().splitlines()
+        if not lines or not all(line.startswith("pymoo-hdte: error: ") for line in lines):
+            raise Wrong(f"not a line for each complaint: {lines!r}"[:200])
+        # The first stands for all: what is refused is told in one line here.
+        raise InvalidInput(arguments[0], None, lines[0])
     if code != 0 or not set(report.always) <= written <= set(report.files):
         raise Wrong(f"code {code} and {written}")
     json.loads((out / report.document).read_text(encoding="utf-8"))

@@ -27,7 +27,7 @@ import numpy as np
 from experiments.reliability.inputs import KINDS
 from experiments.reliability.mutations import mutated, put
 from experiments.runner.campaign import Run
-from pymoo_hdte.checks import InvalidInput
+from pymoo_hdte.checks import InvalidInput, SeveralComplaints
 
 SEED = 20261122
 REFUSED, ACCEPTED, FAILED, HUNG, CRASHED = range(5)
@@ -88,14 +88,20 @@ def _read(kind: str, folder: Path) -> tuple[int, str]:
     try:
         KINDS[kind].read(folder)
     except InvalidInput as error:
-        words = str(error)
-        clear = bool(error.field and error.allowed) and "\n" not in words
-        return (REFUSED if clear and len(words) <= LONGEST_MESSAGE else FAILED), words
+        complaints = error.complaints if isinstance(error, SeveralComplaints) else (error,)
+        return (REFUSED if all(map(_is_clear, complaints)) else FAILED), str(error)
     except OSError as error:
         return REFUSED, repr(error)
     except Exception:
         return FAILED, traceback.format_exc()
     return ACCEPTED, "read"
+
+
+def _is_clear(complaint: InvalidInput) -> bool:
+    """Tell whether a complaint names its field and what is allowed, in one line of some length."""
+    words = str(complaint)
+    named = bool(complaint.field and complaint.allowed)
+    return named and "\n" not in words and len(words) <= LONGEST_MESSAGE
 
 
 def outcomes_of_process(command: list[str], count: int, seconds: float) -> list[int]:

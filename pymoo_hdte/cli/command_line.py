@@ -37,7 +37,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         # Nobody reads on: no mistake, and nobody to tell.
         raise
     except (InvalidInput, ArithmeticError, OSError) as error:
-        print(f"pymoo-hdte: error: {_message(error)}", file=sys.stderr)
+        for line in _message(error).splitlines():
+            print(f"pymoo-hdte: error: {line}", file=sys.stderr)
         return MISTAKE
     except KeyboardInterrupt:
         print("pymoo-hdte: interrupted, nothing was written", file=sys.stderr)

@@ -189,7 +189,7 @@ def _lines(
     except (gzip.BadGzipFile, EOFError, zlib.error) as error:
         raise InvalidInput(path.name, str(error), f"gzip-compressed {kind} in UTF-8") from None
     except UnicodeError as error:
-        allowed = f"{kind} in the encoding {encoding or 'UTF-8'}"
+        allowed = f"{kind} in {encoding or 'UTF-8, cp1252 or UTF-16'}"
         raise InvalidInput(path.name, str(error), allowed) from None
     finally:
         if text is not None:

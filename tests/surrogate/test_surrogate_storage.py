@@ -2,12 +2,12 @@
 
 import json
 import os
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from pymoo_hdte.checks import InvalidInput
+from pymoo_hdte.io import whole_file
 from pymoo_hdte.surrogate import Box, ChebyshevSurrogate
 
 BOX = Box(("theta_s", "K"), (0.1, 1 / 3), (0.3, 2 / 3))
@@ -56,12 +56,12 @@ def test_the_name_is_taken_as_given(surrogate, tmp_path):
 def test_a_write_that_fails_leaves_the_former_file(surrogate, path, monkeypatch):
     before = path.read_bytes()
 
-    def fail(file, contents):
-        with file.open("wb") as stream:
-            stream.write(contents[: len(contents) // 2])
+    def fail(descriptor, content):
+        with os.fdopen(descriptor, "wb") as stream:
+            stream.write(content[: len(content) // 2])
         raise OSError("disk full")
 
-    monkeypatch.setattr(Path, "write_bytes", fail)
+    monkeypatch.setattr(whole_file, "write_all", fail)
     with pytest.raises(OSError, match="disk full"):
         surrogate.save(path)
     assert path.read_bytes() == before

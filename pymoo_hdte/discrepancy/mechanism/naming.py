@@ -24,6 +24,7 @@ from pymoo_hdte.discrepancy.engine.search import Search
 from pymoo_hdte.discrepancy.engine.verdict import Verdict, judge
 from pymoo_hdte.discrepancy.mechanism.evidence import MeasuredData
 from pymoo_hdte.discrepancy.mechanism.rest import share_removed
+from pymoo_hdte.mechanism.believed import SMALLEST_SHARE
 
 _NAMING = ("named", "class", "partial")
 
@@ -265,13 +266,15 @@ def _with_rivals(verdict: Verdict, equivalent: Iterable[Hypothesis]) -> Verdict:
 def _doubts(data: MeasuredData, base: Fit, chosen: Hypothesis) -> list[str]:
     """Return what forbids to name a set plainly: of its effects, and bounds of believed values.
 
-    A value that ended at zero is a part that the machine does not have.
+    A value that ended at zero, or at the least that a fit knows, is a part that the machine does
+    not have.
     """
     fitted = chosen.fit
     stuck = [
         parameter.name
         for parameter, side in zip(data.base, fitted.bound_sides, strict=False)
-        if side > 0.0 or (side < 0.0 and parameter.lower != 0.0)
+        if side > 0.0
+        or (side < 0.0 and parameter.lower not in (0.0, SMALLEST_SHARE * parameter.start))
     ]
     found = doubts_of(Search(data, base, ()), chosen, None)
     return found + [f"{name} ended at the bound of its tolerance" for name in stuck]

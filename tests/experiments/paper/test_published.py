@@ -42,7 +42,7 @@ def test_the_page_says_both_and_that_neither_is_the_paper_s(printed):
     (finding,) = table.findings
     assert not finding.agrees
     assert finding.answers
-    clause = published._of_the_first_page(printed)
+    clause = published.of_the_first_page(printed)
     for value in (*(one.dte for one in printed.values()), TABLE_8["initial"].mean_arcsec):
         assert f"{value:.1f}" in finding.sentence
         assert f"{value:.1f}" in clause
