@@ -74,7 +74,8 @@ def who_finds(scores: Scores, contested: Contested) -> str:
     parts = []
     for algorithm in OF_TABLE_7:
         found, runs = runs_that_find(scores, contested, algorithm)
-        parts.append(f"{algorithm} in {'all' if found == runs else f'{found} of'} {runs} runs")
+        share = "all" if found == runs else f"{found or 'none'} of"
+        parts.append(f"{algorithm} in {share} {runs} runs")
     return f"the front is found by {', '.join(parts[:-1])} and {parts[-1]}"
 
 

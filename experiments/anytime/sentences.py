@@ -102,9 +102,8 @@ def closest_sentence(ranked: Sequence[Reading]) -> str:
         "" if place is None else f", against {significant(ranked[place].factor, 2)} at 100 x 100"
     )
     return (
-        f"The printed numbers come closest with {best.population} particles after "
-        f"{best.evaluations:,} evaluations (off by a factor of {significant(best.factor, 2)}"
-        f"{against})."
+        f"The printed numbers come closest with {_setting(best)}: off by a factor of "
+        f"{significant(best.factor, 2)}{against}."
     )
 
 

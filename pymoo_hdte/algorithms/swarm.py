@@ -19,7 +19,7 @@ from pymoo_hdte.algorithms.inertia import InertiaWeight
 from pymoo_hdte.algorithms.points import Points
 from pymoo_hdte.algorithms.pyramid import Hierarchy
 from pymoo_hdte.algorithms.velocity import InitialVelocity, VelocityWithinBounds
-from pymoo_hdte.checks import InvalidInput, whole_number
+from pymoo_hdte.checks import finite_array, whole_number
 
 
 class ParticleSwarm(Swarm):
@@ -126,9 +126,7 @@ class ParticleSwarm(Swarm):
         particles = super()._initialize_infill()
         X, (lowest, highest) = particles.get("X"), self.problem.bounds()
         V = self.initial_velocity(X, lowest, highest, self.random_state)
-        if np.shape(V) != X.shape:
-            wanted = f"{X.shape}, that of the positions"
-            raise InvalidInput("shape that initial_velocity returns", np.shape(V), wanted)
+        V = finite_array("what initial_velocity returns", V, X.shape)
         return self._flying(particles, V, [None] * self.pop_size)
 
     def _flying(

@@ -8,7 +8,9 @@ from __future__ import annotations
 
 import importlib
 import json
+import tokenize
 import zipfile
+import zlib
 from array import array
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -135,6 +137,13 @@ def _read_hdf5(path: Path, names: Sequence[str]) -> Arrays:
         raise InvalidInput(path.name, str(error)[:200], allowed) from None
 
 
+_DAMAGED = (
+    *(OSError, ValueError, LookupError, TypeError, EOFError, RuntimeError, SyntaxError),
+    *(zlib.error, zipfile.BadZipFile, tokenize.TokenError),
+)
+"""What libraries raise where bytes of a packed file were changed."""
+
+
 def _check_zip(path: Path, wanted: Callable[[str], bool]) -> list[str]:
     """Return the names in a zip file, whose wanted members together fit into the budget."""
     with zipfile.ZipFile(path) as packed:
@@ -153,7 +162,9 @@ def _read_npz(path: Path, names: Sequence[str]) -> Arrays:
         return Arrays(_checked(path, names, arrays, there))
     except InvalidInput:
         raise
-    except (ValueError, KeyError, EOFError, TypeError, zipfile.BadZipFile) as error:
+    except _DAMAGED as error:
+        if isinstance(error, OSError) and not path.is_file():
+            raise
         raise InvalidInput(path.name, str(error)[:200], "an intact npz file of numbers") from None
 
 
@@ -191,6 +202,8 @@ def _read_xlsx(path: Path, names: Sequence[str]) -> Arrays:
         book = openpyxl.load_workbook(path, read_only=True, data_only=True)
         try:
             sheet = book.worksheets[0]
+            # What a sheet says of its size may be too small, and rows beyond it would be left out.
+            sheet.reset_dimensions()
             rows = sheet.iter_rows(values_only=True)
             titles: list[str] = []
             above = 0
@@ -227,7 +240,7 @@ def _read_xlsx(path: Path, names: Sequence[str]) -> Arrays:
             book.close()
     except InvalidInput:
         raise
-    except (OSError, ValueError, KeyError, TypeError, IndexError, zipfile.BadZipFile) as error:
+    except _DAMAGED as error:
         if isinstance(error, OSError) and not path.is_file():
             raise
         raise InvalidInput(path.name, str(error)[:200], "an intact xlsx file") from None

@@ -24,7 +24,7 @@ from pymoo_hdte.io.text_columns import TextTable, column_label
 from pymoo_hdte.io.text_header import numbered
 from pymoo_hdte.io.text_lines import Seen
 from pymoo_hdte.io.text_table import LARGEST, read_text_table
-from pymoo_hdte.units import ORIGINS
+from pymoo_hdte.units import ORIGINS, usual_spelling
 
 __all__ = ["CHANNEL_UNITS", "LARGEST", "Channel", "TableLayout", "layout_from_fields"]
 
@@ -187,7 +187,13 @@ def _tables(
     steps = np.diff(time)
     mean, usual = float(np.mean(steps)), float(np.median(steps))
     falls, leaps = steps <= 0.0, steps > LONGEST_STEP * mean
-    pieces = _pieces(steps, usual) if split and leaps.any() and not falls.any() else []
+    # Over a gap nobody knows how many turns an angle made, or what a rate added up to.
+    counts = any(
+        channel.unwrap or channel.wraps is not None or channel.integrated
+        for channel in layout.channels.values()
+    )
+    divided = split and leaps.any() and not falls.any() and not counts
+    pieces = _pieces(steps, usual) if divided else []
     for row in np.flatnonzero(falls | leaps)[:1] if not pieces else ():
         allowed = (
             f"rising by the median step, {usual:g} s, within 1 %, or unevenly, by at most "
@@ -328,7 +334,7 @@ def _columns(path: Path, layout: TableLayout, gaps: bool, seen: Seen | None) -> 
 
 def _check_unit(table: TextTable, channel: Channel) -> None:
     """Refuse a channel whose unit is another than the file has in its row of units."""
-    unit = table.units.get(str(channel.column), "").strip("[]() ")
+    unit = usual_spelling(table.units.get(str(channel.column), "").strip("[]() "))
     stated = CHANNEL_UNITS.get(unit), ORIGINS.get(unit, 0.0)
     if unit in CHANNEL_UNITS and stated != (channel.factor, channel.origin):
         field = f"{table.file}, line {table.title_line + 1}: unit of {channel.column}"

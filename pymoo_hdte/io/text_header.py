@@ -57,7 +57,9 @@ def numbered_header(
     titles above it, if any, are not read.
     """
     for line, text in zip(numbers, lines[:MOST_LINES_ABOVE], strict=False):
-        for mark in _marks(text, delimiter):
+        # A comma may be that of decimals: it separates cells only where nothing else does.
+        present: list[str | None] = [mark for mark in ";\t," if mark in text]
+        for mark in _marks(text, delimiter) if delimiter is not None else present[:1] or [","]:
             cells = [cell.strip(AROUND) for cell in text.split(mark)]
             if max(columns) < len(cells) and all(begins_as_number(cells[at]) for at in columns):
                 titles = [numbered(at) for at in range(len(cells))]

@@ -177,3 +177,62 @@ def test_another_unit_is_told_with_its_factor():
     foot_pound = FOREIGN["lbf.ft"][1] * known["N.m"]
     assert math.isclose(foot_pound, 0.45359237 * 9.80665 * 0.3048, rel_tol=1e-15)
     assert "'N.m'" in suggestion("nM", ["N.m", "mN.m"])
+
+
+def test_a_comma_of_decimals_separates_no_numbered_columns(tmp_path):
+    path = tmp_path / "a.csv"
+    rows = [f"{0.01 * i:.2f};{i + 0.5}".replace(".", ",") for i in range(40)]
+    path.write_text("\n".join(rows) + "\n")
+    layout = TableLayout("csv", {"q": Channel(1, "m")}, Channel(0, "s"), None, 0, decimal="comma")
+    table = read_table(path, layout)
+    np.testing.assert_allclose(table.channels["q"], np.arange(40) + 0.5)
+
+
+def test_a_row_of_units_in_another_spelling_is_held_against_the_layout(tmp_path):
+    path = tmp_path / "a.csv"
+    rows = "\n".join(f"{0.01 * i},{i}" for i in range(40))
+    path.write_text(f"t,u\n[s],[mNm]\n{rows}\n")
+    layout = TableLayout("csv", {"u": Channel("u", "N.m")}, Channel("t", "s"), None, 0)
+    with pytest.raises(InvalidInput, match="unit of u"):
+        read_table(path, layout)
+
+
+def test_a_sheet_is_read_to_its_end_whatever_it_says_of_its_size(tmp_path):
+    openpyxl = pytest.importorskip("openpyxl")
+    path, small = tmp_path / "a.xlsx", tmp_path / "b.xlsx"
+    book = openpyxl.Workbook()
+    for row in [("t", "q"), *((0.01 * i, float(i)) for i in range(50))]:
+        book.active.append(row)
+    book.save(path)
+    with zipfile.ZipFile(path) as whole, zipfile.ZipFile(small, "w") as cut:
+        for name in whole.namelist():
+            text = whole.read(name)
+            cut.writestr(name, text.replace(b'ref="A1:B51"', b'ref="A1:B20"'))
+    layout = TableLayout("xlsx", {"q": Channel("q", "m")}, Channel("t", "s"), None, 0)
+    assert len(read_table(small, layout).time) == 50
+
+
+@pytest.mark.parametrize("ending", ["npz", "xlsx"])
+def test_damaged_bytes_of_a_packed_file_are_refused_or_read(ending, tmp_path):
+    path = tmp_path / f"a.{ending}"
+    columns = {"t": 0.01 * np.arange(60), "q": np.sin(np.arange(60.0))}
+    if ending == "npz":
+        np.savez_compressed(path, **columns)
+    else:
+        book = pytest.importorskip("openpyxl").Workbook()
+        for row in [tuple(columns), *zip(*(one.tolist() for one in columns.values()), strict=True)]:
+            book.active.append(row)
+        book.save(path)
+    content, rng = path.read_bytes(), np.random.default_rng(1)
+    layout = TableLayout(ending, {"q": Channel("q", "m")}, Channel("t", "s"), None, 0)
+    refused = 0
+    for _ in range(60):
+        damaged = bytearray(content)
+        for at in rng.integers(len(content), size=3):
+            damaged[at] = rng.integers(256)
+        path.write_bytes(damaged)
+        try:
+            read_table(path, layout)
+        except InvalidInput:
+            refused += 1
+    assert refused > 0

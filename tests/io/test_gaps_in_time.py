@@ -96,3 +96,14 @@ def test_a_rig_has_a_record_for_each_part(tmp_path):
     ]
     assert all(records[at].remarks for at in (0, 1))
     assert not records[2].remarks
+
+
+def test_a_log_of_angles_that_wrap_is_not_divided(tmp_path):
+    """Nobody knows how many turns an angle made while nothing was recorded."""
+    path = tmp_path / "a.csv"
+    log(path, [(1300, 0.8)])
+    wrapping = TableLayout(
+        "csv", {"q": Channel("q", "rad", unwrap=True)}, Channel("t", "s"), None, 0
+    )
+    with pytest.raises(InvalidInput, match="rising by the median step"):
+        read_unbroken_tables(path, wrapping)
