@@ -14,12 +14,12 @@ import numpy as np
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from experiments.anytime.data import OF_TABLE_7, Case, Contested, Scores, committed_scores
-from experiments.anytime.leads import RIVALS, cells_in_order, leads, who_finds
+from experiments.anytime.leads import RIVALS, totals_of, who_finds
 from experiments.anytime.measures import RETURNED
 from experiments.anytime.moments import COMMON, EXACT, FRESH
 from experiments.anytime.readings import readings
 from experiments.anytime.sentences import closest_sentence
-from experiments.anytime.tables import SCALE, STATED, exactly
+from experiments.anytime.tables import SCALE, STATED
 from experiments.comparison.runs import AS_PRINTED, FIRST_STEP, VELOCITIES
 from experiments.paper import later_prototypes, printed_times, published, table2, table5
 from experiments.paper.calibrating import experiment as calibration
@@ -62,9 +62,7 @@ def in_three_sentences() -> tuple[str, str, str]:
     printed, drive = published.printed_equations(), simplest()
     low, high = (printed[reading].dte for reading in published.READINGS)
     scores, best = committed_scores(), _best_of_the_ladder()
-    law = _law(scores, AS_PRINTED)
-    ahead = dict(zip(RIVALS, law["ahead"], strict=True))
-    free = dict(zip(RIVALS, _law(scores, FIRST_STEP)["ahead"], strict=True))
+    law, free = (totals_of(scores, velocity) for velocity in (AS_PRINTED, FIRST_STEP))
     return (
         f"The paper contradicts itself where no model is needed: by its own validation figures, "
         f"prototype {ranking.HIGHEST} must be predicted "
@@ -79,8 +77,9 @@ def in_three_sentences() -> tuple[str, str, str]:
         f"At the stated budget, with the paper's samples, "
         f"{who_finds(scores, Contested(MODEL, COMMON, AS_PRINTED))}, so that the advantage over "
         f"NSGA-II does not come out; below 100 particles AMP-MOPSO is ahead of MOPSO in "
-        f"{ahead['MOPSO']} of {law['cells']} settings and of NSGA-II in {ahead['NSGA-II']}, but "
-        f"in {free['MOPSO']} and {free['NSGA-II']} under another law of first velocities.",
+        f"{law.ahead['MOPSO']} of {law.cells} settings and of NSGA-II in {law.ahead['NSGA-II']}, "
+        f"but in {free.ahead['MOPSO']} and {free.ahead['NSGA-II']} under another law of first "
+        f"velocities.",
     )
 
 
@@ -115,11 +114,11 @@ def values() -> dict[str, Any]:
             for moments in (EXACT, COMMON, FRESH)
         },
         "rivals": RIVALS,
-        "laws": [_law(scores, law) for law in VELOCITIES],
+        "laws": {law: totals_of(scores, law) for law in VELOCITIES},
         "n_seeds": len(scores.values[_case(Contested(MODEL, EXACT, AS_PRINTED), OF_TABLE_7[0])]),
         "closest": closest_sentence(readings(scores)),
         "contradictions": [_sentence(part) for part in _within_paper()],
-        "models": [_sentence(part) for part in _of_models()],
+        "models": [_sentence(part) for part in _of_models(printed)],
     }
 
 
@@ -133,8 +132,8 @@ def _within_paper() -> Iterator[str]:
         yield from parts.values()
 
 
-def _of_models() -> Iterator[str]:
-    yield published.of_the_first_page(published.printed_equations())
+def _of_models(printed: dict[str, published.Printed]) -> Iterator[str]:
+    yield published.of_the_first_page(printed)
     yield calibration.of_the_first_page(_best_of_the_ladder())
     yield inference.of_the_first_page(read_fits(committed_file(inference.FITS, inference.NAME)))
     yield dominated(MODEL)
@@ -144,14 +143,6 @@ def _of_models() -> Iterator[str]:
 def _best_of_the_ladder() -> Outcome:
     outcomes = read_outcomes(committed_file(calibration.OUTCOMES, "calibration"))
     return best_rungs(outcomes, "table8")[0]
-
-
-def _law(scores: Scores, law: str) -> dict[str, Any]:
-    """Return in how many cells AMP-MOPSO leads under a law of velocities, over all models."""
-    contested = [one for one in exactly(scores) if one.velocity == law]
-    kept, cells = np.sum([cells_in_order(scores, one) for one in contested], axis=0)
-    ahead = np.sum([[lead.ahead for lead in leads(scores, one)] for one in contested], axis=0)
-    return {"name": law, "ahead": ahead.tolist(), "kept": int(kept), "cells": int(cells)}
 
 
 def _stated(scores: Scores, moments: str, indicator: str) -> list[float]:
