@@ -36,12 +36,7 @@ def test_a_string_that_is_a_value_counts(source):
     assert source('x = "a"\n') != source('x = "b"\n')
 
 
-NOT_YET = pytest.mark.xfail(raises=KeyError, reason="made before outcomes had one: run it anew")
-
-
-@pytest.mark.parametrize(
-    "name", [*OF_THE_PAPER[:2], pytest.param("calibration.csv", marks=NOT_YET)]
-)
+@pytest.mark.parametrize("name", OF_THE_PAPER[1:])
 def test_outcomes_of_the_paper_carry_one_fingerprint(name):
     first, this = (
         read_origin(committed_file(file, "anytime"))["source"] for file in (OF_THE_PAPER[0], name)
