@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import unicodedata
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, fields, replace
@@ -26,7 +25,12 @@ from pymoo_hdte.discrepancy.campaign.format import (
     TORSION,
     TRANSMISSION_ERROR,
 )
-from pymoo_hdte.discrepancy.campaign.records import ROLES, RunningRecord, TorsionRecord
+from pymoo_hdte.discrepancy.campaign.records import (
+    ROLES,
+    RunningRecord,
+    TorsionRecord,
+    is_record_name,
+)
 from pymoo_hdte.io.array_files import READERS
 from pymoo_hdte.io.fields import Fields
 from pymoo_hdte.io.layout import Channel, TableLayout, layout_from_fields, with_zeros
@@ -141,18 +145,9 @@ def record_table(record: RunningRecord | TorsionRecord) -> dict[str, Any]:
 
 
 def _name_of(file: str) -> str:
-    """Return the name of the record in a file, empty if it cannot be one.
-
-    It is what stands before the ending, in ASCII: other characters become the letter without its
-    accent, or an underscore.
-    """
+    """Return the name of the record in a file, which stands before its ending; empty for none."""
     stem = next((file.removesuffix(one) for one in _ENDINGS if file.endswith(one)), "")
-    if not stem or not file.isprintable() or any(mark in file for mark in '/\\:*?"<>|'):
-        return ""
-    letters = unicodedata.normalize("NFKD", stem.replace("ß", "ss"))
-    plain = "".join(one for one in letters if not unicodedata.combining(one))
-    name = re.sub(r"[^\w.-]", "_", plain, flags=re.ASCII)
-    return name if re.match(r"\w", name, re.ASCII) and not stem.startswith(".") else ""
+    return stem if is_record_name(stem) else ""
 
 
 def _ranges(entry: Fields, place: str) -> dict[str, Any]:
