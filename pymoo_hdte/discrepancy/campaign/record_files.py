@@ -111,12 +111,15 @@ def read_record(
     kind: type[RunningRecord | TorsionRecord] = RunningRecord if running else TorsionRecord
     names = RUNNING if running else TORSION
     layout = layout_from_fields(entry.table("table"), shared) if entry.has("table") else shared
+    channels = {name: one for name, one in layout.channels.items() if one.column != ""}
+    of_error = running and TRANSMISSION_ERROR in channels
+    if of_error:
+        del channels[_computed_angle(channels, place)]
+    layout = replace(layout, channels=channels)
     layout = with_zeros(entry.table("zero"), layout) if entry.has("zero") else layout
-    stated = {name: one for name, one in layout.channels.items() if one.column != ""}
+    stated = layout.channels
     needed = [field.name for field in fields(kind) if field.name in stated]
-    if running and TRANSMISSION_ERROR in stated:
-        needed.remove(_computed_angle(stated, place))
-        needed.append(TRANSMISSION_ERROR)
+    needed += [TRANSMISSION_ERROR] * of_error
     layout = replace(layout, channels={name: stated[name] for name in needed})
     known = _ranges(entry, place) | _temperature(entry, place, layout) if running else {}
     columns = read_columns(path, layout, seen=seen)
@@ -185,8 +188,11 @@ def _temperature(entry: Fields, place: str, layout: TableLayout) -> dict[str, fl
 
 def _computed_angle(stated: dict[str, Channel], place: str) -> str:
     """Return the angle without a column, for which one of transmission error stands."""
+    # A channel that the file states may equal the usual one, which is that of no other file.
     own = [
-        name for name in ("input_angle", "output_angle") if stated[name] != LAYOUT.channels[name]
+        name
+        for name in ("input_angle", "output_angle")
+        if stated[name] is not LAYOUT.channels[name]
     ]
     if len(own) == 2:
         field = f"{place}.table.channels.{TRANSMISSION_ERROR}"

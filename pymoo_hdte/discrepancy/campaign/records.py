@@ -203,7 +203,9 @@ def is_record_name(name: Any) -> bool:
 
 def _check_record(record: Any, channels: tuple[str, ...]) -> None:
     if not is_record_name(record.name):
-        allowed = f"printable, without a point in front, and none of {' '.join(sorted(_NOT_IN_NAMES))}"
+        allowed = (
+            f"printable, without a point in front, and none of {' '.join(sorted(_NOT_IN_NAMES))}"
+        )
         raise InvalidInput("name", record.name, allowed)
     one_of("role", record.role, ROLES)
     real_number("sample_rate", record.sample_rate, above=0.0)

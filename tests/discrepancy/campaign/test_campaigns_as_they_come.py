@@ -34,7 +34,17 @@ def renamed(folder, name):
 
 @pytest.mark.parametrize(
     "name",
-    ["Öl kalt, 20 Nm", "größe 1", "a (2)", "slow.2-b", "ταχύς", "慢速", "медленно 5 Н·м", "धीमा", "_1"],
+    [
+        "Öl kalt, 20 Nm",
+        "größe 1",
+        "a (2)",
+        "slow.2-b",
+        "ταχύς",
+        "慢速",
+        "медленно 5 Н·м",
+        "धीमा",
+        "_1",
+    ],
 )
 def test_a_record_is_called_as_its_file_in_any_script(folder, name):
     renamed(folder, f"{name}.csv.gz")
@@ -60,7 +70,9 @@ def test_names_that_differ_in_any_character_are_two(folder):
     assert [f"{one.name}.csv.gz" for one in read_campaign(folder).running] == names
 
 
-@pytest.mark.parametrize("file", ["../slow.csv", "a/b.csv", "a\\b.csv", ".csv", " .csv", ".a.csv", "a.exe"])
+@pytest.mark.parametrize(
+    "file", ["../slow.csv", "a/b.csv", "a\\b.csv", ".csv", " .csv", ".a.csv", "a.exe"]
+)
 def test_a_file_of_another_folder_is_refused(folder, file):
     changed(folder, lambda whole: whole["record"][0].update(file=file))
     with pytest.raises(InvalidInput, match="without folders"):
@@ -72,16 +84,19 @@ def test_the_path_of_campaign_toml_is_that_of_its_folder(folder):
 
 
 @pytest.mark.parametrize("missing", ["input_angle", "output_angle"])
-def test_a_transmission_error_stands_for_one_of_the_angles(folder, missing):
+@pytest.mark.parametrize("usual", [False, True], ids=["own column", "usual column"])
+def test_a_transmission_error_stands_for_one_of_the_angles(folder, missing, usual):
     campaign = small_campaign()
     stated = {"input_angle": "output_angle", "output_angle": "input_angle"}[missing]
     rows = {"transmission_error": {"column": "TE", "unit": "arcsec"}}
-    rows[stated] = {"column": "angle", "unit": "deg"}
+    title, unit = (f"{stated}_rad", "rad") if usual else ("angle", "deg")
+    rows[stated] = {"column": title, "unit": unit}
     for record in campaign.running:
         error = np.degrees(record.transmission_error(50.0)) * 3600.0
-        columns = [record.time, np.degrees(getattr(record, stated)), error]
+        angle = getattr(record, stated)
+        columns = [record.time, angle if usual else np.degrees(angle), error]
         columns += [record.input_torque, record.output_torque]
-        text = "time_s,angle,TE,input_torque_Nm,output_torque_Nm\n" + "\n".join(
+        text = f"time_s,{title},TE,input_torque_Nm,output_torque_Nm\n" + "\n".join(
             ",".join(map(repr, row)) for row in np.column_stack(columns).tolist()
         )
         (folder / f"{record.name}.csv").write_text(text)
@@ -97,9 +112,19 @@ def test_a_transmission_error_stands_for_one_of_the_angles(folder, missing):
         found, expected = getattr(ours, missing), getattr(theirs, missing)
         np.testing.assert_allclose(found, expected, rtol=0, atol=1e-10 * np.abs(expected).max())
 
-    other = {missing: {"column": "angle", "unit": "deg"}}
+    other = {missing: {"column": f"{missing}_rad" if usual else "angle", "unit": unit}}
     changed(folder, lambda whole: whole["record"][0]["table"]["channels"].update(other))
     with pytest.raises(InvalidInput, match="absent beside both"):
+        read_campaign(folder)
+
+
+def test_an_angle_that_is_computed_has_no_zero(folder):
+    def change(whole):
+        error = {"transmission_error": {"column": "TE", "unit": "arcsec"}}
+        whole["record"][0] |= {"table": {"channels": error}, "zero": {"output_angle": 1.0}}
+
+    changed(folder, change)
+    with pytest.raises(InvalidInput, match="zero.*'output_angle'.*one of"):
         read_campaign(folder)
 
 
