@@ -9,7 +9,7 @@ from pymoo_hdte.discrepancy.campaign.campaign import Campaign
 _SURE = 5.0
 """Standard errors between a sensor that feels the load's inertia and one that does not."""
 _HALF = 0.5
-"""Share of the inertia below which the sensor is nearer to the brake."""
+"""Of the inertia: within it of what a place shows, a sensor is nearer to that place."""
 
 
 def inertia_felt(campaign: Campaign) -> tuple[float, float]:
@@ -49,16 +49,24 @@ def inertia_felt(campaign: Campaign) -> tuple[float, float]:
 
 
 def sensor_hint(campaign: Campaign) -> str:
-    """Return what to do where the sensor feels no load inertia, in a sentence, or nothing.
+    """Return where the output's torque sensor seems to sit, if it is not where it is stated.
 
     Parameters
     ----------
     campaign : Campaign
+
+    Returns
+    -------
+    str
+        A sentence, or nothing.
     """
     share, error = inertia_felt(campaign)
-    if not (share < _HALF and 1.0 - share > _SURE * error and abs(share) < _HALF):
+    at_drive = campaign.rig.output_torque_at == "drive"
+    stated, other = (1.0, 0.0) if at_drive else (0.0, 1.0)
+    if abs(share - stated) <= max(_HALF, _SURE * error) or abs(share - other) >= _HALF:
         return ""
+    where, place = ("behind", "brake") if at_drive else ("in front of", "drive")
     return (
         f"The output torque shows {100.0 * abs(share):.0f} % of the believed load inertia: if its "
-        'sensor sits behind the load, put output_torque_at = "brake" into [rig].'
+        f'sensor sits {where} the load, put output_torque_at = "{place}" into [rig].'
     )
