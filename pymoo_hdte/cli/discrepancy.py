@@ -85,8 +85,8 @@ def _analysed(options: argparse.Namespace, believed: ModelFiles, say: Say) -> di
     analysis.prove()
     say("choosing the next test and writing the report")
     document = analysis.report(options.out)
-    if "sensor_place" in document:
-        say(document["sensor_place"])
+    for hint in document.get("sensor_hints", ()):
+        say(hint)
     return document
 
 

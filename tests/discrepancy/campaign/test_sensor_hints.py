@@ -1,4 +1,4 @@
-"""A torque sensor behind the load: the same motion, another torque, and the same verdict."""
+"""A torque sensor behind the load, or in another unit: what the records say of it."""
 
 import tomllib
 from dataclasses import replace
@@ -10,7 +10,8 @@ from virtual_rig_cases import BELIEVED, RIG
 
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy import analyse, read_campaign, write_campaign
-from pymoo_hdte.discrepancy.campaign.sensor_place import inertia_felt, sensor_hint
+from pymoo_hdte.discrepancy.campaign.sensor_hints import inertia_felt, sensor_hints
+from pymoo_hdte.units import FOREIGN
 from pymoo_hdte.virtual.rig import draw_rig, run_campaign
 
 AT_BRAKE = replace(RIG, output_torque_at="brake")
@@ -38,9 +39,10 @@ def test_a_sensor_at_the_brake_misses_what_accelerates_the_load():
         # The believed inertia is off by its tolerance at most.
         assert abs(share - truth) < BELIEVED.tolerance + 4.0 * error
     for sound in (drive, brake):
-        assert sensor_hint(sound) == ""
-    assert '"brake"' in sensor_hint(mistaken(brake, RIG))
-    assert '"drive"' in sensor_hint(mistaken(drive, AT_BRAKE))
+        assert sensor_hints(sound) == []
+    for campaign, place in ((mistaken(brake, RIG), "brake"), (mistaken(drive, AT_BRAKE), "drive")):
+        (hint,) = sensor_hints(campaign)
+        assert f'"{place}"' in hint
 
 
 def test_where_the_sensor_sits_decides_between_adequate_and_unlisted(tmp_path):
@@ -49,7 +51,7 @@ def test_where_the_sensor_sits_decides_between_adequate_and_unlisted(tmp_path):
     wrong = analyse(mistaken(brake, RIG))
     assert wrong.verdict.status == "unlisted"
     document = wrong.report(tmp_path / "report")
-    assert document["sensor_place"] == sensor_hint(mistaken(brake, RIG))
+    assert document["sensor_hints"] == sensor_hints(mistaken(brake, RIG))
     page = (tmp_path / "report" / "report.html").read_text(encoding="utf-8")
     assert "output_torque_at = &#34;brake&#34;" in page
 
@@ -71,7 +73,33 @@ def test_the_load_inertia_is_fitted_at_the_brake_as_well():
 
 def test_without_a_load_inertia_nothing_is_said():
     bare = replace(session(RIG), believed=replace(BELIEVED, load_inertia=0.0))
-    assert sensor_hint(bare) == ""
+    assert sensor_hints(bare) == []
+
+
+def scaled(campaign, factor):
+    """Return a campaign whose output torque is read with another factor."""
+    return replace(
+        campaign,
+        running=tuple(
+            replace(one, output_torque=factor * one.output_torque) for one in campaign.running
+        ),
+    )
+
+
+@pytest.mark.parametrize("rig", [RIG, AT_BRAKE])
+def test_foot_pounds_within_the_tolerance_of_the_load_are_told(rig):
+    """A column in lbf.ft is 26 % off as N.m, where 30 % are allowed."""
+    campaign, foot_pound = session(rig), FOREIGN["lbf.ft"][1]
+    (hint,) = sensor_hints(scaled(campaign, 1.0 / foot_pound))
+    assert "lbf.ft" in hint
+    for gain in (0.71, 0.755, 0.8, 0.98, 1.02, 1.25):
+        assert sensor_hints(scaled(campaign, gain)) == []
+    # A range says that the load was not set, so that nobody knows its factor.
+    ranges = tuple(
+        replace(one, load_range=(one.load_torque - 20.0, one.load_torque + 20.0))
+        for one in scaled(campaign, 1.0 / foot_pound).running
+    )
+    assert sensor_hints(replace(campaign, running=ranges)) == []
 
 
 def test_the_place_is_kept_in_files_and_beside_another_model(tmp_path):
