@@ -1,10 +1,13 @@
 """Outcomes of the reliability suite: as objects, and as the small CSV files that are kept.
 
-Memory and seconds are in a separate file, because they differ from run to run.
+Memory and seconds are in a separate file, because they differ from run to run. ``python -m
+experiments.reliability.data FILE`` tells what failed in a file of tallies, since an experiment ends
+well whatever it finds.
 """
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterable, Sequence
 from dataclasses import astuple, dataclass, fields
 from pathlib import Path
@@ -134,3 +137,16 @@ def read_peaks(path: Path) -> list[Peak]:
         Peak(row["experiment"], float(row["memory"]), float(row["seconds"]))
         for row in read_rows(path)
     ]
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Tell what failed in a file of tallies; 0 if nothing did."""
+    (path,) = sys.argv[1:] if arguments is None else arguments
+    failed = [one for one in read_tallies(Path(path)) if one.failed]
+    for one in failed:
+        print(f"{one.part}, {one.kind}: {one.failed} of {one.trials} failed: {one.failing}")
+    return int(bool(failed))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

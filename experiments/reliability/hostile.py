@@ -10,6 +10,7 @@ import subprocess
 import sys
 import tempfile
 import warnings
+import zipfile
 import zlib
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -28,7 +29,7 @@ EXPANDED = 3 * 2**29
 
 
 def bombs() -> Iterator[bool]:
-    """Read files of a megabyte that expand to more than a gigabyte, or have a line without end."""
+    """Read small files that expand to more than the budget, or have a line without end."""
     texts = {
         "rows": b"t,q\n" + b"0,1\n" * 2**18,
         "one line": b"1" * 2**20,
@@ -43,6 +44,11 @@ def bombs() -> Iterator[bool]:
             yield _refused(path)
         path = Path(top) / "t.mat"
         path.write_bytes(_matlab_bomb())
+        yield _refused(path)
+        path = Path(top) / "t.npz"
+        np.savez_compressed(path, q=np.zeros(2**27, np.uint8))
+        yield _refused(path)
+        _stating(path, b"(134217728,)", b"(134217728000,)")
         yield _refused(path)
         path = Path(top) / "rig.toml"
         path.write_bytes(b"a." * 40_000 + b"a = 1")
@@ -158,6 +164,16 @@ def _matlab_bomb() -> bytes:
     packed = b"".join([*parts, packing.flush()])
     tag = np.array([15, len(packed)], "<u4").tobytes()
     return b"MATLAB 5.0 MAT-file".ljust(124) + b"\0\1IM" + tag + packed
+
+
+def _stating(path: Path, shape: bytes, other: bytes) -> None:
+    """Let the array of an npz file state another shape in its head, which has room for it."""
+    with zipfile.ZipFile(path) as packed:
+        content = packed.read("q.npy")
+    spare = b" " * (len(other) - len(shape))
+    content = content.replace(shape + b", }" + spare, other + b", }", 1)
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as packed:
+        packed.writestr("q.npy", content)
 
 
 def _refused(path: Path) -> bool:

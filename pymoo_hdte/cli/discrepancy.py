@@ -85,18 +85,9 @@ def _analysed(options: argparse.Namespace, believed: ModelFiles, say: Say) -> di
     analysis.prove()
     say("choosing the next test and writing the report")
     document = analysis.report(options.out)
-    if hint := _hint(measured, document["status"]):
+    for hint in document.get("sensor_hints", ()):
         say(hint)
     return document
-
-
-def _hint(measured: Any, status: str) -> str:
-    """Return what a verdict of an unknown effect may come from, or nothing."""
-    from pymoo_hdte.discrepancy import Campaign
-    from pymoo_hdte.discrepancy.campaign.sensor_place import sensor_hint
-
-    unknown = isinstance(measured, Campaign) and status == "unlisted"
-    return sensor_hint(measured) if unknown else ""
 
 
 def _measured(folder: Path, data: Path | None, progress: Callable[[int, int], None]) -> Any:

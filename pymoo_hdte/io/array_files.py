@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import importlib
 import json
+import math
 import tokenize
 import zipfile
 import zlib
@@ -89,22 +90,31 @@ def _library(name: str, path: Path) -> Any:
 def _checked(
     path: Path, names: Sequence[str], arrays: Mapping[str, Any], there: Sequence[str]
 ) -> dict[str, NDArray[np.float64]]:
-    """Return arrays as vectors, all of one length."""
-    found: dict[str, NDArray[np.float64]] = {}
-    length = 0
+    """Return arrays as vectors, all of one length.
+
+    An array needs a ``dtype`` and a ``shape``, and is read by ``array[...]`` once these, and all
+    arrays together, keep the budget.
+    """
+    budget, expanded = Budget.now(), 0
+    right: dict[str, Any] = {}
     for name in names:
-        values = arrays.get(name)
-        shown = None
+        values, shown = arrays.get(name), None
         if values is not None:
-            shown = f"{values.dtype} of shape {list(values.shape)}"
-            right = values.dtype.kind in "iuf" and values.size == max(values.shape, default=0) > 0
-            if right and values.size == (length or values.size):
-                length = values.size
-                found[name] = np.asarray(values).ravel().astype(float)
-        if name not in found:
+            shape = tuple(values.shape)
+            shown = f"{values.dtype} of shape {list(shape)}"
+            length = max(shape, default=0)
+            same = all(length == max(one.shape) for one in right.values())
+            if values.dtype.kind in "iuf" and math.prod(shape) == length > 0 and same:
+                right[name] = values
+                budget.check("rows", length, f"{path.name}: {name}")
+                # A file may hold chunks that are larger than what is in them.
+                chunk = math.prod(getattr(values, "chunks", None) or ())
+                expanded += max(length, chunk) * values.dtype.itemsize
+        if name not in right:
             allowed = f"a vector of real numbers, all of one length; there are {list(there)}"
             raise InvalidInput(f"{path.name}: {name}", shown, allowed[:500])
-    return found
+    budget.check("bytes", expanded, f"{path.name}, expanded")
+    return {name: np.ravel(values[...]).astype(float) for name, values in right.items()}
 
 
 def _read_matlab(path: Path, names: Sequence[str]) -> Arrays:
@@ -117,7 +127,6 @@ def _read_matlab(path: Path, names: Sequence[str]) -> Arrays:
 
 def _read_hdf5(path: Path, names: Sequence[str]) -> Arrays:
     h5py = _library("h5py", path)
-    budget = Budget.now()
     try:
         with h5py.File(path, "r") as file:
             arrays = {}
@@ -126,9 +135,7 @@ def _read_hdf5(path: Path, names: Sequence[str]) -> Arrays:
                 # Links lead to other files, which nobody named.
                 own = isinstance(data, h5py.Dataset) and data.file.filename == file.filename
                 if own and not data.is_virtual and data.external is None:
-                    budget.check("rows", max(data.shape, default=0), f"{path.name}: {name}")
-                    budget.check("bytes", data.size * data.dtype.itemsize, f"{path.name}: {name}")
-                    arrays[name] = data[...]
+                    arrays[name] = data
             return Arrays(_checked(path, names, arrays, list(file)))
     except InvalidInput:
         raise
@@ -142,6 +149,31 @@ _DAMAGED = (
     *(zlib.error, zipfile.BadZipFile, tokenize.TokenError),
 )
 """What libraries raise where bytes of a packed file were changed."""
+
+
+@dataclass(frozen=True)
+class _Member:
+    """An array of an npz file that is read when it is asked for, and what its head says of it."""
+
+    archive: Any
+    name: str
+    dtype: np.dtype[Any]
+    shape: tuple[int, ...]
+
+    def __getitem__(self, _: Any) -> NDArray[Any]:
+        return np.asarray(self.archive[self.name])
+
+
+def _member(archive: Any, name: str) -> _Member:
+    """Return an array of an open npz file; `ValueError` if it is none of numbers."""
+    with archive.zip.open(f"{name}.npy") as file:
+        version = np.lib.format.read_magic(file)
+        heads = {
+            (1, 0): np.lib.format.read_array_header_1_0,
+            (2, 0): np.lib.format.read_array_header_2_0,
+        }
+        shape, _, dtype = heads[version](file)
+    return _Member(archive, name, dtype, shape)
 
 
 def _check_zip(path: Path, wanted: Callable[[str], bool]) -> list[str]:
@@ -158,8 +190,8 @@ def _read_npz(path: Path, names: Sequence[str]) -> Arrays:
         members = _check_zip(path, lambda member: member.removesuffix(".npy") in names)
         there = [member.removesuffix(".npy") for member in members]
         with np.load(path, allow_pickle=False) as file:
-            arrays = {name: file[name] for name in names if name in there}
-        return Arrays(_checked(path, names, arrays, there))
+            arrays = {name: _member(file, name) for name in names if name in there}
+            return Arrays(_checked(path, names, arrays, there))
     except InvalidInput:
         raise
     except _DAMAGED as error:

@@ -48,6 +48,9 @@ def with_effects(campaign: Campaign, rig: TrueRig, effects: Sequence[DriveEffect
     running = tuple(
         _changed(record, row, calm, changed, rig.drive.ratio) for row, record in enumerate(records)
     )
+    if campaign.rig.output_torque_at == "brake":
+        pairs = zip(running, records, strict=True)
+        running = tuple(replace(one, output_torque=old.output_torque) for one, old in pairs)
     return replace(campaign, running=running)
 
 

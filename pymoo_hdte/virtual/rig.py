@@ -220,6 +220,8 @@ def _run(
     load = condition.load_torque + (setting if condition.load_torque != 0.0 else 0.0)
     start = rng.uniform(0.0, 2.0 * np.pi * mechanics.ratio)
     samples = simulate_run(mechanics, condition, load, start, elapsed)
+    if rig.output_torque_at == "brake":
+        samples[3] = load
     raw_time = condition.raw_interval * np.arange(float(samples.shape[1]))
     samples[1] = true_rig.encoder.reading(samples[1], elapsed + raw_time)
     averaged = condition.samples_averaged

@@ -1,18 +1,23 @@
 """The page on files of campaigns: its example is read, and it has every key that is read."""
 
+import gzip
+import json
 import re
 import shutil
 import tomllib
 
 import numpy as np
 import pytest
+import scipy.io
 import tomli_w
 from places import DOCS
 from small_campaigns import small_campaign
 
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy import read_campaign, write_campaign
+from pymoo_hdte.discrepancy.campaign.believed import SENSOR_PLACES
 from pymoo_hdte.discrepancy.campaign.format import COLUMNS, LAYOUT
+from pymoo_hdte.io.array_files import READERS
 from pymoo_hdte.io.fields import Fields
 from pymoo_hdte.io.layout import COUNTS
 from pymoo_hdte.units import DEGREE, UNITS
@@ -126,3 +131,98 @@ def test_the_page_has_every_unit_channel_and_title():
     assert [re.findall("`(.*?)`", part) for part in cell.split(";")] == [list(one) for one in units]
     assert all(f"`{name}`" in PAGE for name in LAYOUT.channels)
     assert all(f"`{title}`" in PAGE for title, _ in COLUMNS.values())
+
+
+def copied_without_files(tmp_path):
+    """Return a folder of a campaign with its table as a dict, and the columns of its records."""
+    campaign = small_campaign()
+    write_campaign(campaign, tmp_path / "rig")
+    whole = tomllib.loads((tmp_path / "rig" / "campaign.toml").read_text())
+    for entry in whole["record"]:
+        (tmp_path / "rig" / entry["file"]).unlink()
+    records = (*campaign.running, *campaign.torsion)
+    columns = [
+        {title: getattr(one, name) for name, (title, _) in COLUMNS.items() if hasattr(one, name)}
+        for one in records
+    ]
+    return tmp_path / "rig", whole, columns
+
+
+def written(path, columns):
+    """Write columns to a file in the format of its ending."""
+    if path.suffix == ".npz":
+        np.savez(path, **columns)
+    elif path.suffix == ".mat":
+        scipy.io.savemat(path, columns)
+    elif path.suffix in (".h5", ".hdf5"):
+        with pytest.importorskip("h5py").File(path, "w") as file:
+            file.update(columns)
+    elif path.suffix == ".xlsx":
+        book = pytest.importorskip("openpyxl").Workbook()
+        for row in (tuple(columns), *zip(*(one.tolist() for one in columns.values()), strict=True)):
+            book.active.append(row)
+        book.save(path)
+    else:
+        rows = zip(*(one.tolist() for one in columns.values()), strict=True)
+        if "json" in path.name:
+            lines = [json.dumps(dict(zip(columns, row, strict=True))) for row in rows]
+        else:
+            lines = [",".join(columns), *(",".join(map(repr, row)) for row in rows)]
+        text = "\n".join(lines).encode()
+        path.write_bytes(gzip.compress(text) if path.suffix == ".gz" else text)
+
+
+(FILES,) = re.findall(r"^\| `file` \|.*It ends in (.*) \|$", PAGE, re.M)
+ENDINGS = [
+    *re.findall("`(.*?)`", FILES.replace(", these also with `.gz`", "")),
+    *(f"{one}.gz" for one in (".jsonl", ".ndjson")),
+]
+
+
+def test_the_page_has_every_ending():
+    endings = {one for endings, _ in READERS.values() for one in endings}
+    assert {*ENDINGS} == endings | {".csv", ".csv.gz", ".txt", ".txt.gz"}
+
+
+@pytest.mark.parametrize("ending", ENDINGS)
+def test_a_campaign_of_files_with_any_ending_is_read(tmp_path, ending):
+    folder, whole, columns = copied_without_files(tmp_path)
+    for entry, rows in zip(whole["record"], columns, strict=True):
+        entry["file"] = entry["file"].replace(".csv.gz", ending)
+        written(folder / entry["file"], rows)
+    (folder / "campaign.toml").write_text(tomli_w.dumps(whole))
+    read = read_campaign(folder)
+    for ours, theirs in zip((*read.running, *read.torsion), columns, strict=True):
+        for name, (title, _) in COLUMNS.items():
+            if title in theirs:
+                np.testing.assert_allclose(getattr(ours, name), theirs[title], rtol=1e-12)
+
+
+def test_the_example_of_numbered_columns_and_another_encoding_is_read(tmp_path):
+    (example,) = (one for one in re.findall(r"```toml\n(.*?)```", PAGE, re.S) if "cp1252" in one)
+    folder, whole, columns = copied_without_files(tmp_path)
+    whole["record"] = [one for one in whole["record"] if one["test"] == "running"]
+    for head in ("Prüfstand 3\nZeit;Winkel [°];Winkel [°];Moment;Moment\n", ""):
+        for entry, rows in zip(whole["record"], columns, strict=False):
+            entry["file"] = entry["file"].removesuffix(".gz")
+            scales = (1.0, 1.0 / DEGREE, 1.0 / DEGREE, 1.0, 1.0)
+            scaled = np.column_stack([*rows.values()]) * scales
+            text = head + "\n".join(";".join(map(repr, row)) for row in scaled.tolist())
+            (folder / entry["file"]).write_text(text, encoding="cp1252")
+        (folder / "campaign.toml").write_text(tomli_w.dumps(whole) + example)
+        for ours, theirs in zip(read_campaign(folder).running, columns, strict=False):
+            for name, (title, _) in COLUMNS.items():
+                np.testing.assert_allclose(getattr(ours, name), theirs[title], rtol=1e-12)
+
+
+def test_each_place_of_the_torque_sensor_on_the_page_is_read(tmp_path):
+    places = re.findall(r'^output_torque_at = "(\w+)"', PAGE, re.M)
+    folder, whole, columns = copied_without_files(tmp_path)
+    for entry, rows in zip(whole["record"], columns, strict=True):
+        entry["file"] = entry["file"].removesuffix(".gz")
+        written(folder / entry["file"], rows)
+    for place in places:
+        whole["rig"]["output_torque_at"] = place
+        (folder / "campaign.toml").write_text(tomli_w.dumps(whole))
+        assert read_campaign(folder).rig.output_torque_at == place
+    assert tuple(places) == SENSOR_PLACES

@@ -4,12 +4,14 @@ import re
 import sys
 from collections import Counter
 from importlib import import_module
+from typing import get_type_hints
 
 import pytest
 from places import DOCS, ROOT
 from public_names import PACKAGES
 
 import pymoo_hdte
+from pymoo_hdte.algorithms import ParticleSwarm
 
 PAGES = {path.stem: path.read_text(encoding="utf-8") for path in (DOCS / "reference").glob("*.md")}
 LISTED = Counter(
@@ -48,6 +50,16 @@ def test_a_listed_name_is_imported_from_where_its_page_says(name):
     package, public = as_public(name).split(".")
     shown = getattr(import_module(module), last)
     assert shown is getattr(import_module(f"pymoo_hdte.{package}"), public)
+
+
+def test_what_a_part_of_the_swarm_must_offer_is_in_the_reference():
+    hints = get_type_hints(ParticleSwarm.__init__)
+    types = {kind for hint in hints.values() for kind in (hint, *getattr(hint, "__args__", ()))}
+    protocols = {kind for kind in types if getattr(kind, "_is_protocol", False)}
+    assert len(protocols) == 3
+    for kind in protocols:
+        shown = f".. autoclass:: {kind.__module__}.{kind.__name__}\n"
+        assert sum(page.count(shown) for page in PAGES.values()) == 1
 
 
 def test_every_group_has_its_task_on_the_front_page_of_the_reference():

@@ -5,6 +5,7 @@ import io
 import os
 import time
 import tracemalloc
+import zipfile
 import zlib
 from contextlib import suppress
 
@@ -133,6 +134,79 @@ def test_a_matlab_array_that_expands_beyond_what_its_shape_says_is_refused(tmp_p
     finally:
         tracemalloc.stop()
     assert peak < MEMORY
+
+
+def written(folder, form, t, q):
+    """Return a file of two columns."""
+    path = folder / {"npz": "t.npz", "hdf5": "t.h5", "xlsx": "t.xlsx"}.get(form, "t.jsonl")
+    if form == "npz":
+        np.savez_compressed(path, t=t, q=q)
+    elif form == "hdf5":
+        with pytest.importorskip("h5py").File(path, "w") as file:
+            file.create_dataset("t", data=t, compression="gzip")
+            file.create_dataset("q", data=q, compression="gzip")
+    elif form == "xlsx":
+        book = pytest.importorskip("openpyxl").Workbook(write_only=True)
+        sheet = book.create_sheet()
+        for row in (("t", "q"), *zip(t.tolist(), q.tolist(), strict=True)):
+            sheet.append(row)
+        book.save(path)
+    elif form == "json_lines":
+        lines = (f'{{"t": {a}, "q": {b}}}\n' for a, b in zip(t.tolist(), q.tolist(), strict=True))
+        path.write_text("".join(lines))
+    else:
+        path = matlab(folder / "t.mat", t=t, q=q)
+    return path
+
+
+ARRAYS = ["npz", "hdf5", "xlsx", "json_lines", "matlab"]
+
+
+@pytest.mark.parametrize("form", ARRAYS)
+def test_rows_of_arrays_keep_the_budget_however_small_their_numbers_are(
+    tmp_path, monkeypatch, form
+):
+    monkeypatch.setenv("PYMOO_HDTE_MOST_BYTES", str(10**9))
+    rows = np.zeros(SMALL["ROWS"] + 2, np.uint8)
+    refused(written(tmp_path, form, rows, rows), form, "MOST_ROWS")
+
+
+@pytest.mark.parametrize("form", ["npz", "hdf5", "matlab"])
+def test_arrays_of_a_file_keep_the_budget_together(tmp_path, monkeypatch, form):
+    path = written(tmp_path, form, np.zeros(4_000), np.zeros(4_000))
+    monkeypatch.setenv("PYMOO_HDTE_MOST_BYTES", "50_000")
+    refused(path, form, "MOST_BYTES")
+    monkeypatch.setenv("PYMOO_HDTE_MOST_BYTES", "70_000")
+    channels = {"q": Channel("q", "m")}
+    read = tables.read_table(path, tables.TableLayout(form, channels, None, 100.0, 0))
+    assert len(read.time) == 4_000
+
+
+@pytest.mark.parametrize("rows", [5_001, 10**9, 10**18])
+def test_an_array_that_states_more_than_it_holds_is_refused_before_it_is_made(tmp_path, rows):
+    path = written(tmp_path, "npz", np.zeros(300), np.zeros(300))
+    with zipfile.ZipFile(path) as packed:
+        parts = {name: packed.read(name) for name in packed.namelist()}
+    old, new = b"(300,), }", f"({rows},), }}".encode()
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as packed:
+        for name, part in parts.items():
+            end = part.index(b"\n")
+            head = part[:end].replace(old, new).rstrip().ljust(end)
+            packed.writestr(name, head + part[end:])
+    refused(path, "npz", "MOST_ROWS")
+
+
+def test_a_chunk_that_is_larger_than_its_data_set_is_refused(tmp_path):
+    """HDF5 expands whole chunks: 10 rows in one of 40 MB take 40 MB."""
+    h5py = pytest.importorskip("h5py")
+    path = tmp_path / "t.h5"
+    with h5py.File(path, "w") as file:
+        for name in ("t", "q"):
+            file.create_dataset(
+                name, data=np.arange(300.0), maxshape=(None,), chunks=(5_000_000,),
+                compression="gzip",
+            )  # fmt: skip
+    refused(path, "hdf5", "MOST_BYTES")
 
 
 @pytest.mark.parametrize("form", ["csv", "matlab", "plain"])

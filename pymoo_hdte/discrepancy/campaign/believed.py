@@ -21,6 +21,9 @@ MECHANICAL = (
 )
 """Fields of `BelievedDrive` that are fitted; J_out, 1/100 of the load's inertia, is not."""
 
+SENSOR_PLACES = ("drive", "brake")
+"""Of the output's torque sensor: before or behind the load inertia."""
+
 
 @dataclass(frozen=True)
 class BelievedDrive:
@@ -157,11 +160,15 @@ class Rig:
         Of the torque sensors, relative.
     input_torque_zero, output_torque_zero : float
         Of the torque sensors, N.m.
+    output_torque_at : {"drive", "brake"}
+        Where the torque sensor of the output sits: between drive and load inertia, so that it reads
+        the load's torque and what accelerates the load, or behind both, where it reads the load's
+        torque alone.
 
     Raises
     ------
     InvalidInput
-        For a value that is negative or not finite, or for noise of zero.
+        For a value that is negative or not finite, for noise of zero, or another place.
 
     Examples
     --------
@@ -181,10 +188,14 @@ class Rig:
     input_torque_zero: float = 0.003
     output_torque_gain: float = 0.005
     output_torque_zero: float = 0.1
+    output_torque_at: str = "drive"
 
     def __post_init__(self) -> None:
         for one in fields(self):
             value = getattr(self, one.name)
+            if one.name == "output_torque_at":
+                one_of(one.name, value, SENSOR_PLACES)
+                continue
             # Residuals are weighted by the noise, so that it must not be zero.
             if one.name.endswith("_noise"):
                 real_number(one.name, value, above=0.0)

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from pymoo_hdte.checks import Complaints, InvalidInput, complaints_of
-from pymoo_hdte.discrepancy.campaign.believed import BelievedDrive, Rig
+from pymoo_hdte.discrepancy.campaign.believed import SENSOR_PLACES, BelievedDrive, Rig
 from pymoo_hdte.discrepancy.campaign.believed_model import (
     believed_from_fields,
     single_tolerances,
@@ -25,7 +24,7 @@ from pymoo_hdte.discrepancy.campaign.format import (
     GOOD_ENOUGH,
     LAYOUT,
     RIG,
-    SENSOR_PLACES,
+    SENSOR_PLACE,
 )
 from pymoo_hdte.discrepancy.campaign.record_files import (
     FileOfRecord,
@@ -83,10 +82,7 @@ def read_campaign(
     with toml_with_lines(folder / CAMPAIGN_FILE) as top:
         title, drive = top.text("title"), top.text("drive")
         believed = believed_from_fields(top, folder) if top.has("model") else _believed(top)
-        of_rig = top.table("rig")
-        if _takes_torque_at(of_rig) == "brake":
-            believed = with_load_before_sensor(believed)
-        rig = rig_from_fields(of_rig, f"{CAMPAIGN_FILE}.rig")
+        rig = rig_from_fields(top.table("rig"), f"{CAMPAIGN_FILE}.rig")
         enough = {
             name: top.number(key, above=0.0) * factor
             for name, (key, factor) in GOOD_ENOUGH.items()
@@ -174,9 +170,14 @@ def _table(campaign: Campaign) -> dict[str, Any]:
         "drive": campaign.drive,
         **in_units(campaign, stated),
         "believed": _believed_table(campaign.believed),
-        "rig": in_units(campaign.rig, RIG),
+        "rig": in_units(campaign.rig, RIG) | _sensor_place(campaign.rig),
         "record": [record_table(record) for record in records],
     }
+
+
+def _sensor_place(rig: Rig) -> dict[str, str]:
+    """Return the place of the output's torque sensor, where it is not the usual one."""
+    return {} if rig.output_torque_at == "drive" else {SENSOR_PLACE: rig.output_torque_at}
 
 
 def _believed_table(believed: BelievedDrive) -> dict[str, Any]:
@@ -201,33 +202,13 @@ def _believed(top: Fields) -> BelievedDrive:
         raise InvalidInput(f"{place}.{error.field}", error.value, error.allowed) from None
 
 
-def _takes_torque_at(rig: Fields) -> str:
-    return rig.choice("output_torque_at", SENSOR_PLACES) if rig.has("output_torque_at") else "drive"
-
-
-def with_load_before_sensor(believed: BelievedDrive) -> BelievedDrive:
-    """Return a drive whose torque sensor stands behind the load and feels none of its inertia.
-
-    The load inertia is a part of the output inertia then, and the drive moves as before.
-
-    Parameters
-    ----------
-    believed : BelievedDrive
-        With the sensor between output and load.
-    """
-    tolerances = {name: one for name, one in believed.tolerances.items() if name != "load_inertia"}
-    return replace(
-        believed,
-        output_inertia=believed.output_inertia + believed.load_inertia,
-        load_inertia=0.0,
-        tolerances=tolerances,
-    )
-
-
 def rig_from_fields(table: Fields, place: str) -> Rig:
     """Return the rig of the table ``[rig]``, which stands at ``place``; errors name its field."""
+    known: dict[str, Any] = {}
+    if table.has(SENSOR_PLACE):
+        known[SENSOR_PLACE] = table.choice(SENSOR_PLACE, SENSOR_PLACES)
     if not table.has("control"):
-        return build(Rig, RIG, table, place)
+        return build(Rig, RIG, table, place, **known)
     sentence = table.text("control")
     match = CONTROL.search(sentence)
     try:
@@ -235,7 +216,8 @@ def rig_from_fields(table: Fields, place: str) -> Rig:
     except ValueError:
         allowed = "'... T = P*(w_set - w) + I*integral(w_set - w) ...' with two numbers"
         raise InvalidInput(f"{place}.control", sentence, allowed) from None
-    return build(Rig, RIG, table, place, proportional=proportional, integral=integral)
+    known |= {"proportional": proportional, "integral": integral}
+    return build(Rig, RIG, table, place, **known)
 
 
 def _placed_in_files(error: InvalidInput, files: Sequence[FileOfRecord]) -> InvalidInput:

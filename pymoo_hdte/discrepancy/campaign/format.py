@@ -59,8 +59,8 @@ RIG = _named(
     torsion_angle_noise="torsion_angle_noise_arcsec",
 )
 
-SENSOR_PLACES = ("drive", "brake")
-"""Where the torque sensor of the output sits: between drive and load inertia, or behind both."""
+SENSOR_PLACE = "output_torque_at"
+"""Key of the place of the output's torque sensor, which is no number; absent for the usual one."""
 
 GOOD_ENOUGH = _named(
     good_enough_error="good_enough_arcsec",

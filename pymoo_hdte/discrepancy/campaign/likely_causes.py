@@ -6,14 +6,14 @@ import math
 
 from pymoo_hdte.units import FOREIGN, UNITS, si_unit
 
-_NEAR = 0.1
+NEAR = 0.1
 """Relative distance from a factor up to which it is the likely one: half of that between 1.3558 and
 a load that is off by a third as it may be."""
 _RATIO_DIGITS = 5
 """Of a ratio that travels of both angles show: a common zero moves it in no digit of these."""
 
 
-def likely_unit(quantity: str, factor: float, near: float = _NEAR) -> str:
+def likely_unit(quantity: str, factor: float, near: float = NEAR) -> str:
     """Return which unit or sign explains readings that are too large, as the end of a sentence.
 
     Parameters

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import unicodedata
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, fields, replace
@@ -26,7 +25,12 @@ from pymoo_hdte.discrepancy.campaign.format import (
     TORSION,
     TRANSMISSION_ERROR,
 )
-from pymoo_hdte.discrepancy.campaign.records import ROLES, RunningRecord, TorsionRecord
+from pymoo_hdte.discrepancy.campaign.records import (
+    ROLES,
+    RunningRecord,
+    TorsionRecord,
+    is_record_name,
+)
 from pymoo_hdte.io.array_files import READERS
 from pymoo_hdte.io.fields import Fields
 from pymoo_hdte.io.layout import Channel, TableLayout, layout_from_fields, with_zeros
@@ -107,12 +111,15 @@ def read_record(
     kind: type[RunningRecord | TorsionRecord] = RunningRecord if running else TorsionRecord
     names = RUNNING if running else TORSION
     layout = layout_from_fields(entry.table("table"), shared) if entry.has("table") else shared
+    channels = {name: one for name, one in layout.channels.items() if one.column != ""}
+    of_error = running and TRANSMISSION_ERROR in channels
+    if of_error:
+        del channels[_computed_angle(channels, place)]
+    layout = replace(layout, channels=channels)
     layout = with_zeros(entry.table("zero"), layout) if entry.has("zero") else layout
-    stated = {name: one for name, one in layout.channels.items() if one.column != ""}
+    stated = layout.channels
     needed = [field.name for field in fields(kind) if field.name in stated]
-    if running and TRANSMISSION_ERROR in stated:
-        needed.remove(_computed_angle(stated, place))
-        needed.append(TRANSMISSION_ERROR)
+    needed += [TRANSMISSION_ERROR] * of_error
     layout = replace(layout, channels={name: stated[name] for name in needed})
     known = _ranges(entry, place) | _temperature(entry, place, layout) if running else {}
     columns = read_columns(path, layout, seen=seen)
@@ -141,18 +148,9 @@ def record_table(record: RunningRecord | TorsionRecord) -> dict[str, Any]:
 
 
 def _name_of(file: str) -> str:
-    """Return the name of the record in a file, empty if it cannot be one.
-
-    It is what stands before the ending, in ASCII: other characters become the letter without its
-    accent, or an underscore.
-    """
+    """Return the name of the record in a file, which stands before its ending; empty for none."""
     stem = next((file.removesuffix(one) for one in _ENDINGS if file.endswith(one)), "")
-    if not stem or not file.isprintable() or any(mark in file for mark in '/\\:*?"<>|'):
-        return ""
-    letters = unicodedata.normalize("NFKD", stem.replace("ß", "ss"))
-    plain = "".join(one for one in letters if not unicodedata.combining(one))
-    name = re.sub(r"[^\w.-]", "_", plain, flags=re.ASCII)
-    return name if re.match(r"\w", name, re.ASCII) and not stem.startswith(".") else ""
+    return stem if is_record_name(stem) else ""
 
 
 def _ranges(entry: Fields, place: str) -> dict[str, Any]:
@@ -190,8 +188,11 @@ def _temperature(entry: Fields, place: str, layout: TableLayout) -> dict[str, fl
 
 def _computed_angle(stated: dict[str, Channel], place: str) -> str:
     """Return the angle without a column, for which one of transmission error stands."""
+    # A channel that the file states may equal the usual one, which is that of no other file.
     own = [
-        name for name in ("input_angle", "output_angle") if stated[name] != LAYOUT.channels[name]
+        name
+        for name in ("input_angle", "output_angle")
+        if stated[name] is not LAYOUT.channels[name]
     ]
     if len(own) == 2:
         field = f"{place}.table.channels.{TRANSMISSION_ERROR}"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,6 +15,9 @@ ROLES = ("train", "held_out")
 
 FEWEST_SAMPLES = 8
 """Least number of rows of a record."""
+
+_NOT_IN_NAMES = frozenset('/\\:*?"<>|')
+"""Characters that the name of a file cannot have on one system or another."""
 
 _COLDEST, _HOTTEST = 200.0, 473.0
 """K. No grease of a gear serves beyond -73 and 200 degrees Celsius: the unit is then another."""
@@ -50,7 +52,7 @@ class RunningRecord:
     Attributes
     ----------
     name : str
-        Letters, digits, ``.``, ``-`` and ``_``; also the stem of its file.
+        In any script, as `is_record_name` has it; also the stem of its file.
     role : {"train", "held_out"}
         To be fitted, or only to judge the result.
     input_speed : float
@@ -188,9 +190,23 @@ def _check_range(name: str, limits: Any, inside: float) -> None:
         raise InvalidInput(name, limits, f"lowest and highest, with {inside:g} between them")
 
 
+def is_record_name(name: Any) -> bool:
+    """Tell whether a record may have a name: any system can then have a file of that name."""
+    return (
+        isinstance(name, str)
+        and name.isprintable()
+        and bool(name.strip())
+        and not name.startswith(".")
+        and not set(name) & _NOT_IN_NAMES
+    )
+
+
 def _check_record(record: Any, channels: tuple[str, ...]) -> None:
-    if not isinstance(record.name, str) or not re.fullmatch(r"\w[\w.-]*", record.name, re.ASCII):
-        raise InvalidInput("name", record.name, "letters, digits, '.', '-' and '_'")
+    if not is_record_name(record.name):
+        allowed = (
+            f"printable, without a point in front, and none of {' '.join(sorted(_NOT_IN_NAMES))}"
+        )
+        raise InvalidInput("name", record.name, allowed)
     one_of("role", record.role, ROLES)
     real_number("sample_rate", record.sample_rate, above=0.0)
     time = finite_array("time", record.time, (None,))

@@ -150,10 +150,14 @@ def _predict_group(
     near = None if start is None else start.rows(np.tile(np.arange(records), count))
     speed = np.tile(conditions.input_speed, count)
     balance = steady_motions(coefficients, speed, load.ravel(), rig, near, effort)
+    output_torque = balance.coupling_torque
+    if rig.output_torque_at == "brake":
+        # Behind the load inertia there is no torque but that of the load, which is constant.
+        output_torque = output_torque * (np.arange(output_torque.shape[1]) == 0)
     channels = [
         balance.transmission_error,
         balance.motor_torque + _driving(balance, coefficients),
-        balance.coupling_torque,
+        output_torque,
         balance.lead,
     ]
     lines = _lines(balance, channels, orders, believed.ratio, conditions)

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from pymoo_hdte.checks import InvalidInput
+from pymoo_hdte.discrepancy.campaign.sensor_hints import sensor_hints
 from pymoo_hdte.discrepancy.drive.analysis import DriveFinding
 from pymoo_hdte.discrepancy.drive.coverage import campaign_limits
 from pymoo_hdte.discrepancy.drive.misfit.map import Location
@@ -95,6 +96,8 @@ def write_report(
     document["revised_model"] = {"file": MODEL_FILE if model_files else None}
     document["robust_optimum"] = _shift_document(shift)
     document["gap_sentence"] = gap_sentence(finding, proof)
+    if hints := sensor_hints(finding.campaign):
+        document["sensor_hints"] = hints
     html = _page(finding, location, proof, document, shift)
     FOLDER.write(Path(out), html, document, model_files)
     return document
@@ -171,7 +174,9 @@ def _page(
         parameters=parameter_rows(finding),
         metrics=metric_rows(proof),
         records=record_rows(finding.campaign, proof),
-        rows_found=rows_sentence(finding.rows),
+        rows_found=" ".join(
+            [rows_sentence(finding.rows), *document.get("sensor_hints", [])]
+        ).strip(),
         faults=fault_rows(finding.rows),
         all_faults=len(finding.rows.faults),
         noise=noise_rows(finding.rows),

@@ -49,7 +49,10 @@ def test_what_is_written_is_read_back(campaign, folder):
     for name in ("believed", "rig"):
         for field in fields(getattr(campaign, name)):
             value = getattr(getattr(read, name), field.name)
-            assert value == pytest.approx(getattr(getattr(campaign, name), field.name), rel=1e-11)
+            expected = getattr(getattr(campaign, name), field.name)
+            assert value == (
+                expected if isinstance(expected, str) else pytest.approx(expected, rel=1e-11)
+            )
     assert [record.name for record in read.train] == ["slow", "empty"]
     assert [record.name for record in read.held_out] == ["back"]
     pairs = zip((*read.running, *read.torsion), (*campaign.running, *campaign.torsion), strict=True)

@@ -2,6 +2,7 @@
 
 import io
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -14,6 +15,7 @@ from night import others_at_night
 from places import ROOT
 
 from experiments.command_line import main
+from experiments.reliability import data
 from experiments.reliability import experiment as reliability
 from experiments.reliability import kill as reliability_kill
 from experiments.reliability.commands import Wrong
@@ -263,3 +265,16 @@ def test_a_folder_without_permission_is_refused_before_anything_runs(tmp_path, m
         main(["emps", "--out", str(tmp_path)])
     assert stopped.value.code == 2
     assert f"--out {tmp_path} cannot be written to" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("failed", [0, 2])
+def test_a_night_in_which_something_failed_ends_with_1(failed, tmp_path, capsys):
+    tallies = [Tally(FUZZ, "rig", 5, 3, 2, 0), Tally(KILL, "Dask", 5, 0, 3, failed, "torn:2")]
+    path = tmp_path / "reliability.csv"
+    path.write_text(format_tallies(tallies), encoding="utf-8")
+    assert data.main([str(path)]) == (failed > 0)
+    assert ("torn:2" in capsys.readouterr().out) == (failed > 0)
+    # The night reads the file that the suite writes.
+    night = (ROOT / ".ci" / "nightly").read_text(encoding="utf-8")
+    (out,) = re.findall(r"reliability --quick --out (\S+)", night)
+    assert f"experiments.reliability.data {out}/reliability/{reliability.TALLIES}\n" in night

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import groupby
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -162,7 +163,7 @@ def _condition(record: RunningRecord) -> tuple[float, float]:
 
 def with_noise(rig: Rig, findings: Sequence[NoiseFinding]) -> Rig:
     """Return a rig with the noise that is used; the same rig if all is as stated."""
-    changed = {one.name: one.used for one in findings if one.replaced}
+    changed: dict[str, Any] = {one.name: one.used for one in findings if one.replaced}
     return replace(rig, **changed) if changed else rig
 
 

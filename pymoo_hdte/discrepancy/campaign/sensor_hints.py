@@ -1,15 +1,18 @@
-"""Where the output's torque sensor sits, as the records show it: before or behind the load."""
+"""What the records say of the output's torque sensor: where it sits, and which unit it reads."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from pymoo_hdte.discrepancy.campaign.campaign import Campaign
+from pymoo_hdte.discrepancy.campaign.likely_causes import NEAR, likely_unit
 
+_ERRORS = 3.0
+"""Standard errors within which the factor of a unit explains the mean torques."""
 _SURE = 5.0
 """Standard errors between a sensor that feels the load's inertia and one that does not."""
 _HALF = 0.5
-"""Share of the inertia below which the sensor is nearer to the brake."""
+"""Of the inertia: within it of what a place shows, a sensor is nearer to that place."""
 
 
 def inertia_felt(campaign: Campaign) -> tuple[float, float]:
@@ -48,17 +51,47 @@ def inertia_felt(campaign: Campaign) -> tuple[float, float]:
     return (moments / weights, weights**-0.5) if weights > 0.0 else (0.0, np.inf)
 
 
-def sensor_hint(campaign: Campaign) -> str:
-    """Return what to do where the sensor feels no load inertia, in a sentence, or nothing.
+def sensor_hints(campaign: Campaign) -> list[str]:
+    """Return what is to be checked at the output's torque sensor, each in a sentence.
 
     Parameters
     ----------
     campaign : Campaign
     """
-    share, error = inertia_felt(campaign)
-    if not (share < _HALF and 1.0 - share > _SURE * error and abs(share) < _HALF):
+    return [hint for hint in (_of_place(campaign), _of_unit(campaign)) if hint]
+
+
+def _of_unit(campaign: Campaign) -> str:
+    """Return which unit the mean torques are in, if it is not that of the loads that were set.
+
+    A factor counts as near within its standard error and what is stated of gain and zero.
+    """
+    records = [one for one in campaign.running if one.load_torque and not one.load_range]
+    load = np.array([one.load_torque for one in records])
+    measured = np.array([np.mean(one.output_torque) for one in records])
+    power = float(load @ load)
+    factor = float(load @ measured) / power if power else 0.0
+    if not factor:
         return ""
+    error = float(np.std(measured - factor * load)) / power**0.5
+    zero = campaign.rig.output_torque_zero * float(np.abs(load).sum()) / power
+    near = campaign.rig.output_torque_gain + (zero + _ERRORS * error) / abs(factor)
+    cause = likely_unit("torque", factor, min(near, NEAR))
+    return f"The output torque is{cause.removeprefix(';')}" if cause else ""
+
+
+def _of_place(campaign: Campaign) -> str:
+    """Return where the output's torque sensor seems to sit, if it is not where it is stated.
+
+    At least half of the inertia, and several standard errors, are between both places.
+    """
+    share, error = inertia_felt(campaign)
+    at_drive = campaign.rig.output_torque_at == "drive"
+    stated, other = (1.0, 0.0) if at_drive else (0.0, 1.0)
+    if abs(share - stated) <= max(_HALF, _SURE * error) or abs(share - other) >= _HALF:
+        return ""
+    where, place = ("behind", "brake") if at_drive else ("in front of", "drive")
     return (
         f"The output torque shows {100.0 * abs(share):.0f} % of the believed load inertia: if its "
-        'sensor sits behind the load, put output_torque_at = "brake" into [rig].'
+        f'sensor sits {where} the load, put output_torque_at = "{place}" into [rig].'
     )
