@@ -43,6 +43,25 @@ class Jump:
     size: float
 
 
+@dataclass(frozen=True)
+class ReadingError:
+    """By how much a torque sensor may be wrong in one record, beyond its noise.
+
+    Attributes
+    ----------
+    channel : str
+        ``"input_torque"`` or ``"output_torque"``.
+    size : float
+        Standard deviation of what is added to the mean of the channel, N.m.
+    of_lines : bool
+        Whether each part of each order line is as uncertain: with steps that hide the motion.
+    """
+
+    channel: str
+    size: float
+    of_lines: bool = False
+
+
 @dataclass(frozen=True, eq=False)
 class RunningRecord:
     """The drive at constant speed and load, over one output turn or more.
@@ -77,6 +96,9 @@ class RunningRecord:
         Of the drive in kelvin, near its lubricant; the mean over the record.
     jumps : tuple of Jump
         Jumps of a sensor that were taken out of the rows; none in a record as it was measured.
+    reading_errors : tuple of ReadingError
+        What its torque sensors may be wrong by, as its rows show; none in a record as it was
+        measured.
     settling : float, optional
         Time constant in s of the decay with which the rows begin, which is fitted with the lines;
         None in a record as it was measured.
@@ -111,6 +133,7 @@ class RunningRecord:
     temperature: float | None = None
     jumps: tuple[Jump, ...] = ()
     settling: float | None = None
+    reading_errors: tuple[ReadingError, ...] = ()
 
     def __post_init__(self) -> None:
         for name, inside in (("speed_range", self.input_speed), ("load_range", self.load_torque)):

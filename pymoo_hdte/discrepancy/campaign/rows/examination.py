@@ -13,6 +13,7 @@ from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy.campaign.campaign import Campaign
 from pymoo_hdte.discrepancy.campaign.line_basis import mean_speed
 from pymoo_hdte.discrepancy.campaign.records import RunningRecord, TorsionRecord
+from pymoo_hdte.discrepancy.campaign.rows.drift import without_drift
 from pymoo_hdte.discrepancy.campaign.rows.faults import WINDOWS
 from pymoo_hdte.discrepancy.campaign.rows.findings import NoiseFinding, RowFault, RowFindings
 from pymoo_hdte.discrepancy.campaign.rows.noise_estimate import (
@@ -69,7 +70,10 @@ def examined_rows(
     noise = _noise(campaign, kept, [record for record, _ in sweeps], rules)
     rig = with_noise(campaign.rig, noise)
     records = _unsettled([one.record for one in kept], rules)
-    running, new_zero = with_one_zero(records, campaign.believed, rig, rules)
+    drifts = [one.drifts for one in kept]
+    steady, drifting, zeros = without_drift(records, drifts, rig, ratio, rules)
+    noise, rig = (*noise, *zeros), with_noise(rig, zeros)
+    running, new_zero = with_one_zero(steady, campaign.believed, rig, rules)
     changed: dict[str, Any] = {
         "running": running,
         "torsion": tuple(record for record, _ in sweeps),
@@ -81,7 +85,7 @@ def examined_rows(
     pairs = zip(records, kept, strict=True)
     faults += [_hidden_decay(one) for one, own in pairs if one is not own.record]
     faults += [fault for _, found in sweeps for fault in found]
-    final = [_final(fault, left_out) for fault in faults]
+    final = [_final(fault, left_out) for fault in (*faults, *drifting)]
     return campaign, RowFindings(n_rows, (*final, *new_zero), left_out, noise)
 
 
