@@ -26,7 +26,7 @@ CHANNELS = ("transmission_error", "input_torque", "output_torque", "input_angle"
 
 _READ = {"output_angle": (0, False), "input_angle": (0, True), "input_torque": (1, False),
          "output_torque": (2, False)}  # fmt: skip
-"""Place in `CHANNELS` of the mean that a jump or a zero makes uncertain; whether divided by the ratio."""
+"""Place in `CHANNELS` of a mean that becomes uncertain; whether divided by the ratio."""
 # Which doubles of orders are fitted beside them decides no verdict.
 _RESOLVED = 0.9
 """Largest double, as a share of the Nyquist order."""
@@ -149,8 +149,9 @@ def order_lines(
         channel, share = _READ[jump.channel]
         covariance[channel, 0, 0] += (jump.size / (ratio if share else 1.0)) ** 2
     for error in record.reading_errors:
+        channel, share = _READ[error.channel]
         uncertain = np.arange(covariance.shape[1] if error.of_lines else 1)
-        covariance[_READ[error.channel][0], uncertain, uncertain] += error.size**2
+        covariance[channel, uncertain, uncertain] += (error.size / (ratio if share else 1.0)) ** 2
     return OrderLines(
         orders=asked,
         mean=coefficients[0],

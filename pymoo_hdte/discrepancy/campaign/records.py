@@ -45,14 +45,14 @@ class Jump:
 
 @dataclass(frozen=True)
 class ReadingError:
-    """By how much a torque sensor may be wrong in one record, beyond its noise.
+    """By how much a sensor may be wrong in one record, beyond its noise.
 
     Attributes
     ----------
     channel : str
-        ``"input_torque"`` or ``"output_torque"``.
+        Attribute of the record.
     size : float
-        Standard deviation of what is added to the mean of the channel, N.m.
+        Standard deviation of what is added to the mean of the channel, rad or N.m.
     of_lines : bool
         Whether each part of each order line is as uncertain: with steps that hide the motion.
     """
@@ -97,7 +97,7 @@ class RunningRecord:
     jumps : tuple of Jump
         Jumps of a sensor that were taken out of the rows; none in a record as it was measured.
     reading_errors : tuple of ReadingError
-        What its torque sensors may be wrong by, as its rows show; none in a record as it was
+        What its sensors may be wrong by, as the rows show; none in a record as it was
         measured.
     settling : float, optional
         Time constant in s of the decay with which the rows begin, which is fitted with the lines;

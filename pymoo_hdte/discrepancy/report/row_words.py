@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from pymoo_hdte.discrepancy.campaign.rows.findings import (
+    FAILED,
     UNITS,
     NoiseFinding,
     RowFault,
@@ -19,7 +20,9 @@ _MOST_FAULTS = 50
 _NOUNS = {
     "spike": ("spike", "spikes"),
     "jump": ("jump", "jumps"),
-    "new zero": ("new zero of an encoder", "new zeros of an encoder"),
+    "new zero": ("new zero of a sensor", "new zeros of sensors"),
+    "drift": ("torque that drifts", "torques that drift"),
+    "saturated": ("saturated channel", "saturated channels"),
     "settling": ("beginning that has not settled", "beginnings that have not settled"),
     "gap": ("gap", "gaps"),
     "repeated": ("run of repeated rows", "runs of repeated rows"),
@@ -95,7 +98,9 @@ def _treatment(findings: RowFindings) -> str:
         if hidden := sum(map(_hidden, findings.faults)):
             done[-1] += f", also in {hidden} more, where noise may hide it"
     if "new zero" in modelled:
-        done.append("the records after a new zero are shifted back")
+        done.append("records with a new zero are shifted back")
+    if "drift" in modelled:
+        done.append("a drift is taken out, and its sensor's zero counts as less certain")
     if findings.left_out:
         done.append(f"left out as a whole: {listed(list(findings.left_out))}")
     return "; ".join(done) or "nothing had to be left out"
@@ -108,7 +113,7 @@ def fault_rows(findings: RowFindings) -> list[FaultRow]:
 
 def _fault_row(fault: RowFault) -> FaultRow:
     unit, size = UNITS[fault.channel], fault.size
-    if fault.kind != "stuck":  # whose size is a reading, and no small angle
+    if fault.kind not in FAILED:  # whose size is a reading, and no small angle
         unit, size = _shown(unit, size)
     channel = "all" if fault.channel == "rows" else fault.channel.replace("_", " ")
     kind = "repeated rows" if fault.kind == "repeated" else fault.kind

@@ -28,7 +28,7 @@ from pymoo_hdte.discrepancy.campaign.rows.faults import (
     spikes_on_course,
     step,
 )
-from pymoo_hdte.discrepancy.campaign.rows.findings import RowFault
+from pymoo_hdte.discrepancy.campaign.rows.findings import FAILED, RowFault
 from pymoo_hdte.discrepancy.campaign.rows.search import Rows, RowSearch, Spikes
 from pymoo_hdte.discrepancy.campaign.rows.settling import settling, unsettled_rows
 from pymoo_hdte.discrepancy.engine.rules import Rules
@@ -89,8 +89,8 @@ def repaired_run(
     search = _RunSearch(record, ratio, deviations, rules)
     search.take_repeated()
     enough = search.take_stuck()
-    stuck = tuple(fault for fault in search.faults if fault.kind == "stuck")
-    if stuck and not (enough and spans_a_turn(search.record, ratio)):
+    failed = tuple(fault for fault in search.faults if fault.kind in FAILED)
+    if failed and not (enough and spans_a_turn(search.record, ratio)):
         return RepairedRun(record, tuple(search.faults), None, False)
     search.note_gaps()
     try:
@@ -98,7 +98,7 @@ def repaired_run(
     except InvalidInput:
         # A record that cannot tell these lines apart is judged, and refused, where it is measured,
         # unless that is so only without the rows in which a channel has failed.
-        return RepairedRun(record, stuck, None, not stuck)
+        return RepairedRun(record, failed, None, not failed)
     drifts = torque_drifts(search.fitted(orders), residual, deviations, rules)
     return RepairedRun(search.record, tuple(search.faults), residual, search.usable, drifts)
 
