@@ -11,6 +11,7 @@ it, and each one through the slope of its lines, as order x |phasor| x N x angle
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -152,6 +153,10 @@ def order_lines(
         channel, share = _READ[error.channel]
         uncertain = np.arange(covariance.shape[1] if error.of_lines else 1)
         covariance[channel, uncertain, uncertain] += (error.size / (ratio if share else 1.0)) ** 2
+        for power, bend in enumerate(courses[:3], 2):
+            shape = math.factorial(power) * bend / float(np.ptp(record.time)) ** power
+            part = error.bent * np.r_[shape.real, shape.imag[1:]]
+            covariance[channel] += np.outer(part, part)
     return OrderLines(
         orders=asked,
         mean=coefficients[0],

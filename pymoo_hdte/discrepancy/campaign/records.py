@@ -55,11 +55,15 @@ class ReadingError:
         Standard deviation of what is added to the mean of the channel, rad or N.m.
     of_lines : bool
         Whether each part of each order line is as uncertain: with steps that hide the motion.
+    bent : float
+        Standard deviation of what is added as powers 2, 3 and 4 of the time from the middle of the
+        record, as a share of its length, in the unit of ``size``: of a drift that is not straight.
     """
 
     channel: str
     size: float
     of_lines: bool = False
+    bent: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)

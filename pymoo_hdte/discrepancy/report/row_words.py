@@ -73,7 +73,13 @@ def rows_sentence(findings: RowFindings) -> str:
         records = {fault.record for fault in shown}
         where = next(iter(records)) if len(records) == 1 else f"{len(records)} records"
         words.append(f"{listed(counted)} in {where}: {_treatment(findings)}.")
-    changed = [one for one in findings.noise if one.replaced]
+    replaced = [one for one in findings.noise if one.replaced]
+    for zero in (one for one in replaced if one.name.endswith("_zero")):
+        words.append(
+            f"The {_name(zero)} drifts, so that it counts as known to {zero.used:.2g} {zero.unit} "
+            f"instead of {zero.stated:.2g} {zero.unit}."
+        )
+    changed = [one for one in replaced if not one.name.endswith("_zero")]
     if changed:
         ratios = listed([f"{one.used / one.stated:.2g} times ({_name(one)})" for one in changed])
         words.append(f"The noise is not the stated one but {ratios}; what was found is used.")
@@ -100,7 +106,8 @@ def _treatment(findings: RowFindings) -> str:
     if "new zero" in modelled:
         done.append("records with a new zero are shifted back")
     if "drift" in modelled:
-        done.append("a drift is taken out, and its sensor's zero counts as less certain")
+        largest = max(abs(one.size) for one in findings.faults if one.kind == "drift")
+        done.append(f"drifts of up to {largest:.2g} N.m are taken out")
     if findings.left_out:
         done.append(f"left out as a whole: {listed(list(findings.left_out))}")
     return "; ".join(done) or "nothing had to be left out"

@@ -328,10 +328,29 @@ BOTH_WAYS = tuple(
 )
 
 
-def test_no_friction_is_named_for_a_drift(clean):
+def test_lines_beside_a_drift_that_is_not_straight_scatter_as_their_covariance_says(clean):
+    ratio = clean.believed.ratio
+    orders = [1.0 / ratio, 2.0 / ratio, 1.0]
+
+    def read(record):
+        return record.input_torque - 0.05 * np.expm1(-2.0 * along(record))
+
+    changed, _ = examined(reading(clean, "input_torque", read))
+    for before, after in zip(clean.running, changed.running, strict=True):
+        true, found = (order_lines(one, changed.rig, ratio, orders) for one in (before, after))
+        apart = (found.phasors - true.phasors)[1]
+        triangle = np.linalg.cholesky(found.covariance[1, 1:, 1:])
+        white = np.linalg.solve(triangle, np.r_[apart.real, apart.imag])
+        assert np.sqrt(np.mean(white**2)) < 1.5
+
+
+@pytest.mark.parametrize("power", others_at_night([2.0], 1.0))
+def test_no_friction_is_named_for_a_drift(clean, power):
     """It was named with a probability of .97, and as large as half of the drift."""
-    analysis = analyse(drifting(clean, "input_torque", np.full(len(clean.running), 0.05)))
-    assert analysis.verdict.status == "adequate"
+    drift = reading(
+        clean, "input_torque", lambda one: one.input_torque + 0.05 * along(one) ** power
+    )
+    assert analyse(drift).verdict.status == "adequate"
 
 
 def test_friction_beside_a_drift_is_named_where_the_drive_turns_both_ways():
@@ -425,6 +444,7 @@ def test_a_reading_in_steps_that_hide_the_noise_has_that_of_the_steps(
     (one,) = (one for one in found.noise if one.replaced)
     assert one.name == noise
     assert "steps" in one.reason
+    assert json.loads(json.dumps(found.as_dict()))["noise"]
     averaged = np.sqrt(np.median([one.samples_averaged for one in clean.running]))
     row_noise = getattr(changed.rig, noise) / averaged
     assert row_noise >= 0.95 * step / scale / np.sqrt(12.0)

@@ -63,7 +63,8 @@ def without_drift(
     """Return records without the drift of a torque sensor, the drifts, and the zeros beside them.
 
     When in a record the zero was right, nobody knows: in its middle it may be off by half the
-    drift. What most records share of that is one error of the zero, as which it is uncertain.
+    drift. What most records share of that is one error of the zero, as which it is uncertain. Nor
+    need the drift be as straight as what is taken out (`ReadingError.bent`).
 
     Parameters
     ----------
@@ -128,5 +129,5 @@ def _steadied(record: RunningRecord, channel: str, rise: float, shared: float) -
     if rise:
         share = centred(record, slice(None)) / float(np.ptp(record.time))
         record = replace(record, **{channel: getattr(record, channel) - rise * share})
-    error = ReadingError(channel, abs(rise - shared) / 2.0)
+    error = ReadingError(channel, abs(rise - shared) / 2.0, bent=abs(rise))
     return replace(record, reading_errors=(*record.reading_errors, error))

@@ -74,12 +74,12 @@ def examined_rows(
     kept = [one for one in runs if one.record.name not in left_out]
     _check_failed(kept)
     records = _unsettled([one.record for one in kept], rules)
-    noise = _noise(campaign, kept, [record for record, _ in sweeps], rules)
-    read, noise = coarse_readings(records, noise, campaign.rig, ratio, rules)
-    rig = with_noise(campaign.rig, noise)
+    shown = _noise(campaign, kept, [record for record, _ in sweeps], rules)
+    read, of_readings = coarse_readings(records, shown, campaign.rig, ratio, rules)
     drifts = [one.drifts for one in kept]
-    steady, drifting, zeros = without_drift(read, drifts, rig, ratio, rules)
-    noise, rig = (*noise, *zeros), with_noise(rig, zeros)
+    steady, drifting, zeros = without_drift(read, drifts, campaign.rig, ratio, rules)
+    noise = (*of_readings, *zeros)
+    rig = with_noise(campaign.rig, noise)
     running, new_zero = with_one_zero(steady, campaign.believed, rig, rules)
     changed: dict[str, Any] = {
         "running": running,

@@ -138,12 +138,12 @@ def coarse_readings(
                 for one, step, of_sample, hidden in zip(found, steps, coarse, hides, strict=True)
             ]
         if np.mean(hides) > 0.5:
-            used = float(np.median(coarse)) / np.sqrt(12.0) / scale
+            used = np.median(coarse) / np.sqrt(12.0) / scale
             size = f"{np.median(steps):.3g} N.m"
             if name == "angle_noise":
-                used = float(np.sqrt(used**2 - rig.angle_quantisation**2 / 12.0))
+                used = np.sqrt(used**2 - rig.angle_quantisation**2 / 12.0)
                 size = f"{np.median(steps) / ARCSEC:.3g} arcsec"
-            used = max(used, noise[name].used)
+            used = float(max(used, noise[name].used))
             reason = f"{channel.replace('_', ' ')} is read in steps of {size}"
             noise[name] = replace(noise[name], found=used, used=used, reason=reason)
     return found, list(noise.values())
