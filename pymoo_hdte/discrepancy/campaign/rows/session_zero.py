@@ -145,7 +145,8 @@ def _outlier(
     left = values * weights
     left = left - axes @ (axes.T @ left)
     elapsed = np.array([one.elapsed for one in records])
-    warming = np.exp(-np.divide.outer(elapsed - elapsed[0], np.ptp(elapsed) * np.array(_WARMING)))
+    constants = (float(np.ptp(elapsed)) or 1.0) * np.array(_WARMING)
+    warming = np.exp(-np.divide.outer(elapsed - elapsed[0], constants))
     courses = np.column_stack([np.eye(number), warming * weights[:, None]])
     courses -= axes @ (axes.T @ courses)
     own = np.sum(courses**2, axis=0)
