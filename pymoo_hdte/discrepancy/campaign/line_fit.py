@@ -11,6 +11,7 @@ it, and each one through the slope of its lines, as order x |phasor| x N x angle
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -26,7 +27,7 @@ CHANNELS = ("transmission_error", "input_torque", "output_torque", "input_angle"
 
 _READ = {"output_angle": (0, False), "input_angle": (0, True), "input_torque": (1, False),
          "output_torque": (2, False)}  # fmt: skip
-"""Place in `CHANNELS` of the mean that a jump makes uncertain; whether divided by the ratio."""
+"""Place in `CHANNELS` of a mean that becomes uncertain; whether divided by the ratio."""
 # Which doubles of orders are fitted beside them decides no verdict.
 _RESOLVED = 0.9
 """Largest double, as a share of the Nyquist order."""
@@ -148,6 +149,14 @@ def order_lines(
     for jump in record.jumps:
         channel, share = _READ[jump.channel]
         covariance[channel, 0, 0] += (jump.size / (ratio if share else 1.0)) ** 2
+    for error in record.reading_errors:
+        channel, share = _READ[error.channel]
+        uncertain = np.arange(covariance.shape[1] if error.of_lines else 1)
+        covariance[channel, uncertain, uncertain] += (error.size / (ratio if share else 1.0)) ** 2
+        for power, bend in enumerate(courses[:3], 2):
+            shape = math.factorial(power) * bend / float(np.ptp(record.time)) ** power
+            part = error.bent * np.r_[shape.real, shape.imag[1:]]
+            covariance[channel] += np.outer(part, part)
     return OrderLines(
         orders=asked,
         mean=coefficients[0],

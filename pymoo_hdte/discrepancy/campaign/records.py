@@ -45,6 +45,29 @@ class Jump:
     size: float
 
 
+@dataclass(frozen=True)
+class ReadingError:
+    """By how much a sensor may be wrong in one record, beyond its noise.
+
+    Attributes
+    ----------
+    channel : str
+        Attribute of the record.
+    size : float
+        Standard deviation of what is added to the mean of the channel, rad or N.m.
+    of_lines : bool
+        Whether each part of each order line is as uncertain: with steps that hide the motion.
+    bent : float
+        Standard deviation of what is added as powers 2, 3 and 4 of the time from the middle of the
+        record, as a share of its length, in the unit of ``size``: of a drift that is not straight.
+    """
+
+    channel: str
+    size: float
+    of_lines: bool = False
+    bent: float = 0.0
+
+
 @dataclass(frozen=True, eq=False)
 class RunningRecord:
     """The drive at constant speed and load, over one output turn or more.
@@ -79,6 +102,9 @@ class RunningRecord:
         Of the drive in kelvin, near its lubricant; the mean over the record.
     jumps : tuple of Jump
         Jumps of a sensor that were taken out of the rows; none in a record as it was measured.
+    reading_errors : tuple of ReadingError
+        What its sensors may be wrong by, as the rows show; none in a record as it was
+        measured.
     settling : float, optional
         Time constant in s of the decay with which the rows begin, which is fitted with the lines;
         None in a record as it was measured.
@@ -113,6 +139,7 @@ class RunningRecord:
     temperature: float | None = None
     jumps: tuple[Jump, ...] = ()
     settling: float | None = None
+    reading_errors: tuple[ReadingError, ...] = ()
 
     def __post_init__(self) -> None:
         for name, inside in (("speed_range", self.input_speed), ("load_range", self.load_torque)):

@@ -101,6 +101,8 @@ def measure(
     values = np.array([stack(line.mean, line.phasors) for line in lines])
     stiffness = campaign.believed.stiffness
     covariance = np.array([_sensor_covariance(line, rig, stiffness) for line in lines])
+    # The load is taken from the measured output torque: its error is one of the input torque, too.
+    covariance[:, 1, 1] += [_load_variance(record) / ratio**2 for record in records]
     return Features(tuple(records), conditions, np.array(orders), values, covariance)
 
 
@@ -132,6 +134,12 @@ def _sensor_covariance(line: OrderLines, rig: Rig, stiffness: float) -> NDArray[
     # The load is taken from the measured output torque, whose error changes the predicted torsion.
     covariance[0, 0] += line.covariance[2, 0, 0] / stiffness**2
     return covariance
+
+
+def _load_variance(record: RunningRecord) -> float:
+    """Return the variance of the mean output torque by errors of its sensor, (N.m)^2."""
+    errors = record.reading_errors
+    return sum(error.size**2 for error in errors if error.channel == "output_torque")
 
 
 def unexpected_lines(

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from pymoo_hdte.discrepancy.campaign.rows.findings import (
+    FAILED,
     UNITS,
     NoiseFinding,
     RowFault,
@@ -19,7 +20,9 @@ _MOST_FAULTS = 50
 _NOUNS = {
     "spike": ("spike", "spikes"),
     "jump": ("jump", "jumps"),
-    "new zero": ("new zero of an encoder", "new zeros of an encoder"),
+    "new zero": ("new zero of a sensor", "new zeros of sensors"),
+    "drift": ("torque that drifts", "torques that drift"),
+    "saturated": ("saturated channel", "saturated channels"),
     "settling": ("beginning that has not settled", "beginnings that have not settled"),
     "gap": ("gap", "gaps"),
     "repeated": ("run of repeated rows", "runs of repeated rows"),
@@ -70,7 +73,13 @@ def rows_sentence(findings: RowFindings) -> str:
         records = {fault.record for fault in shown}
         where = next(iter(records)) if len(records) == 1 else f"{len(records)} records"
         words.append(f"{listed(counted)} in {where}: {_treatment(findings)}.")
-    changed = [one for one in findings.noise if one.replaced]
+    replaced = [one for one in findings.noise if one.replaced]
+    for zero in (one for one in replaced if one.name.endswith("_zero")):
+        words.append(
+            f"The {_name(zero)} drifts, so that it counts as known to {zero.used:.2g} {zero.unit} "
+            f"instead of {zero.stated:.2g} {zero.unit}."
+        )
+    changed = [one for one in replaced if not one.name.endswith("_zero")]
     if changed:
         ratios = listed([f"{one.used / one.stated:.2g} times ({_name(one)})" for one in changed])
         words.append(f"The noise is not the stated one but {ratios}; what was found is used.")
@@ -95,7 +104,10 @@ def _treatment(findings: RowFindings) -> str:
         if hidden := sum(map(_hidden, findings.faults)):
             done[-1] += f", also in {hidden} more, where noise may hide it"
     if "new zero" in modelled:
-        done.append("the records after a new zero are shifted back")
+        done.append("records with a new zero are shifted back")
+    if "drift" in modelled:
+        largest = max(abs(one.size) for one in findings.faults if one.kind == "drift")
+        done.append(f"drifts of up to {largest:.2g} N.m are taken out")
     if findings.left_out:
         done.append(f"left out as a whole: {listed(list(findings.left_out))}")
     return "; ".join(done) or "nothing had to be left out"
@@ -108,7 +120,7 @@ def fault_rows(findings: RowFindings) -> list[FaultRow]:
 
 def _fault_row(fault: RowFault) -> FaultRow:
     unit, size = UNITS[fault.channel], fault.size
-    if fault.kind != "stuck":  # whose size is a reading, and no small angle
+    if fault.kind not in FAILED:  # whose size is a reading, and no small angle
         unit, size = _shown(unit, size)
     channel = "all" if fault.channel == "rows" else fault.channel.replace("_", " ")
     kind = "repeated rows" if fault.kind == "repeated" else fault.kind

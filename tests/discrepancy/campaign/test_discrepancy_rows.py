@@ -359,3 +359,52 @@ def test_what_settles_over_most_of_a_record_or_begins_later_is_a_motion(rng):
     for motion in (slow, later):
         result = repaired(replace(record, input_angle=record.input_angle + motion))
         assert result.record.settling is None
+
+
+def clipped(record, channel, share):
+    """Return a record whose channel reads no more than all but a share of its rows."""
+    values = getattr(record, channel)
+    return replace(record, **{channel: np.minimum(values, np.quantile(values, 1.0 - share))})
+
+
+@pytest.mark.parametrize("channel", ["input_torque", "output_torque"])
+def test_rows_at_the_end_of_a_range_are_told_and_left_out(rng, channel):
+    record = run(rng)
+    result = repaired(clipped(record, channel, 0.04))
+    (fault,) = result.faults
+    assert (fault.kind, fault.channel, fault.treatment) == ("saturated", channel, "left out")
+    assert fault.size == np.quantile(getattr(record, channel), 0.96)
+    assert fault.rows == N_ROWS - len(result.record.time)
+    assert getattr(result.record, channel).max() < fault.size
+    assert result.usable
+    assert_lines_as_of(result.record, record, 4.5)
+
+
+def test_a_record_that_is_saturated_most_of_the_time_is_not_usable(rng):
+    result = repaired(clipped(run(rng), "input_torque", 0.4))
+    assert not result.usable
+    assert [fault.kind for fault in result.faults] == ["saturated"]
+    with pytest.raises(InvalidInput, match="saturated at"):
+        _check_failed([result])
+
+
+def test_a_square_wave_a_rest_and_a_coarse_crest_are_not_saturated(rng):
+    square = 20.0 + np.sign(np.sin(np.pi * TIME))
+    rests = 20.0 - np.round(rng.random(N_ROWS) - 0.45)
+    crest = 20.0 + np.round(400.0 * np.sin(7.0 * np.pi * TIME)) / 100.0
+    for torque in (square, rests, crest):
+        kinds = {one.kind for one in repaired(replace(run(rng), output_torque=torque)).faults}
+        assert "saturated" not in kinds
+
+
+def test_a_straight_line_of_a_torque_is_a_drift_and_a_slow_wave_is_none(rng):
+    record, along = run(rng), TIME / TIME[-1]
+    assert not repaired(record).drifts.any()
+    for channel, size in (("input_torque", 0.02), ("output_torque", -1.0)):
+        drifts = repaired(changed(record, channel, slice(None), size * along)).drifts
+        place = RUNNING.index(channel) - 2
+        assert drifts[place] == pytest.approx(size, abs=0.5 * NOISE[channel])
+        assert drifts[1 - place] == 0.0
+    for turns in (1.0, 1.6, 2.5, 3.0, 4.0):
+        wave = 0.02 * np.sin(2.0 * np.pi * turns * along + 0.4)
+        assert not repaired(changed(record, "input_torque", slice(None), wave)).drifts.any()

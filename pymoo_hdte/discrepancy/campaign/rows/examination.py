@@ -13,9 +13,16 @@ from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy.campaign.campaign import Campaign
 from pymoo_hdte.discrepancy.campaign.line_basis import mean_speed
 from pymoo_hdte.discrepancy.campaign.records import RunningRecord, TorsionRecord
+from pymoo_hdte.discrepancy.campaign.rows.drift import without_drift
 from pymoo_hdte.discrepancy.campaign.rows.faults import WINDOWS
-from pymoo_hdte.discrepancy.campaign.rows.findings import NoiseFinding, RowFault, RowFindings
+from pymoo_hdte.discrepancy.campaign.rows.findings import (
+    FAILED,
+    NoiseFinding,
+    RowFault,
+    RowFindings,
+)
 from pymoo_hdte.discrepancy.campaign.rows.noise_estimate import (
+    coarse_readings,
     repeatability,
     running_noise,
     sweep_noise,
@@ -66,10 +73,14 @@ def examined_rows(
     left_out = _left_out(runs, rules)
     kept = [one for one in runs if one.record.name not in left_out]
     _check_failed(kept)
-    noise = _noise(campaign, kept, [record for record, _ in sweeps], rules)
-    rig = with_noise(campaign.rig, noise)
     records = _unsettled([one.record for one in kept], rules)
-    running, new_zero = with_one_zero(records, campaign.believed, rig, rules)
+    shown = _noise(campaign, kept, [record for record, _ in sweeps], rules)
+    read, of_readings = coarse_readings(records, shown, campaign.rig, ratio, rules)
+    drifts = [one.drifts for one in kept]
+    steady, drifting, zeros = without_drift(read, drifts, campaign.rig, ratio, rules)
+    noise = (*of_readings, *zeros)
+    rig = with_noise(campaign.rig, noise)
+    running, new_zero = with_one_zero(steady, campaign.believed, rig, rules)
     changed: dict[str, Any] = {
         "running": running,
         "torsion": tuple(record for record, _ in sweeps),
@@ -81,7 +92,7 @@ def examined_rows(
     pairs = zip(records, kept, strict=True)
     faults += [_hidden_decay(one) for one, own in pairs if one is not own.record]
     faults += [fault for _, found in sweeps for fault in found]
-    final = [_final(fault, left_out) for fault in faults]
+    final = [_final(fault, left_out) for fault in (*faults, *drifting)]
     return campaign, RowFindings(n_rows, (*final, *new_zero), left_out, noise)
 
 
@@ -148,12 +159,13 @@ def _left_out(runs: Sequence[RepairedRun], rules: Rules) -> tuple[str, ...]:
 def _check_failed(kept: Sequence[RepairedRun]) -> None:
     """Refuse a record that cannot be left out and in which a channel has failed for too long."""
     for one in kept:
-        failed = [fault for fault in one.faults if fault.kind == "stuck"]
+        failed = [fault for fault in one.faults if fault.kind in FAILED]
         if failed and not one.usable:
             rows = f"{failed[0].rows} rows from row {failed[0].row + 1} on"
             field = f"{one.record.name}: {failed[0].channel} in {rows}"
             allowed = "a reading that changes; without this record too few are left"
-            raise InvalidInput(field, f"always {failed[0].size:g}", allowed)
+            word = "always" if failed[0].kind == "stuck" else "saturated at"
+            raise InvalidInput(field, f"{word} {failed[0].size:g}", allowed)
 
 
 def _final(fault: RowFault, left_out: Sequence[str]) -> RowFault:

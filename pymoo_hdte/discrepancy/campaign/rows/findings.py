@@ -15,6 +15,9 @@ UNITS = {
 }
 """Unit of the size of a fault by its channel."""
 
+FAILED = ("stuck", "saturated")
+"""Kinds of faults in which a channel does not read what it measures; their size is a reading."""
+
 
 @dataclass(frozen=True)
 class RowFault:
@@ -24,11 +27,14 @@ class RowFault:
     ----------
     record : str
         Name of the record.
-    kind : {"spike", "jump", "gap", "repeated", "stuck", "new zero", "settling"}
-        One to a few rows that depart from both sides; a constant offset from a row on; rows that
+    kind : str
+        ``"spike"``, ``"jump"``, ``"gap"``, ``"repeated"``, ``"stuck"``, ``"saturated"``,
+        ``"drift"``, ``"new zero"`` or ``"settling"``:
+        one to a few rows that depart from both sides; a constant offset from a row on; rows that
         are missing; rows that repeat the one before; rows in which one channel does not change,
-        though it does elsewhere; a constant offset from this record on; a decay
-        at the first rows.
+        though it does elsewhere; rows at the end of what a channel can read; a torque that rises on
+        a straight line while the other one does not; a constant offset of this record, or from it
+        on; a decay at the first rows.
     channel : str
         ``"input_angle"``, ``"output_angle"``, ``"input_torque"``, ``"output_torque"``; ``"time"``
         where both encoders agree that the time of the rows is wrong; ``"rows"`` for all of them,

@@ -19,9 +19,10 @@ from scipy.stats import chi2, norm
 
 from pymoo_hdte.discrepancy.campaign.believed import BelievedDrive, Rig
 from pymoo_hdte.discrepancy.campaign.line_fit import order_lines, row_covariance
-from pymoo_hdte.discrepancy.campaign.records import RunningRecord, TorsionRecord
+from pymoo_hdte.discrepancy.campaign.records import ReadingError, RunningRecord, TorsionRecord
 from pymoo_hdte.discrepancy.campaign.rows.findings import NoiseFinding
 from pymoo_hdte.discrepancy.engine.rules import Rules
+from pymoo_hdte.units import ARCSEC
 
 Rows = NDArray[np.float64]
 
@@ -35,6 +36,9 @@ _MEDIAN_SPREAD = 1.0 / np.log(2.0)
 """Relative standard deviation of the median of n exponential values, times sqrt(n)."""
 
 _MEDIAN_OF_NORMAL = 0.6745
+
+_ROUNDING = 1e-6
+"""Differences of changes that are none, as a share of their range."""
 
 _THIRD_DIFFERENCES = np.sqrt(20.0)
 """Third differences of white noise have 1 + 9 + 9 + 1 times its variance."""
@@ -90,6 +94,83 @@ def running_noise(
         _judged(rig, name, float(size), abs(np.log(times)) / deviation, reason, rules)
         for name, times, size in found
     ]
+
+
+def coarse_readings(
+    records: Sequence[RunningRecord],
+    findings: Sequence[NoiseFinding],
+    rig: Rig,
+    ratio: float,
+    rules: Rules,
+) -> tuple[list[RunningRecord], list[NoiseFinding]]:
+    """Return records and noise where channels are read in steps that hide the stated noise.
+
+    The noise is at least that of the steps, step / sqrt(12). Angles turn on through many steps;
+    of a torque steps also hide what is small beside them, so that its mean and each of its lines
+    are as uncertain.
+
+    Parameters
+    ----------
+    records : sequence of RunningRecord
+    findings : sequence of NoiseFinding
+        Of `running_noise`.
+    rig : Rig
+        What is stated.
+    ratio : float
+        Transmission ratio N, dimensionless.
+    rules : Rules
+    """
+    encoder = float(np.hypot(rig.angle_noise, rig.angle_quantisation / np.sqrt(12.0)))
+    channels = (
+        ("input_angle", "angle_noise", encoder * ratio, ratio),
+        ("output_angle", "angle_noise", encoder, 1.0),
+        ("input_torque", "input_torque_noise", rig.input_torque_noise, 1.0),
+        ("output_torque", "output_torque_noise", rig.output_torque_noise, 1.0),
+    )
+    found, noise = list(records), {one.name: one for one in findings}
+    for channel, name, stated, scale in channels:
+        steps = np.array([_step(getattr(one, channel), rules) for one in found])
+        # Of one raw sample, as the stated noise.
+        coarse = steps * np.sqrt([one.samples_averaged for one in found])
+        hides = coarse > rules.noise_mismatch * stated * np.sqrt(12.0)
+        if name != "angle_noise":
+            found = [
+                _with_hidden(one, channel, step, stated * step / of_sample) if hidden else one
+                for one, step, of_sample, hidden in zip(found, steps, coarse, hides, strict=True)
+            ]
+        if np.mean(hides) > 0.5:
+            used = np.median(coarse) / np.sqrt(12.0) / scale
+            size = f"{np.median(steps):.3g} N.m"
+            if name == "angle_noise":
+                used = np.sqrt(used**2 - rig.angle_quantisation**2 / 12.0)
+                size = f"{np.median(steps) / ARCSEC:.3g} arcsec"
+            used = float(max(used, noise[name].used))
+            reason = f"{channel.replace('_', ' ')} is read in steps of {size}"
+            noise[name] = replace(noise[name], found=used, used=used, reason=reason)
+    return found, list(noise.values())
+
+
+def _step(values: Rows, rules: Rules) -> float:
+    """Return the step in which a channel is read; zero where its changes are not in steps."""
+    changes = np.diff(values)
+    # Whole turns that were added, or digits of a file, leave equal changes apart by rounding.
+    rounding = float(np.ptp(changes)) * _ROUNDING
+    distinct = np.unique(np.round((changes - changes.min()) / rounding)) if rounding else changes
+    if len(distinct) > rules.changing_share * len(changes):
+        return 0.0
+    return float(np.median(np.diff(distinct))) * rounding
+
+
+def _with_hidden(record: RunningRecord, channel: str, step: float, noise: float) -> RunningRecord:
+    """Return a record whose mean and lines are uncertain by what the steps of a channel hide.
+
+    Rounding adds waves of the reading over a step, the first one of step / pi, which noise beside
+    it averages out by exp(-2 (pi noise / step)^2) (Carbone and Petri, IEEE Transactions on
+    Instrumentation and Measurement 43, 1994). A part of it has the root mean square.
+    """
+    wave = step / np.pi * np.exp(-2.0 * (np.pi * noise / step) ** 2)
+    error = ReadingError(channel, float(wave / np.sqrt(2.0)), of_lines=True)
+    return replace(record, reading_errors=(*record.reading_errors, error))
 
 
 def _powers(

@@ -19,6 +19,7 @@ from scipy.ndimage import median_filter
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy.campaign.line_basis import LineFit, spans_a_turn
 from pymoo_hdte.discrepancy.campaign.records import Jump, RunningRecord, TorsionRecord
+from pymoo_hdte.discrepancy.campaign.rows.drift import torque_drifts
 from pymoo_hdte.discrepancy.campaign.rows.faults import (
     WINDOWS,
     Lines,
@@ -27,7 +28,7 @@ from pymoo_hdte.discrepancy.campaign.rows.faults import (
     spikes_on_course,
     step,
 )
-from pymoo_hdte.discrepancy.campaign.rows.findings import RowFault
+from pymoo_hdte.discrepancy.campaign.rows.findings import FAILED, RowFault
 from pymoo_hdte.discrepancy.campaign.rows.search import Rows, RowSearch, Spikes
 from pymoo_hdte.discrepancy.campaign.rows.settling import settling, unsettled_rows
 from pymoo_hdte.discrepancy.engine.rules import Rules
@@ -58,12 +59,15 @@ class RepairedRun:
     usable : bool
         False if several channels jump at once: not a sensor has changed then, but the test. And if
         too few rows are left in which no channel has failed.
+    drifts : ndarray, shape (2,), or None
+        See `torque_drifts`; None where the lines cannot be fitted.
     """
 
     record: RunningRecord
     faults: tuple[RowFault, ...]
     residual: Rows | None
     usable: bool
+    drifts: Rows | None = None
 
 
 def repaired_run(
@@ -85,8 +89,8 @@ def repaired_run(
     search = _RunSearch(record, ratio, deviations, rules)
     search.take_repeated()
     enough = search.take_stuck()
-    stuck = tuple(fault for fault in search.faults if fault.kind == "stuck")
-    if stuck and not (enough and spans_a_turn(search.record, ratio)):
+    failed = tuple(fault for fault in search.faults if fault.kind in FAILED)
+    if failed and not (enough and spans_a_turn(search.record, ratio)):
         return RepairedRun(record, tuple(search.faults), None, False)
     search.note_gaps()
     try:
@@ -94,8 +98,9 @@ def repaired_run(
     except InvalidInput:
         # A record that cannot tell these lines apart is judged, and refused, where it is measured,
         # unless that is so only without the rows in which a channel has failed.
-        return RepairedRun(record, stuck, None, not stuck)
-    return RepairedRun(search.record, tuple(search.faults), residual, search.usable)
+        return RepairedRun(record, failed, None, not failed)
+    drifts = torque_drifts(search.fitted(orders), residual, deviations, rules)
+    return RepairedRun(search.record, tuple(search.faults), residual, search.usable, drifts)
 
 
 def repaired_sweep(
@@ -135,7 +140,7 @@ class _RunSearch(RowSearch[RunningRecord]):
         Where jumps do not end, they are a motion, and none is taken out.
         """
         # Its first rows depart from each other as spikes do.
-        self._take_settling(self._fitted(orders), ())
+        self._take_settling(self.fitted(orders), ())
         rough: tuple[RunningRecord, NDArray[np.int_], list[RowFault]] | None = None
         for taken in range(self.rules.most_jumps + 1):
             fit = self._without_spikes(orders)
@@ -151,10 +156,10 @@ class _RunSearch(RowSearch[RunningRecord]):
                 break
         if rough is not None:
             self.record, self.rows, self.faults = rough
-        self._take_settling(self._fitted(orders), ())
-        return self._fitted(orders).whole_residual
+        self._take_settling(self.fitted(orders), ())
+        return self.fitted(orders).whole_residual
 
-    def _fitted(self, orders: Sequence[float]) -> LineFit:
+    def fitted(self, orders: Sequence[float]) -> LineFit:
         """Return the lines of the rows as they are by now, fitted once for the same rows."""
         if self._fit is None or self._fit.record is not self.record:
             self._fit = LineFit.of(self.record, self.ratio, orders)
@@ -177,7 +182,7 @@ class _RunSearch(RowSearch[RunningRecord]):
     def _without_spikes(self, orders: Sequence[float]) -> LineFit:
         """Leave out spikes, the small ones once the large ones are gone, and return the fit."""
         for _ in range(_ROUNDS):
-            fit = self._fitted(orders)
+            fit = self.fitted(orders)
             found = self._spikes(fit.whole_residual)
             if not found:
                 break

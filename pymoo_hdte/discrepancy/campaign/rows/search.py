@@ -8,6 +8,7 @@ from typing import Generic, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import binary_dilation
 
 from pymoo_hdte.discrepancy.campaign.records import FEWEST_SAMPLES, RunningRecord, TorsionRecord
 from pymoo_hdte.discrepancy.campaign.rows.findings import RowFault
@@ -56,22 +57,46 @@ class RowSearch(Generic[Record]):
             self._keep(~again)
 
     def take_stuck(self) -> bool:
-        """Leave out rows in which a channel stays the same for far longer than elsewhere.
+        """Leave out rows in which a channel is saturated, or stays the same for far too long.
 
         Not if too few rows would be left, of which it tells.
         """
-        every = np.zeros(len(self.rows), dtype=bool)
+        every, saturated = np.zeros(len(self.rows), dtype=bool), 0
         for channel in self.channels:
             values = getattr(self.record, channel)
-            stuck = self._stuck(values)
+            for reading in (float(values.max()), float(values.min())):
+                flags = self._saturated(values, reading)
+                if flags.any():
+                    first, rows = int(np.argmax(flags)), int(np.count_nonzero(flags))
+                    self.note("saturated", channel, first, rows, reading, "left out")
+                    saturated += rows
+                every |= flags
+            stuck = self._stuck(values) & ~every
             for first, last in _runs(stuck):
                 value = float(values[first])
                 self.note("stuck", channel, first, last - first + 1, value, "left out")
             every |= stuck
         enough = bool(np.count_nonzero(~every) >= FEWEST_SAMPLES)
+        enough &= saturated <= self.rules.saturated_share * len(every)
         if every.any() and enough:
             self._keep(~every)
         return enough
+
+    def _saturated(self, values: Rows, reading: float) -> NDArray[np.bool_]:
+        """Return in which rows a channel is at the end of its range, as at no other reading.
+
+        With the rows beside them, of which noise has taken others to that end. One run alone is a
+        channel that is stuck.
+        """
+        rules, at_end = self.rules, values == reading
+        inside = values[~at_end]
+        next_to_it = inside[np.argmin(np.abs(inside - reading))]
+        number, others = np.count_nonzero(at_end), np.count_nonzero(inside == next_to_it)
+        lively = len(np.unique(inside)) >= rules.stuck_rows
+        many = number >= rules.stuck_rows and number >= rules.stuck_ratio * others
+        if not (lively and many and len(_runs(at_end)) > 1):
+            return np.zeros_like(at_end)
+        return np.asarray(binary_dilation(at_end, iterations=rules.longest_spike))
 
     def _stuck(self, values: Rows) -> NDArray[np.bool_]:
         """Return in which rows a channel has one reading for too long."""

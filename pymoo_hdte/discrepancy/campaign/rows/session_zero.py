@@ -1,8 +1,11 @@
-"""An encoder whose zero changes between two records of a session.
+"""A sensor whose zero changes between the records of a session.
 
 The mean transmission error follows the load; what is left of it may step once, at a change of the
-zero, or drift with the temperature. It is a change of the zero if one step, and no smooth drift,
-leaves hardly more than noise.
+zero of an encoder, be off in one record, or drift with the temperature. It is a change of the zero
+if a step or one record, and no smooth drift, leaves hardly more than noise.
+
+The mean input torque less that of the load is friction: a level at each speed, and a share of the
+load. A record that alone departs from that, by more than its stated zero, has another zero.
 """
 
 from __future__ import annotations
@@ -14,10 +17,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import norm
+from scipy.stats import t as student
 
 from pymoo_hdte.discrepancy.campaign.believed import BelievedDrive, Rig
 from pymoo_hdte.discrepancy.campaign.line_fit import OrderLines, order_lines
-from pymoo_hdte.discrepancy.campaign.records import RunningRecord
+from pymoo_hdte.discrepancy.campaign.records import ReadingError, RunningRecord
 from pymoo_hdte.discrepancy.campaign.rows.findings import RowFault
 from pymoo_hdte.discrepancy.engine.rules import Rules
 
@@ -27,7 +31,13 @@ _LEAST_FREEDOM = 4
 """Degrees of freedom that loads and a step leave; with fewer, every step fits."""
 
 _FEWEST = 2
-"""Least number of records before and after a change: one may be off for any reason."""
+"""Least number of records before and after a change that stays."""
+
+_OWN = 0.1
+"""Least square of what levels leave of one record's departure: half where two share one."""
+
+_FOLLOWED = 1e-9
+"""Directions of levels that are none, as a share of the largest: of a load that never changes."""
 
 _WARMING = (0.03, 0.1, 0.3, 1.0)
 """Time constants of drifts that are compared, in lengths of the session."""
@@ -43,10 +53,18 @@ class _Means(NamedTuple):
     elapsed: Values
 
 
+class _Change(NamedTuple):
+    """A zero that differs in some successive records, and by how much, rad or N.m."""
+
+    records: slice
+    channel: str
+    size: float
+
+
 def with_one_zero(
     records: Sequence[RunningRecord], believed: BelievedDrive, rig: Rig, rules: Rules
 ) -> tuple[tuple[RunningRecord, ...], tuple[RowFault, ...]]:
-    """Return records without a change of an encoder's zero between two of them, and the change.
+    """Return records without a zero that differs between them, and where it does.
 
     Parameters
     ----------
@@ -61,26 +79,31 @@ def with_one_zero(
     records : tuple of RunningRecord
         The same objects if there is no change.
     faults : tuple of RowFault
-        None or one.
+        At most one of a torque, in one record, and one of an encoder, in one or from it on.
     """
     ordered = sorted(records, key=lambda one: one.elapsed)
     if len(ordered) < _LEAST_FREEDOM:
         return tuple(records), ()
-    means = _means(ordered, believed, rig)
-    found = _step(means, rules)
-    if found is None:
-        return tuple(records), ()
-    first, size = found
-    channel = _encoder(means, believed, first, size)
-    moved = -size if channel == "output_angle" else size * believed.ratio
-    late = {one.name for one in ordered[first:]}
-    corrected = tuple(
-        replace(one, **{channel: getattr(one, channel) - moved}) if one.name in late else one
-        for one in records
-    )
-    n_rows = sum(len(one.time) for one in ordered[first:])
-    fault = RowFault(ordered[first].name, "new zero", channel, 0, n_rows, moved, "modelled")
-    return corrected, (fault,)
+    faults = []
+    for change_of in (_torque_change, _encoder_change):
+        means = _means(ordered, believed, rig)
+        change = change_of(ordered, means, believed, rig, rules)
+        if change is not None:
+            changed = ordered[change.records]
+            n_rows = sum(len(one.time) for one in changed)
+            size = (change.channel, 0, n_rows, change.size)
+            faults.append(RowFault(changed[0].name, "new zero", *size, "modelled"))
+            ordered[change.records] = [_shifted(one, change, len(changed)) for one in changed]
+    by_name = {one.name: one for one in ordered}
+    return tuple(by_name[one.name] for one in records), tuple(faults)
+
+
+def _shifted(record: RunningRecord, change: _Change, number: int) -> RunningRecord:
+    """Return a record without a change; the mean of one record alone remains uncertain by it."""
+    values = getattr(record, change.channel) - change.size
+    error = ReadingError(change.channel, abs(change.size))
+    errors = (*record.reading_errors, error) if number == 1 else record.reading_errors
+    return replace(record, **{change.channel: values}, reading_errors=errors)
 
 
 def _means(records: Sequence[RunningRecord], believed: BelievedDrive, rig: Rig) -> _Means:
@@ -101,6 +124,77 @@ def _means(records: Sequence[RunningRecord], believed: BelievedDrive, rig: Rig) 
         1.0 / np.sqrt(variance),
         np.array([one.elapsed for one in records]),
     )
+
+
+def _outlier(
+    records: Sequence[RunningRecord], values: Values, design: Values, weights: Values, rules: Rules
+) -> tuple[int, float] | None:
+    """Return the record whose value alone departs from the others, and by how much, or None.
+
+    From a level at each speed, beside further columns of a design (n, p). What fits nearly as well
+    is a doubt: another record, as where two share one level, or a session that warms up.
+    """
+    number = len(records)
+    speeds = np.array([one.input_speed for one in records])
+    levels = np.column_stack([speeds[:, None] == np.unique(speeds), design])
+    axes, sizes, _ = np.linalg.svd(levels * weights[:, None], full_matrices=False)
+    axes = axes[:, sizes > _FOLLOWED * sizes[0]]
+    freedom = number - axes.shape[1] - 1
+    if freedom < _LEAST_FREEDOM:
+        return None
+    left = values * weights
+    left = left - axes @ (axes.T @ left)
+    elapsed = np.array([one.elapsed for one in records])
+    constants = (float(np.ptp(elapsed)) or 1.0) * np.array(_WARMING)
+    warming = np.exp(-np.divide.outer(elapsed - elapsed[0], constants))
+    courses = np.column_stack([np.eye(number), warming * weights[:, None]])
+    courses -= axes @ (axes.T @ courses)
+    own = np.sum(courses**2, axis=0)
+    known = own > _OWN
+    gains = np.where(known, (left @ courses) ** 2 / np.where(known, own, 1.0), 0.0)
+    place = int(np.argmax(gains[:number]))
+    least = float(student.isf(rules.row_fault_chance / number / 2.0, freedom)) ** 2
+    # What is left may be more than noise, as an effect may move the mean.
+    rest = max(float(left @ left - gains[place]) / freedom, 1.0)
+    if not gains[place] - np.delete(gains, place).max() > least * rest:
+        return None
+    return place, float(left[place] / own[place] / weights[place])
+
+
+def _torque_change(
+    records: Sequence[RunningRecord],
+    means: _Means,
+    believed: BelievedDrive,
+    rig: Rig,
+    rules: Rules,
+) -> _Change | None:
+    """Return the torque whose zero differs in one record."""
+    ratio = believed.ratio
+    of_input, of_output = np.array([one.mean[1:3] for one in means.lines]).T
+    variance = np.array([one.covariance[1:3, 0, 0] @ [1.0, ratio**-2] for one in means.lines])
+    forward = np.sign([one.input_speed for one in records])
+    loads = np.column_stack([of_output, forward * np.abs(of_output)])
+    friction = of_input - of_output / ratio
+    found = _outlier(records, friction, loads, 1.0 / np.sqrt(variance), rules)
+    if found is None:
+        return None
+    place, size = found
+    channel = "input_torque"
+    turned = size * ratio / believed.stiffness
+    others = np.delete(means.values, place)[_alike(records, place)]
+    # A load that is read wrong departs from the transmission error of others, too.
+    if others.size and abs(departs := means.values[place] - np.mean(others)) > abs(
+        departs - turned
+    ):
+        channel, size = "output_torque", -size * ratio
+    stated = getattr(rig, f"{channel}_zero")
+    return _Change(slice(place, place + 1), channel, size) if abs(size) > stated else None
+
+
+def _alike(records: Sequence[RunningRecord], place: int) -> list[bool]:
+    """Return which of the other records have the load and direction of one, shape (n - 1,)."""
+    states = [(one.load_torque, one.input_speed > 0.0) for one in records]
+    return [one == states[place] for one in (*states[:place], *states[place + 1 :])]
 
 
 def places_of_change(elapsed: Values) -> NDArray[np.int_]:
@@ -144,16 +238,45 @@ def _step(means: _Means, rules: Rules) -> tuple[int, float] | None:
     return (int(places[best]), size) if clear else None
 
 
-def _encoder(means: _Means, believed: BelievedDrive, first: int, size: float) -> str:
-    """Return the encoder whose zero changed: with that of the input all phases turn."""
+def _encoder_change(
+    records: Sequence[RunningRecord],
+    means: _Means,
+    believed: BelievedDrive,
+    rig: Rig,
+    rules: Rules,
+) -> _Change | None:
+    """Return the encoder whose zero changes, in one record or from it on."""
+    found = _step(means, rules)
+    if found is not None:
+        place, size = found
+        where = slice(place, len(records))
+    else:
+        found = _outlier(records, means.values, means.loads, means.weights, rules)
+        if found is None:
+            return None
+        place, size = found
+        where = slice(place, place + 1)
+    speeds = np.array([one.input_speed for one in records])
+    if _is_of_input(means, believed, speeds, where, size):
+        return _Change(where, "input_angle", size * believed.ratio)
+    return _Change(where, "output_angle", -size)
+
+
+def _is_of_input(
+    means: _Means, believed: BelievedDrive, speeds: Values, where: slice, size: float
+) -> bool:
+    """Tell whether the zero of the input changed: with it all phases turn."""
     phasors = np.array([one.phasors[0, 1:] for one in means.lines])
     turns = np.exp(1j * np.array(believed.error_orders) * size * believed.ratio)
+    late, others = phasors[where], np.ones(len(speeds), dtype=bool)
+    others[where] = False
+    alike = others & np.isin(speeds, speeds[where])
+    usual = phasors[alike if alike.any() else others]
 
-    def apart(late: NDArray[np.complex128]) -> float:
-        both = np.median(late.real, axis=0) + 1j * np.median(late.imag, axis=0)
-        early = phasors[:first]
-        before = np.median(early.real, axis=0) + 1j * np.median(early.imag, axis=0)
-        return float(np.sum(np.abs(both - before) ** 2))
+    def apart(some: NDArray[np.complex128]) -> float:
+        middle, before = (
+            np.median(one.real, axis=0) + 1j * np.median(one.imag, axis=0) for one in (some, usual)
+        )
+        return float(np.sum(np.abs(middle - before) ** 2))
 
-    of_input = apart(phasors[first:] * turns) < 0.5 * apart(phasors[first:])
-    return "input_angle" if of_input else "output_angle"
+    return apart(late * turns) < 0.5 * apart(late)
