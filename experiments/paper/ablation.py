@@ -6,9 +6,9 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from experiments.comparison.figures import fronts, igd_of_runs
-from experiments.comparison.named import check_setting
-from experiments.comparison.paired import Comparison, compare, too_few_seeds
+from experiments.comparing.figures import fronts, igd_of_runs
+from experiments.comparing.named import check_setting
+from experiments.comparing.paired import Comparison, compare, too_few_seeds
 from experiments.paper.comparison_tables import (
     change,
     coverage_table,

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
-from experiments.comparison.paired import Comparison
-from experiments.comparison.runs import FINAL_SIZE
-from experiments.comparison.statistics import summary
+from experiments.comparing.paired import Comparison
+from experiments.comparing.runs import FINAL_SIZE
+from experiments.comparing.statistics import summary
 from experiments.paper.models import models_of
 from experiments.published_values import AlgorithmQuality
 from experiments.runner.registry import Context

@@ -11,8 +11,8 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from scipy.stats import gaussian_kde, norm, skew
 
-from experiments.comparison.figures import BLUE, GREEN, GREY, ORANGE, grid
-from experiments.comparison.runs import robust_problem
+from experiments.comparing.figures import BLUE, GREEN, GREY, ORANGE, grid
+from experiments.comparing.runs import robust_problem
 from experiments.paper.models import FITTED, models_of
 from experiments.paper.scatter import dte_samples
 from experiments.paper.shares import scatter_indices

@@ -13,7 +13,7 @@ from scipy.optimize import brentq
 from scipy.special import gamma
 from scipy.stats import gennorm
 
-from experiments.comparison.figures import BLUE, GREEN, GREY, ORANGE, grid
+from experiments.comparing.figures import BLUE, GREEN, GREY, ORANGE, grid
 from experiments.published_values import TABLE_5
 from experiments.runner.result import Cell, Column, Finding, Table, significant
 from pymoo_hdte.drive import PARAMETERS

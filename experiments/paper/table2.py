@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from experiments.comparison.rates import at_least
+from experiments.comparing.rates import at_least
 from experiments.paper.static_error.figures import heat_maps
 from experiments.paper.static_error.normality_tables import (
     common_sizes,

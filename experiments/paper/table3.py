@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from experiments.comparison.rates import at_least, rate_p
+from experiments.comparing.rates import at_least, rate_p
 from experiments.paper.bench_campaign import (
     COEFFICIENTS,
     N_PROTOTYPES,

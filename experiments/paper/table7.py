@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from experiments.anytime.experiment import at_the_stated_setting, table_7_picture
-from experiments.comparison.figures import fronts, igd_of_runs
-from experiments.comparison.named import check_setting
-from experiments.comparison.paired import Comparison, compare, too_few_seeds
+from experiments.comparing.figures import fronts, igd_of_runs
+from experiments.comparing.named import check_setting
+from experiments.comparing.paired import Comparison, compare, too_few_seeds
+from experiments.paper.anytime.experiment import at_the_stated_setting, table_7_picture
 from experiments.paper.comparison_tables import (
     INDICATOR_NAMES,
     change,

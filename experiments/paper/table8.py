@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from scipy.stats import gaussian_kde
 
-from experiments.comparison.figures import BLUE, GREEN, GREY, ORANGE, PINK, grid
+from experiments.comparing.figures import BLUE, GREEN, GREY, ORANGE, PINK, grid
 from experiments.paper.choices import (
     BAND,
     INITIAL,

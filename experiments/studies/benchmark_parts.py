@@ -13,8 +13,8 @@ from pymoo.core.problem import Problem
 from pymoo.util.nds.non_dominated_sorting import NonDominatedSorting
 from threadpoolctl import threadpool_limits
 
-from experiments.blind.cases import BELIEVED, RIG
-from experiments.comparison.runs import robust_problem
+from experiments.comparing.runs import robust_problem
+from experiments.studies.blind.cases import BELIEVED, RIG
 from experiments.studies.timing import Ratio, best_time
 from pymoo_hdte.algorithms.crowding import least_crowded
 from pymoo_hdte.algorithms.spread import most_spread

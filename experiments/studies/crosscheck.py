@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 import chaospy
 import numpy as np
 
-from experiments.comparison.runs import robust_problem
+from experiments.comparing.runs import robust_problem
 from experiments.paper.models import models_of
 from experiments.paper.scatter import theta_s_of
 from experiments.paper.shares import study_designs

@@ -11,8 +11,8 @@ from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 from tqdm import tqdm
 
-from experiments.comparison.figures import BLUE, GREEN, GREY, ORANGE, grid
-from experiments.comparison.runs import robust_problem
+from experiments.comparing.figures import BLUE, GREEN, GREY, ORANGE, grid
+from experiments.comparing.runs import robust_problem
 from experiments.paper.models import models_of
 from experiments.runner.registry import Context
 from experiments.runner.result import Cell, Column, Picture, Result, Table, significant

@@ -9,8 +9,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from experiments.comparison.figures import BLUE, GREEN, GREY, ORANGE, PINK, grid
-from experiments.comparison.runs import robust_problem
+from experiments.comparing.figures import BLUE, GREEN, GREY, ORANGE, PINK, grid
+from experiments.comparing.runs import robust_problem
 from experiments.paper.choices import BAND, MODEL
 from experiments.paper.models import models_of
 from experiments.paper.shares import (

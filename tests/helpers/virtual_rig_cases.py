@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from experiments.blind.cases import BELIEVED, RIG
+from experiments.studies.blind.cases import BELIEVED, RIG
 from pymoo_hdte.virtual.hidden_forms import HiddenEffect
 from pymoo_hdte.virtual.rig import TrueRig
 from pymoo_hdte.virtual.runs import Condition

@@ -10,8 +10,8 @@ from quick_campaigns import quick_analysis, ripple_analysis_and_report
 from verdict_cases import case_campaign
 from virtual_rig_cases import BELIEVED, RIG, effect, true_rig
 
-from experiments.blind.campaigns import campaign_of, hiding
-from experiments.blind.cases import Case
+from experiments.studies.blind.campaigns import campaign_of, hiding
+from experiments.studies.blind.cases import Case
 from pymoo_hdte.discrepancy import analyse
 from pymoo_hdte.discrepancy.engine.fitting import fit
 from pymoo_hdte.discrepancy.engine.hypothesis import hypothesis_of, label_of

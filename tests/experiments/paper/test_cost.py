@@ -2,7 +2,11 @@
 
 import pytest
 
-from experiments.published_values import BATCH_MODEL_SECONDS, BATCH_SURROGATE_SECONDS, SPEED_UPS
+from experiments.published_values import (
+    BATCH_MODEL_SECONDS,
+    BATCH_SURROGATE_SECONDS,
+    SPEED_UPS,
+)
 from experiments.runner.campaign import Campaign
 from experiments.runner.registry import Context
 from experiments.runner.result import OF_MODELS

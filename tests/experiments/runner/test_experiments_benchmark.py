@@ -4,10 +4,10 @@ import time
 
 import pytest
 
-from experiments.measured import cpu_time, rigs
 from experiments.runner.machine import machine_table
 from experiments.studies import benchmark_verdicts
 from experiments.studies.benchmark_verdicts import CASES, verdict_times
+from experiments.studies.measured import cpu_time, rigs
 from experiments.studies.timing import Ratio, best_time, ratio_table
 from pymoo_hdte.surrogate.threads import usable_cores
 
