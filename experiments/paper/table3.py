@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from experiments.comparing.rates import at_least, rate_p
-from experiments.paper.bench_campaign import (
+from experiments.paper.bench.campaign import (
     COEFFICIENTS,
     N_PROTOTYPES,
     N_REPEATS,

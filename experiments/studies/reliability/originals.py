@@ -15,10 +15,10 @@ from scipy.io import savemat
 
 from experiments.studies.blind.cases import BELIEVED, RIG
 from experiments.studies.reliability.mutations import Files
+from experiments.studies.virtual_rig.rig import draw_rig, run_campaign
+from experiments.studies.virtual_rig.runs import Condition
 from pymoo_hdte.discrepancy import write_campaign
 from pymoo_hdte.surrogate import Box, ChebyshevSurrogate
-from pymoo_hdte.virtual.rig import draw_rig, run_campaign
-from pymoo_hdte.virtual.runs import Condition
 
 SEED = 7
 

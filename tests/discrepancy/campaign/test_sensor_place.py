@@ -6,10 +6,10 @@ import numpy as np
 from quick_campaigns import CONDITIONS
 from virtual_rig_cases import BELIEVED, RIG
 
+from experiments.studies.virtual_rig.rig import draw_rig, run_campaign
 from pymoo_hdte.discrepancy import analyse
 from pymoo_hdte.discrepancy.campaign.files import with_load_before_sensor
 from pymoo_hdte.discrepancy.campaign.sensor_place import inertia_felt, sensor_hint
-from pymoo_hdte.virtual.rig import draw_rig, run_campaign
 
 
 def at_both_places():

@@ -33,12 +33,12 @@ from experiments.studies.blind.rig.session import (
 )
 from experiments.studies.blind.rig.visible import LEAST, features, orders_seen
 from experiments.studies.blind.truth import one_name
+from experiments.studies.virtual_rig.hidden_forms import HiddenEffect
+from experiments.studies.virtual_rig.rig import TrueRig
+from experiments.studies.virtual_rig.runs import Condition as TheirCondition
+from experiments.studies.virtual_rig.runs import simulate_run
 from pymoo_hdte.discrepancy import read_campaign
 from pymoo_hdte.drive.effects import drive_effects
-from pymoo_hdte.virtual.hidden_forms import HiddenEffect
-from pymoo_hdte.virtual.rig import TrueRig
-from pymoo_hdte.virtual.runs import Condition as TheirCondition
-from pymoo_hdte.virtual.runs import simulate_run
 
 RATED = Condition(2000.0, 40.0, 1000.0, 1, "train")
 SHORT = (RATED, replace(RATED, load=0.0, role="held_out"))

@@ -12,6 +12,16 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from experiments.studies.virtual_rig.hidden_forms import HiddenEffect
+from experiments.studies.virtual_rig.integrator import Mechanics, quasi_static_torsion
+from experiments.studies.virtual_rig.laws import Mesh, Side, angle_wave
+from experiments.studies.virtual_rig.runs import Condition, simulate_run
+from experiments.studies.virtual_rig.sensors import (
+    OutputEncoder,
+    TorqueErrors,
+    draw_torque_errors,
+    measure,
+)
 from pymoo_hdte.checks import InvalidInput, one_of, real_number
 from pymoo_hdte.discrepancy.campaign.campaign import (
     BelievedDrive,
@@ -20,11 +30,6 @@ from pymoo_hdte.discrepancy.campaign.campaign import (
     RunningRecord,
     TorsionRecord,
 )
-from pymoo_hdte.virtual.hidden_forms import HiddenEffect
-from pymoo_hdte.virtual.integrator import Mechanics, quasi_static_torsion
-from pymoo_hdte.virtual.laws import Mesh, Side, angle_wave
-from pymoo_hdte.virtual.runs import Condition, simulate_run
-from pymoo_hdte.virtual.sensors import OutputEncoder, TorqueErrors, draw_torque_errors, measure
 
 LOAD_SETTING = 0.25
 """Standard deviation of the brake's load from a set value other than zero, N.m."""

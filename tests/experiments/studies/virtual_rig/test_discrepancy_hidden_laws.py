@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pymoo_hdte.virtual.integrator import quasi_static_torsion
-from pymoo_hdte.virtual.laws import Mesh, Side, backbone, friction, rounded_dead_zone
+from experiments.studies.virtual_rig.integrator import quasi_static_torsion
+from experiments.studies.virtual_rig.laws import Mesh, Side, backbone, friction, rounded_dead_zone
 
 
 def test_maxwell_loop_has_the_area_and_the_saturation_of_its_elements():

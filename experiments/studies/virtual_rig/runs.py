@@ -8,15 +8,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pymoo_hdte.units import REVOLUTION_PER_MINUTE
-from pymoo_hdte.virtual.integrator import (
+from experiments.studies.virtual_rig.integrator import (
     N_STATES,
     Course,
     Mechanics,
     integrate,
     quasi_static_torsion,
 )
-from pymoo_hdte.virtual.laws import friction, static_error
+from experiments.studies.virtual_rig.laws import friction, static_error
+from pymoo_hdte.units import REVOLUTION_PER_MINUTE
 
 SETTLING = 18.0
 """Time constants of the slowest mode before the first sample; leaves 2e-8 of the start."""

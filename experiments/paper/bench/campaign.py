@@ -7,6 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from experiments.paper.bench.prototypes import draw_prototypes
+from experiments.paper.bench.rigs import COMPLETE_DRIVE, INPUT_BEARING, OUTPUT_BEARING, TorsionBench
 from experiments.published_values import TABLE_3, TABLE_6
 from pymoo_hdte.drive import hs_20_100
 from pymoo_hdte.identification import (
@@ -21,13 +23,6 @@ from pymoo_hdte.identification import (
 )
 from pymoo_hdte.identification.damping import INPUT_SPEEDS, OUTPUT_SPEEDS
 from pymoo_hdte.identification.prototypes import RunKey
-from pymoo_hdte.virtual.bench import (
-    COMPLETE_DRIVE,
-    INPUT_BEARING,
-    OUTPUT_BEARING,
-    TorsionBench,
-    draw_prototypes,
-)
 
 COEFFICIENTS = ("K", "B_in", "B_fc", "B_out")
 N_PROTOTYPES, N_REPEATS = 20, 3

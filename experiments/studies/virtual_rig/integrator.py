@@ -8,8 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pymoo_hdte.compilation import compiled
-from pymoo_hdte.virtual.laws import (
+from experiments.studies.virtual_rig.laws import (
     Mesh,
     Side,
     damping_at,
@@ -19,6 +18,7 @@ from pymoo_hdte.virtual.laws import (
     static_error,
     static_mesh_torque,
 )
+from pymoo_hdte.compilation import compiled
 
 N_STATES = 6
 """Deviation of the input angle from its straight line and its rate, transmission error and its

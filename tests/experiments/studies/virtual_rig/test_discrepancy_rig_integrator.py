@@ -7,10 +7,10 @@ import pytest
 from scipy.integrate import solve_ivp
 from virtual_rig_cases import BELIEVED, FAST, PHASES, RIG, effect, true_rig
 
+from experiments.studies.virtual_rig.integrator import Course, integrate, quasi_static_torsion
+from experiments.studies.virtual_rig.laws import static_error
+from experiments.studies.virtual_rig.runs import linear_modes, simulate_run
 from pymoo_hdte.units import ARCSEC
-from pymoo_hdte.virtual.integrator import Course, integrate, quasi_static_torsion
-from pymoo_hdte.virtual.laws import static_error
-from pymoo_hdte.virtual.runs import linear_modes, simulate_run
 
 SMOOTH = true_rig(
     effect("mesh", sinh_curvature=500.0, depth=0.03, depth_phase=1.0, depth_second=2.0),

@@ -9,14 +9,20 @@ import pytest
 from night import others_at_night
 from virtual_rig_cases import BELIEVED, RIG, SHORT, effect, true_rig
 
+from experiments.studies.virtual_rig import rig as virtual_rig
+from experiments.studies.virtual_rig.hidden_forms import HIDDEN_FORMS, draw_effect
+from experiments.studies.virtual_rig.laws import Mesh, backbone, static_error
+from experiments.studies.virtual_rig.rig import (
+    DEFAULT_CONDITIONS,
+    TrueRig,
+    draw_rig,
+    repeated,
+    run_campaign,
+)
+from experiments.studies.virtual_rig.runs import Condition
+from experiments.studies.virtual_rig.sensors import OutputEncoder, TorqueErrors, measure
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.units import ARCSEC
-from pymoo_hdte.virtual import rig as virtual_rig
-from pymoo_hdte.virtual.hidden_forms import HIDDEN_FORMS, draw_effect
-from pymoo_hdte.virtual.laws import Mesh, backbone, static_error
-from pymoo_hdte.virtual.rig import DEFAULT_CONDITIONS, TrueRig, draw_rig, repeated, run_campaign
-from pymoo_hdte.virtual.runs import Condition
-from pymoo_hdte.virtual.sensors import OutputEncoder, TorqueErrors, measure
 
 NOW = ("backlash", "coulomb_friction", "kinematic_error", "thermal_drift", "output_vibration")
 """One of a kind: a mesh, a friction, an error of the gear, a sensor, and one in no list."""

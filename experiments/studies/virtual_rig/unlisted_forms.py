@@ -9,9 +9,14 @@ import math
 
 import numpy as np
 
+from experiments.studies.virtual_rig.listed_forms import (
+    RATED_SPEED,
+    ROUNDING_SPEED,
+    Drawn,
+    uniform_phase,
+)
 from pymoo_hdte.discrepancy.campaign.believed import BelievedDrive
 from pymoo_hdte.units import ARCSEC
-from pymoo_hdte.virtual.listed_forms import RATED_SPEED, ROUNDING_SPEED, Drawn, uniform_phase
 
 
 def output_vibration(believed: BelievedDrive, rng: np.random.Generator, size: float) -> Drawn:
