@@ -27,7 +27,13 @@ class Indicators(NamedTuple):
     spacing: float
 
 
-SMALLER_IS_BETTER = Indicators(igd=True, igd_plus=True, hypervolume=False, spacing=True)
+NAMES = {"igd": "IGD", "igd_plus": "IGD+", "hypervolume": "hypervolume", "spacing": "Spacing"}
+"""Indicators as tables call them."""
+
+
+def smaller_is_better(measure: str) -> bool:
+    """Return whether a smaller value of a measure, named after its indicator, is better."""
+    return not measure.startswith("hypervolume")
 
 
 class IndicatorsAgainst:

@@ -13,9 +13,8 @@ from moocore import is_nondominated
 from pymoo.optimize import minimize
 
 from experiments.comparing.named import algorithm_named, problem_named
-from experiments.comparing.runs import FINAL_SIZE
+from experiments.comparing.runs import FINAL_SIZE, final_rows
 from experiments.runner.campaign import Run
-from pymoo_hdte.algorithms.crowding import least_crowded
 
 SPENT = "evaluations"
 
@@ -67,8 +66,7 @@ class OpenRun:
             return Run(columns, nothing, found.exec_time)
         best = is_nondominated(F, keep_weakly=True)
         X, F = X[best], F[best]
-        kept = least_crowded(F, FINAL_SIZE)
-        kept = kept[np.lexsort(F[kept].T[::-1])]
+        kept = final_rows(F)
         rows = np.hstack([np.full((len(kept), 1), spent), X[kept], F[kept]])
         return Run(columns, rows, found.exec_time)
 

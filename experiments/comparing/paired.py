@@ -9,6 +9,7 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
+from experiments.comparing.indicators import smaller_is_better
 from experiments.comparing.named import problem_named, source_of
 from experiments.comparing.open_runs import OpenRun
 from experiments.comparing.quality import Quality, TrueFront
@@ -18,8 +19,6 @@ from experiments.comparing.statistics import effect_size, holm, wilcoxon_p
 from experiments.runner.campaign import Run
 from experiments.runner.registry import Context
 from experiments.runner.setting import Setting
-
-SMALLER_IS_BETTER = {"igd": True, "spacing": True, "hypervolume": False, "lost_pieces": True}
 
 SIGNIFICANT = 0.05
 """Level of the paired tests, after Holm's correction."""
@@ -118,7 +117,7 @@ class Comparison:
         theirs = [self.values(rival, indicator) for rival in rivals]
         adjusted = holm([wilcoxon_p(ours, values) for values in theirs])
         better = [
-            effect_size(values, ours) if SMALLER_IS_BETTER[indicator] else effect_size(ours, values)
+            effect_size(values, ours) if smaller_is_better(indicator) else effect_size(ours, values)
             for values in theirs
         ]
         return [PairedTest(*entry) for entry in zip(rivals, adjusted.tolist(), better, strict=True)]

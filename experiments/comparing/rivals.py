@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.stats import binomtest, mannwhitneyu, rankdata
 
+from experiments.comparing.indicators import smaller_is_better
 from experiments.comparing.paired import SIGNIFICANT
 from experiments.comparing.ranks import OF_PROBLEMS, OF_RUNS, costs_of
 from experiments.comparing.rates import state_of
@@ -83,6 +84,18 @@ def holm_against(
     costs = costs_of(values, smaller_is_better, OF_PROBLEMS)
     ours, theirs, rivals = _opponents(control, algorithms, costs)
     return _tested(rivals, [_gain(ours, cost) for cost in theirs])
+
+
+def tests_of_medians(
+    control: str, algorithms: Sequence[str], medians: NDArray[np.float64], measure: str
+) -> list[RivalTest]:
+    """Test one algorithm against each other as `holm_against` on medians of one measure.
+
+    Ratios of distances mean the same on all problems, differences of hypervolumes do as well.
+    """
+    smaller = smaller_is_better(measure)
+    compared = np.log(medians) if smaller else medians
+    return holm_against(control, algorithms, compared, smaller_is_better=smaller)
 
 
 def signs_against(

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
+from numpy.typing import NDArray
 from pymoo.algorithms.moo.nsga2 import NSGA2
 from pymoo.core.algorithm import Algorithm
 from pymoo.optimize import minimize
@@ -50,6 +51,15 @@ def robust_problem(model: str) -> RobustDTE:
     return RobustDTE(model=model)
 
 
+def final_rows(F: NDArray[np.float64], size: int = FINAL_SIZE) -> NDArray[np.int_]:
+    """Return which rows of ``F`` (n, m) a set of at most ``size`` keeps, by rising objectives.
+
+    More are thinned by crowding, in the same way for all algorithms.
+    """
+    kept = least_crowded(F, size)
+    return kept[np.lexsort(F[kept].T[::-1])]
+
+
 @dataclass(frozen=True)
 class OptimisationRun:
     """One algorithm, one problem, one seed; defaults are the budget of Section 5.1."""
@@ -79,7 +89,6 @@ class OptimisationRun:
         if spent != self.population * self.generations:
             raise RuntimeError(f"{self.key} spent {spent} evaluations: no fair comparison")
         X, F = found.opt.get("X", "F")
-        kept = least_crowded(F, self.final_size)
-        kept = kept[np.lexsort(F[kept].T[::-1])]
+        kept = final_rows(F, self.final_size)
         columns = (*problem.var_names, *problem.obj_names)
         return Run(columns, np.hstack([X[kept], F[kept]]), found.exec_time)

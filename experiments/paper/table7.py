@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from experiments.comparing.figures import fronts, igd_of_runs
+from experiments.comparing.indicators import NAMES
 from experiments.comparing.named import check_setting
 from experiments.comparing.paired import Comparison, compare, too_few_seeds
 from experiments.paper.anytime.experiment import at_the_stated_setting, table_7_picture
 from experiments.paper.comparison_tables import (
-    INDICATOR_NAMES,
     change,
     coverage_table,
     least_igd,
@@ -103,7 +103,7 @@ def _advantages(comparisons: Sequence[Comparison]) -> Iterator[Finding]:
                     f"{change(theirs, ours)} {test.rival}'s (p = {significant(test.p, 2)}; the "
                     f"paper: {change(*paper)})"
                 )
-            name = INDICATOR_NAMES[indicator]
+            name = NAMES[indicator]
             sentence = (
                 f"On {comparison.model}, after 100 x 100 evaluations, {OURS}'s mean {name} is "
                 f"{' and '.join(clauses)}."

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from places import PAGES, WORDS
 
+from experiments.comparing.indicators import NAMES
 from experiments.runner.campaign import Campaign
 from experiments.runner.registry import Context
 from experiments.studies.contest import swarm_parts
@@ -16,7 +17,7 @@ from experiments.studies.contest.peers_rivals import (
     nearest_rival_table,
     subsets_table,
 )
-from experiments.studies.contest.peers_tables import NAMES, median_ranks
+from experiments.studies.contest.peers_tables import median_ranks
 from experiments.studies.robust.data import ahead, outcome_for
 from experiments.studies.robust.functions import FUNCTIONS
 from experiments.studies.robust.job import METHODS, OPENTURNS, OURS

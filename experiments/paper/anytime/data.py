@@ -13,14 +13,14 @@ from numpy.typing import NDArray
 
 from experiments.comparing.references import true_front
 from experiments.comparing.runs import AS_PRINTED, VELOCITIES
+from experiments.comparing.stored import Stored
 from experiments.paper.anytime.job import AnytimeRun
 from experiments.paper.anytime.measures import MEASURES, RETURNED, measure
 from experiments.paper.anytime.moments import COMMON, EXACT, FRESH
 from experiments.published_values import TABLE_7
 from experiments.runner.campaign import Campaign
-from experiments.runner.committed import committed_file, read_rows, rounded, table_with_origin
+from experiments.runner.committed import read_rows, rounded, table_with_origin
 from experiments.runner.registry import Context
-from experiments.runner.store import TIMES, write_atomically
 from pymoo_hdte.io.text_table import csv_text
 
 NAME = "anytime"
@@ -136,23 +136,14 @@ class Scores:
 
 
 def scores_for(context: Context) -> Scores:
-    """Return the committed scores, or those of a full or quick run.
-
-    A run leaves its two files where the committed ones can be replaced by them.
-    """
-    if not (context.full or context.quick):
-        return committed_scores()
-    scores = run_scores(context.campaign, FULL if context.full else QUICK)
-    write_atomically(context.out / NAME / f"{NAME}.csv", format_scores(scores).encode())
-    seconds = context.out / TIMES / NAME / f"{NAME}_seconds.csv"
-    write_atomically(seconds, format_seconds(scores).encode())
-    return scores
+    """Return the committed scores, or those of a full or quick run."""
+    extent = FULL if context.full else QUICK
+    return STORED.of(context, NAME, lambda: run_scores(context.campaign, extent))
 
 
 def committed_scores() -> Scores:
     """Return the scores of the last full run; errors as `committed_file`."""
-    names = f"{NAME}.csv", f"{NAME}_seconds.csv"
-    return read_scores(*(committed_file(file, NAME) for file in names))
+    return STORED.committed(NAME)
 
 
 def run_scores(campaign: Campaign, extent: Extent) -> Scores:
@@ -222,6 +213,9 @@ def read_scores(path: Path, seconds_path: Path) -> Scores:
         for row in read_rows(seconds_path)
     }
     return Scores({case: np.array(rows) for case, rows in found.items()}, seconds)
+
+
+STORED = Stored(read_scores, format_scores, format_seconds)
 
 
 def _case(row: dict[str, str]) -> Case:

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from experiments.comparing.indicators import smaller_is_better
 from experiments.comparing.paired import SIGNIFICANT
 from experiments.comparing.statistics import holm, wilcoxon_p
 from experiments.paper.anytime.data import Contested, Scores, cases
@@ -20,7 +21,6 @@ COMPARED = {
     "hypervolume": f"hypervolume_{Scale(TRUE, NORMALISED).suffix}",
 }
 """The measures by which algorithms are compared; the readings have the others."""
-LARGER_IS_BETTER = ("hypervolume",)
 
 
 class Duel(NamedTuple):
@@ -66,7 +66,7 @@ def duels(
             first.append(scores.of(own, COMPARED[indicator]))
             second.append(scores.of(other, COMPARED[indicator]))
     a, b = np.array(first), np.array(second)
-    sign = 1.0 if indicator in LARGER_IS_BETTER else -1.0
+    sign = -1.0 if smaller_is_better(indicator) else 1.0
     better, low, high = a12_intervals(sign * a, sign * b).T.tolist()
     ratio = a.mean(axis=1) / b.mean(axis=1)
     p = _corrected([wilcoxon_p(x, y) for x, y in zip(a, b, strict=True)])

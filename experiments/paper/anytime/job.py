@@ -11,11 +11,13 @@ from numpy.typing import NDArray
 from pymoo.core.problem import Problem
 
 from experiments.comparing.indicators import front_among
+from experiments.comparing.offers import at_budgets
 from experiments.comparing.runs import (
     ALGORITHMS,
     AS_PRINTED,
     FINAL_SIZE,
     VELOCITIES,
+    final_rows,
     robust_problem,
 )
 from experiments.paper.anytime.moments import problem_with
@@ -66,8 +68,7 @@ class AnytimeRun:
         seconds = time.perf_counter() - started
         rows = []
         for budget, (X, F) in zip(self.budgets, found, strict=True):
-            kept = least_crowded(F, FINAL_SIZE)
-            kept = kept[np.lexsort(F[kept].T[::-1])]
+            kept = final_rows(F)
             exact = robust_problem(self.model).evaluate(X[kept])
             rows.append(np.column_stack([np.full(len(kept), budget), F[kept], exact]))
         return Run(COLUMNS, np.concatenate(rows), seconds)
@@ -80,12 +81,9 @@ class AnytimeRun:
         algorithm = ALGORITHMS[self.algorithm](self.population, FINAL_SIZE)
         if isinstance(algorithm, ParticleSwarm):
             algorithm.initial_velocity = VELOCITIES[self.velocity]()
-        algorithm.setup(problem, termination=("n_eval", budgets[-1]), seed=self.seed)
-        for budget in budgets:
-            while algorithm.evaluator.n_eval < budget:
-                algorithm.next()
-            if algorithm.evaluator.n_eval != budget:
-                spent = algorithm.evaluator.n_eval
+        for budget, _ in at_budgets(algorithm, problem, budgets, self.seed):
+            spent = algorithm.evaluator.n_eval
+            if spent != budget:
                 raise RuntimeError(f"{self.key} spent {spent} of {budget}: no fair comparison")
             yield algorithm.opt.get("X", "F")
 

@@ -7,6 +7,7 @@ from itertools import groupby
 
 import numpy as np
 
+from experiments.comparing.indicators import NAMES
 from experiments.comparing.runs import AS_PRINTED
 from experiments.paper.anytime.data import Case, Contested, Scores
 from experiments.paper.anytime.duels import COMPARED, Duel
@@ -15,7 +16,6 @@ from experiments.paper.anytime.measures import EQUAL, RETURNED
 from experiments.paper.anytime.moments import EXACT
 from experiments.paper.anytime.readings import Reading
 from experiments.paper.anytime.tables import (
-    NAMES,
     OURS,
     RIVALS,
     STATED,

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from itertools import groupby
 
+from experiments.comparing.indicators import NAMES
 from experiments.paper.anytime.data import Contested, Scores
 from experiments.paper.anytime.duels import Duel, duels
-from experiments.paper.anytime.tables import NAMES, WHERE, drawn, duel_cells, duel_columns, exactly
+from experiments.paper.anytime.tables import WHERE, drawn, duel_cells, duel_columns, exactly
 from experiments.runner.result import Cell, Column, Finding, Table
 
 STRATEGIES = (

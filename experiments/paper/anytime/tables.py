@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from experiments.comparing.indicators import NAMES
 from experiments.comparing.runs import AS_PRINTED
 from experiments.paper.anytime.data import OF_TABLE_7, Case, Contested, Scores
 from experiments.paper.anytime.duels import COMPARED, Duel, duels
@@ -22,7 +23,6 @@ OURS = "AMP-MOPSO"
 RIVALS = tuple(name for name in OF_TABLE_7 if name != OURS)
 STATED = 100, 10_000
 """Population and evaluations that the paper states."""
-NAMES = {"igd": "IGD", "spacing": "Spacing", "hypervolume": "hypervolume"}
 SHOWN = 12
 """Readings that the page lists, besides the closest at the stated setting."""
 SCALE = Scale(TRUE, NORMALISED)

@@ -11,24 +11,22 @@ from typing import Any, NamedTuple, cast
 import numpy as np
 from tqdm import tqdm
 
+from experiments.comparing.contestants import CONTESTANTS
 from experiments.runner.committed import committed_file, read_rows, table_with_origin
 from experiments.runner.registry import Context
-from experiments.runner.store import TIMES, write_atomically
+from experiments.runner.store import write_atomically
 from experiments.studies.cards.hardness import STARTS, Hardness, hardness
-from experiments.studies.contest.contestants import CONTESTANTS
 from experiments.studies.contest.peers_data import (
     MEASURES,
+    STORED,
     Scores,
     committed_scores,
     contest_scores,
-    format_scores,
-    format_seconds,
-    read_scores,
 )
 from experiments.studies.contest.problems import BENCHMARKS, CARDS, problem_of
 
 NAME = "cards"
-RUNS, SECONDS, HARDNESS = "cards.csv", "cards_seconds.csv", "cards_hardness.csv"
+HARDNESS = "cards_hardness.csv"
 BUDGETS = (500, 2_000, 10_000)
 SEEDS = 5
 DIRECT = "RobustDTE-calibrated_direct"
@@ -57,17 +55,15 @@ def numbers_for(context: Context) -> Numbers:
         scores = contest_scores(context.campaign, _QUICK, present, BUDGETS[:1], (1, 2))
         return Numbers(scores, _hardness_of(_QUICK, _QUICK_STARTS))
     found = Numbers(_own_scores(context), _hardness_of(list(CARDS), STARTS))
-    write_atomically(context.out / NAME / RUNS, format_scores(found.scores).encode())
+    STORED.leave(found.scores, NAME, context)
     write_atomically(context.out / NAME / HARDNESS, format_hardness(found.hardness).encode())
-    seconds = format_seconds(found.scores).encode()
-    write_atomically(context.out / TIMES / NAME / SECONDS, seconds)
     return found._replace(scores=_with_peers(found.scores))
 
 
 def committed_numbers() -> Numbers:
     """Return the numbers of the last full run; errors as `committed_file`."""
-    runs, seconds, table = (committed_file(file, NAME) for file in (RUNS, SECONDS, HARDNESS))
-    return Numbers(_with_peers(read_scores(runs, seconds)), read_hardness(read_rows(table)))
+    rows = read_rows(committed_file(HARDNESS, NAME))
+    return Numbers(_with_peers(committed_scores(NAME)), read_hardness(rows))
 
 
 def _own_scores(context: Context) -> Scores:

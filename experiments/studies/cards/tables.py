@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from experiments.comparing.indicators import NAMES, smaller_is_better
 from experiments.comparing.paired import SIGNIFICANT
 from experiments.comparing.ranks import medians
 from experiments.comparing.rates import state_of
@@ -20,7 +21,6 @@ from experiments.studies.cards.separation import (
     separations,
 )
 from experiments.studies.contest.peers_data import Scores
-from experiments.studies.contest.peers_tables import NAMES, smaller_is_better
 
 HARDNESS_NOTE = (
     f"Local optima are those of the weighted sum (objectives in widths of the front, weights in "

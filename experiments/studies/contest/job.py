@@ -2,34 +2,20 @@
 
 from __future__ import annotations
 
-import time
 from dataclasses import dataclass
 
 import numpy as np
 
+from experiments.comparing.contestants import EVALUATIONS, SPENT, ContestantRun
 from experiments.comparing.indicators import front_among
 from experiments.runner.campaign import Run
-from experiments.studies.contest.contestants import EVERYONE
 from experiments.studies.contest.problems import problem_of
-
-EVALUATIONS, SPENT = "evaluations", "spent"
-"""Columns of a run, before those of the objectives."""
+from experiments.studies.contest.reduced_swarms import EVERYONE
 
 
 @dataclass(frozen=True)
-class ContestRun:
-    """One algorithm, one problem, one seed, and the set it offers at each budget of evaluations."""
-
-    problem: str
-    algorithm: str
-    seed: int
-    budgets: tuple[int, ...]
-
-    @property
-    def key(self) -> str:
-        """All settings in one name."""
-        budgets = "_".join(map(str, self.budgets))
-        return f"{self.problem}_{self.algorithm}_{budgets}_seed{self.seed}"
+class ContestRun(ContestantRun):
+    """A run on a problem of the contest, which keeps the sets that are offered."""
 
     def execute(self) -> Run:
         """Run, and return the front of what is offered.
@@ -38,12 +24,9 @@ class ContestRun:
         objectives. A budget at which nothing feasible is offered has one row without objectives.
         """
         problem = problem_of(self.problem)
-        run = EVERYONE[self.algorithm].run
-        started = time.perf_counter()
-        offers = run(problem, self.budgets, self.seed)
-        seconds = time.perf_counter() - started
+        offers, seconds = self.offers(EVERYONE[self.algorithm], problem)
         rows = []
-        for budget, offer in zip(self.budgets, offers, strict=True):
+        for budget, offer in offers:
             front = front_among(offer.F)
             if not len(front):
                 front = np.full((1, problem.n_obj), np.nan)

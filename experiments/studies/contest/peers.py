@@ -11,14 +11,15 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.figure import Figure
 
+from experiments.comparing.contestants import CONTESTANTS
+from experiments.comparing.indicators import NAMES
+from experiments.comparing.peers_pymoo import POPULATION
 from experiments.comparing.ranks import nemenyi_difference, problem_ranks
 from experiments.comparing.ranks_figures import critical_difference_plot, rank_heatmap
 from experiments.runner.committed import stored_outcome
 from experiments.runner.registry import Context
 from experiments.runner.result import NEW, Picture, Result
-from experiments.studies.contest.contestants import CONTESTANTS
 from experiments.studies.contest.peers_data import FINAL_SIZE, Extent, Scores, scores_for
-from experiments.studies.contest.peers_pymoo import POPULATION
 from experiments.studies.contest.peers_rivals import (
     must_reach_table,
     nearest_rival_table,
@@ -26,7 +27,6 @@ from experiments.studies.contest.peers_rivals import (
     subsets_table,
 )
 from experiments.studies.contest.peers_tables import (
-    NAMES,
     OURS,
     in_one_sentence,
     median_ranks,

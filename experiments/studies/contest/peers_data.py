@@ -15,15 +15,16 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from experiments.comparing.contestants import EVALUATIONS, SPENT
 from experiments.comparing.indicators import Indicators, IndicatorsAgainst
+from experiments.comparing.stored import Stored
 from experiments.runner.campaign import Campaign, Run
-from experiments.runner.committed import committed_file, read_rows, rounded, table_with_origin
+from experiments.runner.committed import read_rows, rounded, table_with_origin
 from experiments.runner.registry import Context
-from experiments.runner.store import TIMES, write_atomically
 from experiments.studies.contest.benchmark_fronts import front_of
-from experiments.studies.contest.contestants import EVERYONE
-from experiments.studies.contest.job import EVALUATIONS, SPENT, ContestRun
+from experiments.studies.contest.job import ContestRun
 from experiments.studies.contest.problems import BENCHMARKS, EVERY
+from experiments.studies.contest.reduced_swarms import EVERYONE
 from pymoo_hdte.algorithms.crowding import least_crowded
 from pymoo_hdte.algorithms.spread import most_spread
 from pymoo_hdte.io.text_table import csv_text
@@ -88,29 +89,19 @@ class Extent(NamedTuple):
 def scores_for(
     context: Context, name: str, algorithms: Sequence[str], full: Extent, quick: Extent
 ) -> Scores:
-    """Return the committed scores of an experiment, or those of a full or quick run.
-
-    A run leaves its two files where the committed ones can be replaced by them.
-    """
-    if not (context.full or context.quick):
-        return committed_scores(name)
+    """Return the committed scores of an experiment, or those of a full or quick run."""
     budgets, seeds = full if context.full else quick
-    scores = contest_scores(
-        context.campaign, list(BENCHMARKS), algorithms, budgets, range(1, seeds + 1)
+    problems, numbers = list(BENCHMARKS), range(1, seeds + 1)
+    return STORED.of(
+        context,
+        name,
+        lambda: contest_scores(context.campaign, problems, algorithms, budgets, numbers),
     )
-    values, seconds = _files(name)
-    write_atomically(context.out / name / values, format_scores(scores).encode())
-    write_atomically(context.out / TIMES / name / seconds, format_seconds(scores).encode())
-    return scores
 
 
 def committed_scores(name: str) -> Scores:
     """Return the scores of the last full run of an experiment; errors as `committed_file`."""
-    return read_scores(*(committed_file(file, name) for file in _files(name)))
-
-
-def _files(name: str) -> tuple[str, str]:
-    return f"{name}.csv", f"{name}_seconds.csv"
+    return STORED.committed(name)
 
 
 def contest_scores(
@@ -220,3 +211,6 @@ def read_scores(path: Path, seconds_path: Path) -> Scores:
 
 def _in_order(rows: Sequence[dict[str, str]], name: str) -> tuple[str, ...]:
     return tuple(dict.fromkeys(row[name] for row in rows))
+
+
+STORED = Stored(read_scores, format_scores, format_seconds)

@@ -8,10 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import mannwhitneyu
 
+from experiments.comparing.indicators import NAMES, smaller_is_better
 from experiments.comparing.paired import SIGNIFICANT
 from experiments.comparing.ranks import average_ranks
 from experiments.comparing.rates import median, state_of
-from experiments.comparing.rivals import RivalTest, better_than_each, holm_against, win_tie_loss
+from experiments.comparing.rivals import better_than_each, tests_of_medians, win_tie_loss
 from experiments.runner.result import (
     Cell,
     Column,
@@ -23,11 +24,9 @@ from experiments.runner.result import (
 )
 from experiments.studies.contest.peers_data import Scores
 from experiments.studies.contest.peers_tables import (
-    NAMES,
     OURS,
     median_ranks,
     median_values,
-    smaller_is_better,
 )
 from experiments.studies.contest.problems import BENCHMARKS
 
@@ -87,7 +86,8 @@ def _place_row(scores: Scores, indicator: str, evaluations: int, place: int) -> 
     ours, best, rank = _ours_and_best(scores.algorithms, ranks)
     reached = 1 + int(np.sum(ranks < ours))
     values = median_values(scores, indicator, evaluations, tuning=False)
-    unbeaten = sum(not one.beaten for one in rival_tests(scores.algorithms, values, indicator))
+    tests = tests_of_medians(OURS, scores.algorithms, values, indicator)
+    unbeaten = sum(not test.beaten for test in tests)
     return (
         f"place {place}{' or better' if place > 1 else ''} by average rank, {NAMES[indicator]}",
         evaluations,
@@ -109,7 +109,7 @@ def _ours_and_best(
 
 def _beyond_chance_row(scores: Scores, indicator: str, evaluations: int) -> tuple[Cell, ...]:
     values = median_values(scores, indicator, evaluations, tuning=False)
-    tests = rival_tests(scores.algorithms, values, indicator)
+    tests = tests_of_medians(OURS, scores.algorithms, values, indicator)
     unbeaten = [
         f"{test.rival} (p = {significant(test.p, 2)}, {test.better}:{test.worse})"
         for test in tests
@@ -187,7 +187,7 @@ def rivals_table(scores: Scores) -> Table:
                 smaller_is_better=smaller_is_better(indicator),
             )
             values = median_values(scores, indicator, evaluations, tuning=False)
-            tests = rival_tests(scores.algorithms, values, indicator)
+            tests = tests_of_medians(OURS, scores.algorithms, values, indicator)
             for test, count in zip(tests, counts, strict=True):
                 row = rows.setdefault((test.rival, evaluations), [test.rival, evaluations])
                 row += [test.p, test.better, test.worse, count.wins, count.ties, count.losses]
@@ -235,7 +235,7 @@ def _standing(
     algorithms: Sequence[str], medians: NDArray[np.float64], indicator: str
 ) -> list[Cell]:
     ranks = average_ranks(medians, smaller_is_better=smaller_is_better(indicator))
-    tests = rival_tests(algorithms, medians, indicator)
+    tests = tests_of_medians(OURS, algorithms, medians, indicator)
     won = sum(test.beaten for test in tests)
     return [*_ours_and_best(algorithms, ranks), f"{won} of {len(tests)}"]
 
@@ -269,13 +269,3 @@ def nearest_rival_table(scores: Scores) -> Table:
         f"held-out problems, on {np.sum(slight)} of them by less than {100 * SLIGHT:g} %.",
         folded=True,
     )
-
-
-def rival_tests(
-    algorithms: Sequence[str], medians: NDArray[np.float64], indicator: str
-) -> list[RivalTest]:
-    """Test ours against each rival over problems, given medians (problems, algorithms)."""
-    better = smaller_is_better(indicator)
-    # Ratios of distances mean the same on all problems, differences of hypervolumes do as well.
-    compared = np.log(medians) if better else medians
-    return holm_against(OURS, algorithms, compared, smaller_is_better=better)

@@ -7,24 +7,13 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.comparing.indicators import SMALLER_IS_BETTER
+from experiments.comparing.indicators import NAMES, smaller_is_better
 from experiments.comparing.ranks import average_ranks, friedman, medians, rank_intervals
 from experiments.runner.result import Cell, Column, Table, significant
 from experiments.studies.contest.peers_data import Scores, takes_part
 from experiments.studies.contest.problems import BENCHMARKS
 
 OURS = "ElitistSwarm"
-NAMES = {
-    "igd": "IGD",
-    "igd_plus": "IGD+",
-    "hypervolume": "hypervolume",
-    "spacing": "Spacing",
-}
-
-
-def smaller_is_better(measure: str) -> bool:
-    """Return whether a smaller value of one of the `MEASURES` is better."""
-    return getattr(SMALLER_IS_BETTER, measure.removesuffix("_crowding"))
 
 
 def median_values(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,8 @@ from numpy.typing import NDArray
 from pymoo.core.population import Population
 from pymoo.core.problem import Problem
 
+from experiments.comparing.contestants import CONTESTANTS, Contestant
+from experiments.comparing.peers_pymoo import run_pymoo
 from pymoo_hdte.algorithms import ElitistSwarm
 from pymoo_hdte.algorithms.crowding import least_crowded
 from pymoo_hdte.algorithms.dominance import best_front
@@ -112,3 +115,10 @@ REDUCED: dict[str, Callable[[Problem], ElitistSwarm]] = {
     "with entropy inertia": lambda _: EntropyInertiaSwarm(),
 }
 """Variants by what is missing, changed or added; all with 100 particles."""
+
+SWARM_VARIANTS = {
+    name: Contestant("pymoo_hdte", partial(run_pymoo, make)) for name, make in REDUCED.items()
+}
+"""They compete with the whole swarm alone."""
+
+EVERYONE = CONTESTANTS | SWARM_VARIANTS

@@ -8,14 +8,15 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from experiments.comparing.indicators import NAMES
 from experiments.comparing.ranks import medians
+from experiments.comparing.rivals import tests_of_medians
 from experiments.runner.committed import stored_outcome
 from experiments.runner.registry import Context
 from experiments.runner.result import Cell, Column, Result, Table
-from experiments.studies.contest.contestants import SWARM_VARIANTS
 from experiments.studies.contest.peers_data import Extent, Scores, scores_for
-from experiments.studies.contest.peers_rivals import rival_tests
-from experiments.studies.contest.peers_tables import NAMES, OURS
+from experiments.studies.contest.peers_tables import OURS
+from experiments.studies.contest.reduced_swarms import SWARM_VARIANTS
 
 FULL = Extent(budgets=(10_000,), seeds=21)
 QUICK = Extent(budgets=(2_500,), seeds=5)
@@ -60,7 +61,8 @@ def _parts_table(scores: Scores) -> tuple[Table, list[str]]:
         ]
         runs = scores.of("igd", scores.budgets[-1], tuning=tuning)
         cost, low, high = costs(runs, rng)
-        tests = rival_tests(scores.algorithms, medians(runs, smaller_is_better=True), "igd")
+        middle = medians(runs, smaller_is_better=True)
+        tests = tests_of_medians(OURS, scores.algorithms, middle, "igd")
         for variant, (row, test) in enumerate(zip(rows, tests, strict=True), start=1):
             interval = f"{low[variant]:.3f}..{high[variant]:.3f}"
             row += [float(cost[variant]), interval, test.better, test.worse, test.p]

@@ -10,6 +10,7 @@ from moocore import hypervolume
 from numpy.typing import NDArray
 from pymoo.indicators.igd_plus import IGDPlus
 
+from experiments.comparing.contestants import EVALUATIONS, SPENT, ContestantRun
 from experiments.comparing.indicators import CORNER, front_among
 from experiments.runner.campaign import Run
 from experiments.studies.suites.bbob.coco import MARKS, BbobProblem, shares_of_run
@@ -23,32 +24,20 @@ MEASURES = ("hypervolume", "igd_plus", "solutions")
 
 
 @dataclass(frozen=True)
-class SuiteRun:
-    """One algorithm on one problem of a suite with one seed, judged at each budget."""
-
-    problem: str
-    algorithm: str
-    seed: int
-    budgets: tuple[int, ...]
+class SuiteRun(ContestantRun):
+    """A run on a problem of a suite, which keeps what its sets are worth."""
 
     @property
     def key(self) -> str:
         """All settings in one name."""
-        budgets = "_".join(map(str, self.budgets))
-        algorithm = self.algorithm.replace("/", "-")
-        return f"suite_{self.problem}_{algorithm}_{budgets}_seed{self.seed}"
+        return f"suite_{super().key}"
 
     def execute(self) -> Run:
         """Run; columns are the budget, the evaluations spent and `MEASURES`, a row a budget."""
         problem = problem_of(self.problem)
-        started = time.perf_counter()
-        offers = ON_SUITES[self.algorithm].run(problem, self.budgets, self.seed)
-        seconds = time.perf_counter() - started
-        rows = [
-            [budget, offer.spent, *measured(self.problem, offer.F)]
-            for budget, offer in zip(self.budgets, offers, strict=True)
-        ]
-        return Run(("evaluations", "spent", *MEASURES), np.array(rows, dtype=float), seconds)
+        offers, seconds = self.offers(ON_SUITES[self.algorithm], problem)
+        rows = [[budget, offer.spent, *measured(self.problem, offer.F)] for budget, offer in offers]
+        return Run((EVALUATIONS, SPENT, *MEASURES), np.array(rows, dtype=float), seconds)
 
 
 def measured(name: str, F: NDArray[np.float64]) -> tuple[float, float, int]:

@@ -12,10 +12,10 @@ from pymoo.core.algorithm import Algorithm
 from pymoo.core.problem import Problem
 from pymoo.util.ref_dirs import get_reference_directions
 
+from experiments.comparing.contestants import CONTESTANTS, Contestant, of_jmetal
 from experiments.comparing.indicators import front_among
-from experiments.studies.contest.contestants import CONTESTANTS, Contestant, of_jmetal
-from experiments.studies.contest.offer import POPULATION, Offer
-from experiments.studies.contest.peers_pymoo import OWN, PYMOO, run_pymoo
+from experiments.comparing.offers import POPULATION, Offer
+from experiments.comparing.peers_pymoo import OWN, PYMOO, run_pymoo
 from experiments.studies.suites.bbob.coco import StartBox
 from experiments.studies.suites.reduced import LESS
 from pymoo_hdte.algorithms import CompactSwarm

@@ -8,10 +8,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from experiments.comparing import indicators as measures
 from experiments.comparing.paired import SIGNIFICANT
 from experiments.comparing.ranks import average_ranks
 from experiments.comparing.rates import rate
-from experiments.comparing.rivals import RivalTest, holm_against
+from experiments.comparing.rivals import RivalTest, tests_of_medians
 from experiments.runner.result import Cell, Column, Table
 from experiments.studies.suites.bbob.published import BEST, CITED
 from experiments.studies.suites.bbob_tables import reached
@@ -27,9 +28,8 @@ from experiments.studies.suites.protocol import (
     VALIDATION,
 )
 
-NAMES = {"hypervolume": "hypervolume", "igd_plus": "IGD+"}
+NAMES = {name: measures.NAMES[name] for name in ("hypervolume", "igd_plus")}
 SWARMS = (OURS, "ElitistSwarm")
-SMALLER = {"hypervolume": False, "igd_plus": True}
 
 
 def indicators(suite: str) -> list[str]:
@@ -49,7 +49,7 @@ def ranks(outcome: Outcome, suite: str, budget: int, measure: str) -> dict[str, 
     """Return average ranks of the medians over the seeds by algorithm, 1 being the best."""
     algorithms = outcome.algorithms(suite, budget)
     values = outcome.medians(suite, budget, measure, algorithms)
-    means = average_ranks(values, smaller_is_better=SMALLER[measure])
+    means = average_ranks(values, smaller_is_better=measures.smaller_is_better(measure))
     return dict(zip(algorithms, means.tolist(), strict=True))
 
 
@@ -60,12 +60,7 @@ def tests(outcome: Outcome, suite: str, budget: int, measure: str) -> list[Rival
     """
     algorithms = outcome.algorithms(suite, budget)
     values = outcome.medians(suite, budget, measure, algorithms)
-    if SMALLER[measure]:
-        # Ratios of distances mean the same on all problems, differences of hypervolumes do as well.
-        values = np.log(values)
-    return holm_against(
-        OURS, algorithms, missing_as_ours(values, algorithms), smaller_is_better=SMALLER[measure]
-    )
+    return tests_of_medians(OURS, algorithms, missing_as_ours(values, algorithms), measure)
 
 
 def can_show(problems: int, rivals: int) -> bool:

@@ -5,9 +5,10 @@ import pytest
 from moocore import is_nondominated
 from swarm_problems import Parabolas
 
-from experiments.studies.contest.contestants import CONTESTANTS, SWARM_VARIANTS
+from experiments.comparing.contestants import CONTESTANTS
 from experiments.studies.contest.job import ContestRun, front_among
 from experiments.studies.contest.problems import problem_of
+from experiments.studies.contest.reduced_swarms import SWARM_VARIANTS
 
 BUDGETS = (400, 700)
 

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from night import others_at_night
 
+from experiments.comparing.contestants import CONTESTANTS
 from experiments.comparing.indicators import CORNER, IndicatorsAgainst
 from experiments.runner.campaign import Campaign
 from experiments.runner.registry import Context
 from experiments.studies.contest import peers, swarm_parts
-from experiments.studies.contest.contestants import CONTESTANTS, SWARM_VARIANTS
 from experiments.studies.contest.job import ContestRun
 from experiments.studies.contest.peers_data import (
     MEASURES,
@@ -30,6 +30,7 @@ from experiments.studies.contest.peers_rivals import (
 )
 from experiments.studies.contest.peers_tables import OURS, ranks_tables
 from experiments.studies.contest.problems import BENCHMARKS
+from experiments.studies.contest.reduced_swarms import SWARM_VARIANTS
 from pymoo_hdte.checks import InvalidInput
 
 PROBLEMS = tuple(name for name in BENCHMARKS if name.startswith(("ZDT", "WFG")))

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import time
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from importlib.util import find_spec
@@ -10,9 +11,11 @@ from importlib.util import find_spec
 import numpy as np
 from pymoo.core.problem import Problem
 
-from experiments.studies.contest.offer import Offer
-from experiments.studies.contest.peers_pymoo import OWN, PYMOO, run_pymoo
-from experiments.studies.contest.reduced_swarms import REDUCED
+from experiments.comparing.offers import Offer
+from experiments.comparing.peers_pymoo import OWN, PYMOO, run_pymoo
+
+EVALUATIONS, SPENT = "evaluations", "spent"
+"""Columns of a run: its budgets, and what it spent of each."""
 
 RunFunction = Callable[[Problem, Sequence[int], int], list[Offer]]
 
@@ -50,6 +53,31 @@ class Contestant:
         return [(budget,) for budget in budgets] if self.starts_anew else [budgets]
 
 
+@dataclass(frozen=True)
+class ContestantRun:
+    """One contestant on one problem with one seed, and what it offers at each budget, as a job."""
+
+    problem: str
+    algorithm: str
+    seed: int
+    budgets: tuple[int, ...]
+
+    @property
+    def key(self) -> str:
+        """All settings in one name, which may be that of a file."""
+        budgets = "_".join(map(str, self.budgets))
+        return f"{self.problem}_{self.algorithm.replace('/', '-')}_{budgets}_seed{self.seed}"
+
+    def offers(
+        self, contestant: Contestant, problem: Problem
+    ) -> tuple[Iterator[tuple[int, Offer]], float]:
+        """Return budgets with what is offered at each, and the seconds of the run."""
+        started = time.perf_counter()
+        offers = contestant.run(problem, self.budgets, self.seed)
+        seconds = time.perf_counter() - started
+        return zip(self.budgets, offers, strict=True), seconds
+
+
 def run_random(problem: Problem, budgets: Sequence[int], seed: int) -> list[Offer]:
     """Draw designs uniformly and return the feasible objectives after each budget."""
     rng = np.random.default_rng(seed)
@@ -64,7 +92,7 @@ def of_jmetal(name: str) -> RunFunction:
 
     def run(problem: Problem, budgets: Sequence[int], seed: int) -> list[Offer]:
         # Imported where it is used, because the extra may be absent.
-        from experiments.studies.contest.peers_jmetal import run_jmetal
+        from experiments.comparing.peers_jmetal import run_jmetal
 
         return run_jmetal(name, problem, budgets, seed)
 
@@ -72,7 +100,7 @@ def of_jmetal(name: str) -> RunFunction:
 
 
 def _pygmo(problem: Problem, budgets: Sequence[int], seed: int) -> list[Offer]:
-    from experiments.studies.contest.peers_pygmo import run_pygmo
+    from experiments.comparing.peers_pygmo import run_pygmo
 
     return run_pygmo(problem, budgets, seed)
 
@@ -89,10 +117,3 @@ CONTESTANTS = {
     "random search": Contestant("numpy", run_random),
 }
 """All contestants by name."""
-
-SWARM_VARIANTS = {
-    name: Contestant("pymoo_hdte", partial(run_pymoo, make)) for name, make in REDUCED.items()
-}
-"""Variants of the elitist swarm, which compete with it alone."""
-
-EVERYONE = CONTESTANTS | SWARM_VARIANTS

@@ -16,8 +16,8 @@ from pymoo.core.algorithm import Algorithm
 from pymoo.core.problem import Problem
 from pymoo.util.ref_dirs import get_reference_directions
 
+from experiments.comparing.offers import POPULATION, Offer, at_budgets
 from experiments.comparing.open_runs import seeded_default_rng
-from experiments.studies.contest.offer import POPULATION, Offer
 from pymoo_hdte.algorithms import AMPMOPSO, ElitistSwarm, FirstStepWithinBounds
 
 _PARTITIONS = {2: 99, 3: 12}
@@ -31,11 +31,25 @@ def _nsga3(problem: Problem) -> Algorithm:
     return NSGA3(directions)
 
 
+class _EndingAGEMOEA2(AGEMOEA2):
+    """Ends where pymoo 0.6.2 divides by zero, because its front is degenerate.
+
+    So does a run that finds no new design; what it held counts.
+    """
+
+    def next(self) -> None:
+        """Make one generation."""
+        try:
+            super().next()
+        except ZeroDivisionError:
+            self.termination.force_termination = True
+
+
 PYMOO: dict[str, Callable[[Problem], Algorithm]] = {
     "NSGA-II": lambda _: NSGA2(pop_size=POPULATION),
     "NSGA-III": _nsga3,
     "SMS-EMOA": lambda _: SMSEMOA(pop_size=POPULATION),
-    "AGE-MOEA-II": lambda _: AGEMOEA2(pop_size=POPULATION),
+    "AGE-MOEA-II": lambda _: _EndingAGEMOEA2(pop_size=POPULATION),
     "MOPSO-CD": lambda _: MOPSO_CD(pop_size=POPULATION),
     "CMOPSO": lambda _: CMOPSO(pop_size=POPULATION),
 }
@@ -61,29 +75,12 @@ OWN: dict[str, tuple[Callable[[Problem], Algorithm], bool]] = {
 def run_pymoo(
     make: Callable[[Problem], Algorithm], problem: Problem, budgets: Sequence[int], seed: int
 ) -> list[Offer]:
-    """Run an algorithm once and return what it offers at every budget.
-
-    Budgets ascend; a budget counts the evaluations that pymoo's evaluator was asked for, in whole
-    generations that do not exceed it. AGE-MOEA-II of pymoo 0.6.2 may divide by zero where its front
-    is degenerate; such a run ends there, as one that finds no new design does, and what it held
-    counts.
-    """
-    offered = []
+    """Run an algorithm once and return what it offers at every budget, see `at_budgets`."""
     with seeded_default_rng(seed):
-        algorithm = make(problem)
-        algorithm.setup(problem, termination=("n_eval", budgets[-1]), seed=seed)
-        for budget in budgets:
-            while (
-                algorithm.has_next() and algorithm.evaluator.n_eval + algorithm.pop_size <= budget
-            ):
-                try:
-                    algorithm.next()
-                except ZeroDivisionError:
-                    if not isinstance(algorithm, AGEMOEA2):
-                        raise
-                    algorithm.termination.force_termination = True
-            offered.append(Offer(_feasible(algorithm, problem), algorithm.evaluator.n_eval))
-    return offered
+        return [
+            Offer(_feasible(algorithm, problem), algorithm.evaluator.n_eval)
+            for _, algorithm in at_budgets(make(problem), problem, budgets, seed)
+        ]
 
 
 def _feasible(algorithm: Algorithm, problem: Problem) -> NDArray[np.float64]:
