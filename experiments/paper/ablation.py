@@ -38,8 +38,8 @@ SETTING = (
 
 
 FLOWCHART = (
-    "Fig. 16 is the flow chart of the algorithm and shows no result; its steps stand, one part "
-    "each, in the package, and the variants here leave parts out."
+    "Fig. 16 is the flow chart of the algorithm and shows no result. It was not compared: our copy "
+    "of the text has no figures."
 )
 
 

@@ -33,7 +33,7 @@ class RobustDTE(StoredFront, RobustProblem):
     model : str or DriveModel
         A preset (``"calibrated"``, ``"resonant"``, ``"published"``) or a model of your own.
         ``calibrated`` is the printed model plus named effects whose values were fitted to the
-        published statistics; the printed model alone has next to no trade-off.
+        published statistics; the front of the printed model is a single design.
     order : int
         Order k of the surrogate, 1 to 6; the paper takes 3. It costs (k + 1)^5 model runs.
     moments : {"exact", "sample"}
