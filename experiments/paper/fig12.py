@@ -19,6 +19,7 @@ from experiments.paper.shares import scatter_indices
 from experiments.published_values import TABLE_8, Moments
 from experiments.runner.registry import Context
 from experiments.runner.result import Column, Finding, Picture, Result, Table, significant
+from experiments.runner.texts import paragraphs
 from pymoo_hdte.drive import PRESETS
 
 PAPER = TABLE_8["initial"]
@@ -31,14 +32,7 @@ SEED = 3
 ALIKE_PERCENT = 1.0
 """Differences that count as agreeing, as for Table 8."""
 
-SETTING = (
-    "theta_s follows its truncated normal distribution; K, J_in, B_in and B_fc are uniform around "
-    "their nominal values, within ±35 % (the range of the surrogate, as the text can be read), "
-    "within ±5 % (the tolerance of the optimised designs) or held fixed. Agreement with the paper "
-    "is judged at ±35 %, the only range that it states before this figure. Means, standard "
-    "deviations and shares are exact for the surrogate, percentiles and curves are from "
-    f"{N_SAMPLES:,} samples of it."
-)
+(SETTING,) = paragraphs("fig12", n_samples=f"{N_SAMPLES:,}")
 
 
 @dataclass(frozen=True)

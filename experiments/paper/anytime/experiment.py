@@ -35,29 +35,11 @@ from experiments.paper.anytime.tables import (
 from experiments.runner.committed import committed_file, read_origin, stored_outcome
 from experiments.runner.registry import Context
 from experiments.runner.result import Column, Picture, Result, Table
+from experiments.runner.texts import paragraphs
 
 VARIANTS = ("AMP-MOPSO", "A-MOPSO", "MP-MOPSO", "MOPSO")
 
-SETTING = (
-    "Table 7 states 100 particles and 100 generations, but neither its reference front nor its "
-    "unit. Here every algorithm runs with populations of 10 to 100 and budgets of 100 to 10,000 "
-    "evaluations. NSGA-II and A-MOPSO, which follow no schedule, give all budgets in one run; the "
-    "others count on their number of generations and begin anew for each budget. At most 50 "
-    "designs are returned, as the paper's archive has it: NSGA-II's non-dominated population, "
-    "the swarms' archives. The paper draws first velocities within the bounds of the positions; "
-    "such a velocity depends on where the origin of the variables lies, so a second law stands "
-    "beside it, whose first step ends within the bounds."
-)
-READINGS = (
-    "A reading of the printed numbers takes a drive model; one of the two laws of first "
-    "velocities; exact moments, 1000 samples common to "
-    "all designs as the paper has them, or fresh ones for every evaluation; the stored true front "
-    "or the union of all runs of that population and budget as reference; arcsec or objectives "
-    "normalised by that reference; all designs returned, or no more than the population. "
-    "Against the true front, designs found with samples are measured by their exact moments; "
-    "against the union they stand as the runs saw them. How far a reading is off is exp of the "
-    "root mean square logarithm of the ratios of its six means to the printed ones."
-)
+SETTING, READINGS = paragraphs("anytime")
 
 
 def run(context: Context) -> Result:

@@ -13,6 +13,7 @@ from experiments.runner.committed import committed_file, stored_outcome
 from experiments.runner.registry import Context, require
 from experiments.runner.result import NEW, Picture, Result, Table
 from experiments.runner.store import TIMES, write_atomically
+from experiments.runner.texts import paragraphs
 from experiments.studies.blind.cases import SCORING_SEED, Case, all_cases
 from experiments.studies.blind.data import format_outcomes, format_seconds, outcome, read_outcomes
 from experiments.studies.blind.figures import confusion_matrix, reliability_diagram
@@ -45,19 +46,7 @@ from experiments.studies.blind.tables import (
 OUTCOMES = "blind.csv"
 SECONDS = "blind_seconds.csv"
 
-SETTING = (
-    "A test bench of the HS-20-100, written from its physics alone, has equations of motion, an "
-    "integrator and sensors of its own and shares no code with the workflow. It hides nothing, one "
-    "listed effect, two, three, one that no list holds, or one or nothing under stress: noise "
-    "other than stated, faulty rows, one load only, half of the records, base parameters or "
-    "amplitudes of the static error far out of tolerance. Each listed effect comes in the form of "
-    "the library and in at least two of other shape. Every parameter is up to 10 % off and the "
-    "lines of the static error up to 30 %, and that error repeats to 0.3 arcsec only. Thirteen "
-    "records and a torsion sweep are fitted, six records are held out, all read from files. An "
-    f"effect changes what a base fit cannot absorb by at least {LEAST:g} standard deviations, "
-    "unless the largest plausible one does not. Cases, seeds and what must be reached were "
-    f"committed before the scoring run (seed {SCORING_SEED})."
-)
+(SETTING,) = paragraphs("blind", least=f"{LEAST:g}", scoring_seed=SCORING_SEED)
 
 
 def run(context: Context) -> Result:

@@ -13,21 +13,12 @@ from experiments.comparing.quality import GAP
 from experiments.runner.committed import stored_outcome
 from experiments.runner.registry import Context
 from experiments.runner.result import Result
+from experiments.runner.texts import paragraphs
 from experiments.studies.cards.data import DIRECT, NAME, OF_DIRECT, numbers_for
 from experiments.studies.cards.tables import hardness_table, medians_table, separation_table
 
-SETTING = (
-    "As in the comparison of peers: every algorithm with the defaults of its library and 100 "
-    "solutions, what it offers thinned out evenly to 50, indicators in objectives normalised by "
-    "the true front. What that comparison has stored at the largest budget is taken from it."
-)
-LEFT_OUT = (
-    f"{DIRECT} takes 20 ms a design: it has the least budget only, and {', '.join(OF_DIRECT)}. "
-    f"Its front is known to 1 % of its width, and has one step over {GAP:g}, at which pieces are "
-    "told apart, so that its two pieces may be one. "
-    "Those of a finer surrogate, of which the fronts are nearly the same, are spared the largest. "
-    "NSPSO takes no constraints and does not run where there are some. The problems of "
-    "robust_benchmarks() have fronts in closed form and no card."
+SETTING, LEFT_OUT = paragraphs(
+    "cards", direct=DIRECT, of_direct=", ".join(OF_DIRECT), gap=f"{GAP:g}"
 )
 
 

@@ -10,6 +10,7 @@ from experiments.comparing.ranks import medians
 from experiments.comparing.rates import state_of
 from experiments.comparing.statistics import holm
 from experiments.runner.result import Cell, Column, Finding, Table, scored
+from experiments.runner.texts import paragraphs
 from experiments.studies.cards.data import Numbers
 from experiments.studies.cards.hardness import NEAR, POINTS, STARTS
 from experiments.studies.cards.separation import (
@@ -22,24 +23,17 @@ from experiments.studies.cards.separation import (
 )
 from experiments.studies.contest.peers_data import Scores
 
-HARDNESS_NOTE = (
-    f"Local optima are those of the weighted sum (objectives in widths of the front, weights in "
-    f"steps of a quarter) that has the most, found by SLSQP from {STARTS} random designs; minima "
-    "of one value count once. Beside them stands the share of the starts that end in the best, for "
-    "the weights where it is least. Near-optimal is a random design that some point of the front "
-    f"betters by at most {NEAR[0]:g}, or {NEAR[1]:g}, of the front's width in every objective. The "
-    f"floor is the IGD of {POINTS} points of the true front itself, spread evenly."
-)
-SEPARATION_NOTE = (
-    f"By IGD, {RANDOM} aside. Quartiles are those of the algorithms' medians; the seeds' scatter "
-    "is the worst by the best seed of the median algorithm. A problem separates algorithms at a "
-    f"budget if Kruskal and Wallis's test gives p of at most {SIGNIFICANT:g} and the upper "
-    f"quartile is at least {LEAST_SPREAD:g} times the lower. An algorithm reaches the front if its "
-    f"median IGD is at most {REACHES:g} times the floor. With fewer than {FEWEST} algorithms "
-    "nothing is said. This rule was chosen after the runs were seen. An earlier one asked that at "
-    "least a quarter of the algorithms reach the front and as many do not; by it no problem "
-    "separates algorithms at the largest budget. RobustDTE-calibrated_grades was added in order to "
-    "separate them: its verdict shows that such a problem exists, not how frequent it is."
+HARDNESS_NOTE, SEPARATION_NOTE = paragraphs(
+    "cards_tables",
+    starts=STARTS,
+    near=f"{NEAR[0]:g}",
+    wide=f"{NEAR[1]:g}",
+    points=POINTS,
+    random=RANDOM,
+    significant=f"{SIGNIFICANT:g}",
+    least_spread=f"{LEAST_SPREAD:g}",
+    reaches=f"{REACHES:g}",
+    fewest=FEWEST,
 )
 _SAID = {True: "yes", False: "no", None: "too few to say"}
 

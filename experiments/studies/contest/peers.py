@@ -19,6 +19,7 @@ from experiments.comparing.ranks_figures import critical_difference_plot, rank_h
 from experiments.runner.committed import stored_outcome
 from experiments.runner.registry import Context
 from experiments.runner.result import NEW, Picture, Result
+from experiments.runner.texts import paragraphs
 from experiments.studies.contest.peers_data import FINAL_SIZE, Extent, Scores, scores_for
 from experiments.studies.contest.peers_rivals import (
     must_reach_table,
@@ -42,31 +43,7 @@ from experiments.studies.contest.problems import BENCHMARKS
 FULL = Extent(budgets=(10_000, 25_000), seeds=21)
 QUICK = Extent(budgets=(2_500,), seeds=5)
 
-SETTING = (
-    f"Every algorithm runs as its users run it, with the defaults of its library and 100 "
-    "solutions, and spends the same number of evaluations, counted by the problem or by pymoo's "
-    "evaluator. The feasible, non-dominated part of what it offers in the end is thinned out to "
-    f"{FINAL_SIZE} by the same rule for all: the solution whose nearest neighbour is closest "
-    "leaves. Indicators are pymoo's, in objectives normalised by the true front (of RobustDTE: of "
-    "its surrogate), which no algorithm here produced; the hypervolume counts up to 1.1 in each. "
-    "Ranks are those of medians over the seeds."
-)
-HELD_OUT = (
-    "The elitist swarm was tuned on ZDT, moved ZDT (optima at random interior points), DTLZ2 and "
-    "the toy twin. All other problems were held out: its form was frozen before it first ran on "
-    "them. Some of its ideas come from an earlier prototype, though, which had been judged on WFG."
-)
-PEERS_NOTE = (
-    "AMP-MOPSO draws first velocities whose first step ends within the bounds; the printed ones "
-    "would depend on where each problem has its origin. "
-    "MOPSO-CD (pymoo) and NSPSO (pygmo) know no constraints: the first is judged by the feasible "
-    "part of what it offers, the second does not run there and ranks last. pymoo's MOPSO-CD and "
-    "CMOPSO truncate their archives with generators without a seed; here these are seeded. Random "
-    "search offers the non-dominated of all it drew. OMOPSO's archive has jMetalPy's epsilon of "
-    "0.0075 in objectives as they are, which leaves it at most two solutions of the welded beam. "
-    "SMS-EMOA selects by the hypervolume itself: where several have found the front, its points "
-    "lie where that measure counts them most."
-)
+SETTING, HELD_OUT, PEERS_NOTE = paragraphs("peers", final_size=FINAL_SIZE)
 
 
 def _new(scores: Scores) -> str:

@@ -14,6 +14,7 @@ from experiments.comparing.rivals import tests_of_medians
 from experiments.runner.committed import stored_outcome
 from experiments.runner.registry import Context
 from experiments.runner.result import Cell, Column, Result, Table
+from experiments.runner.texts import paragraphs
 from experiments.studies.contest.peers_data import Extent, Scores, scores_for
 from experiments.studies.contest.peers_tables import OURS
 from experiments.studies.contest.reduced_swarms import SWARM_VARIANTS
@@ -22,13 +23,7 @@ FULL = Extent(budgets=(10_000,), seeds=21)
 QUICK = Extent(budgets=(2_500,), seeds=5)
 RESAMPLES = 1000
 
-SETTING = (
-    "Each variant of the elitist swarm lacks a part, has a simpler one, or has one more; all else "
-    "is the same, as are problems, seeds and measures of the comparison with peers. The cost of a "
-    "change is the geometric mean over the problems of the ratio of median IGDs, the variant's to "
-    "the whole swarm's: above 1, the part is worth having. Intervals come from resampled seeds. "
-    "The parts were chosen on the tuning problems; the held-out ones say whether they hold."
-)
+(SETTING,) = paragraphs("swarm_parts")
 
 
 def run(context: Context) -> Result:

@@ -21,6 +21,7 @@ from experiments.runner.committed import (
 from experiments.runner.registry import Context
 from experiments.runner.result import Cell, Column, Finding, Result, Table, scored
 from experiments.runner.store import TIMES, write_atomically
+from experiments.runner.texts import paragraphs
 from experiments.studies.measured.cpu_time import SECONDS, TOOL, cpu_table, timed_study
 from experiments.studies.measured.known_answers import (
     CONFIDENT,
@@ -78,23 +79,7 @@ TOOLS = (
 )
 ARROW = "silverbox"
 """Rig whose held-out record is simulated without a break as well, which takes a minute."""
-SETTING = (
-    "Published measurements with known answers. The first 60 % of a log are fitted and the rest is "
-    "held out where nothing else is given; the files say what is believed "
-    "(experiments/data/*.toml). Right: all known effects are named plainly, and no other than is "
-    "allowed below. Partly right: the main effect is named, but not all or more, or the verdict "
-    "says itself that it is not all. Confidently wrong: a plain verdict without the main effect."
-)
-NOTE = (
-    "Before: the believed model, fitted within its tolerances; SI. A simulation begins anew from "
-    "the measured state with each window. Friction is compared as a curve over the speeds of the "
-    "records where one is known."
-)
-TOOLS_NOTE = (
-    "All get the same smoothed motion and force. Least squares always says Coulomb friction; "
-    "FROLS finds a difference equation, whose terms name no effect, and is simulated in our "
-    "windows. Terms of the force: a acceleration, v speed, q position."
-)
+SETTING, NOTE, TOOLS_NOTE = paragraphs("real")
 
 Rows = list[list[str]]
 

@@ -22,6 +22,7 @@ from experiments.runner.committed import (
 from experiments.runner.registry import Context
 from experiments.runner.result import Cell, Column, Result, Table
 from experiments.runner.store import TIMES, write_atomically
+from experiments.runner.texts import paragraphs
 from experiments.studies.measured.rigs import MEASURED
 from pymoo_hdte.discrepancy import DriveAnalysis, analyse, read_campaign
 from pymoo_hdte.discrepancy.engine.candidate import Candidate
@@ -50,16 +51,7 @@ SECONDS = (
     Column("rig"),
     *(Column(part, "s", 3, "CPU time") for part in ("verdict", "proof")),
 )
-SETTING = (
-    "Campaigns of a simulated HS-20-100 that hide an effect, two, none, or one that is in no list. "
-    "They were made by others with a richer model, and what they hide is not known here: the table "
-    "shows verdicts, and does not say whether they are right. Believed values are up to 10 % off."
-)
-NOTE = (
-    "Before: the believed model, fitted within its tolerances; if nothing is named it stands "
-    "after, too. Doubts are what forbids to name the best set plainly. The held-out gap is over "
-    "all features in standard deviations of the noise, 1 for a perfect model."
-)
+SETTING, NOTE = paragraphs("sealed_rigs")
 
 Rows = list[list[str]]
 _WORDS = 5

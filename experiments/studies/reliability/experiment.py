@@ -15,6 +15,7 @@ from experiments.runner.committed import committed_file, stored_outcome
 from experiments.runner.registry import Context
 from experiments.runner.result import Column, Finding, Result, Table, significant
 from experiments.runner.store import TIMES, write_atomically
+from experiments.runner.texts import paragraphs
 from experiments.studies.reliability.dask_runs import DaskKillJob
 from experiments.studies.reliability.data import (
     FUZZ,
@@ -83,23 +84,7 @@ QUICK = Extent(
     experiments=(("table7",),),
 )
 
-SETTING = (
-    "A valid input of every kind is mutated one to three times: bits, bytes, lines, cells, "
-    "columns, keys, numbers, units, nesting, encodings, missing files, folders and links in the "
-    "place of files. It must be refused (InvalidInput with field, value and what is allowed, on "
-    "one line, or OSError), or be read and be fit for use; within 20 s, judged from outside. "
-    "Through the whole command the exit code must be 0 with a whole report or 2 with one line and "
-    "no report, within 300 s. Every input is a pure function of its kind and number: "
-    'python -m experiments.studies.reliability.fuzz "duty cycle" 1234 repeats one.'
-)
-KILLING = (
-    "Runs of table7 with one seed are killed (SIGKILL) at random moments from the start of the "
-    "interpreter on, or in the midst of writing a file or just before it gets its name. After "
-    "every kill all visible files must be those of an undisturbed run, byte by byte, but for wall "
-    "times and the page, which must be whole; the same command must then end with all of them, "
-    "and no worker may outlive the command. Hidden temporary files of the killed may remain; "
-    "nothing reads them."
-)
+SETTING, KILLING = paragraphs("reliability")
 UPPER = "The upper bound is the exact one-sided 95 % limit of the rate of failures."
 
 

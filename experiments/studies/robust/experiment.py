@@ -24,6 +24,7 @@ from __future__ import annotations
 from experiments.runner.committed import stored_outcome
 from experiments.runner.registry import Context
 from experiments.runner.result import NEW, Picture, Result
+from experiments.runner.texts import paragraphs
 from experiments.studies.robust.data import NAME, outcome_for
 from experiments.studies.robust.figures import error_over_runs
 from experiments.studies.robust.functions import FUNCTIONS
@@ -34,20 +35,7 @@ from experiments.studies.robust.tables import (
     stops_table,
 )
 
-PROTOCOL = (
-    "Two inputs of every function are designed: designs are the middle half of an input's range "
-    "and deviate by a quarter of it, so that runs reach over the range of the source. A method "
-    "needs the least number of runs from which the error of the standard deviation is below 1 % "
-    "at 95 % of 200 random designs, and stays so for a third more runs, within 1000. The same "
-    "draws of the scatter serve the function and all surrogates. OpenTURNS and chaospy expand in "
-    "all inputs together, the designed ones spread evenly over their range; of chaospy, the best "
-    "of five ways counts, of OpenTURNS the set with the least corrected leave-one-out error. "
-    "Their degrees may be as high as ours, with up to 600 terms (500 for chaospy's least angle "
-    "regression). They are tried at numbers of runs that rise by a fifth, so that what they need "
-    "is told too large by less than that; ours is judged whenever its runs rise by an eighth. From "
-    "300 runs on, OpenTURNS ends paths of terms where their error is 1.2 times its least, before "
-    "at 2 times."
-)
+(PROTOCOL,) = paragraphs("robust")
 CHOSEN = (
     "Constants of the package were chosen on Ishigami's function, borehole, OTL circuit, piston, "
     "wing weight and cantilever; robot arm, G-function, kink and resonance were kept out of that. "

@@ -10,6 +10,7 @@ from __future__ import annotations
 from experiments.runner.committed import stored_outcome
 from experiments.runner.registry import Context
 from experiments.runner.result import NEW, Picture, Result
+from experiments.runner.texts import paragraphs
 from experiments.studies.suites import protocol
 from experiments.studies.suites.anew import anew_table
 from experiments.studies.suites.bbob.published import BEST, CITED
@@ -33,30 +34,7 @@ from experiments.studies.suites.suite_tables import (
 )
 from experiments.studies.suites.together import together_table
 
-SETTING = (
-    f"{OURS} runs as it is, all others as their users run them, with a population of 100; those "
-    "that move alike whatever their budget are read on the way to the largest, on bbob-biobj "
-    f"{OURS} among them. There COCO's logger counts every evaluated point; first positions are "
-    "drawn from -5 to 5. Elsewhere at most 100 solutions are judged, more are thinned out by what "
-    "they add to the hypervolume, which counts up to 1.1 in objectives normalised by the true "
-    "front, or, where that has no closed form (RE, MW, DAS-CMOP), by the ends of the best found in "
-    "long runs. Ranks are those of medians over the seeds."
-)
-SETS = (
-    "Held out: nothing was chosen on them. ZCAT was run once; instance 9 with an earlier swarm "
-    "too. These are all 55 functions of bbob-biobj in 10 and 20 dimensions, instance 9, and "
-    "ZCAT's twenty problems with two and with three objectives, thirty variables, at levels of "
-    "difficulty 1 to 4 in turn. The protocol was committed first. Validation: RE, MW, DAS-CMOP, "
-    "LZ09, whose outcomes led to the demands, IMOP, which showed what truncation by hypervolume "
-    "lacked, and instance 10 of bbob-biobj, on which it was decided which parts stay."
-)
-PEERS_NOTE = (
-    "GDE3 and MOEA/D-DE are jMetalPy's (pymoode's GDE3 wants an older pymoo); MOEA/D-DE, "
-    "COMO-CMA-ES and NSPSO take no constraints, COMO-CMA-ES two objectives only, and it alone is "
-    "told the corner up to which hypervolume counts. Peers of jMetalPy and pygmo, which cannot be "
-    "told where to start, are not run on bbob-biobj. DAS-CMOP is taken at the "
-    f"{DIFFICULTY}th of pymoo's triplets of difficulty."
-)
+SETTING, SETS, PEERS_NOTE = paragraphs("suites", ours=OURS, difficulty=DIFFICULTY)
 
 
 def run(context: Context) -> Result:
