@@ -10,9 +10,9 @@ from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
 from experiments.comparing.figures import ALGORITHM_STYLES, grid, plain_log_scale
+from experiments.comparing.intervals import mean_intervals
 from experiments.paper.anytime.data import Contested, Scores, cases
 from experiments.paper.anytime.duels import COMPARED
-from experiments.paper.anytime.intervals import mean_intervals
 from experiments.paper.anytime.readings import Reading
 from experiments.published_values import TABLE_7
 

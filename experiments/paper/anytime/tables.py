@@ -9,10 +9,10 @@ from typing import NamedTuple
 import numpy as np
 
 from experiments.comparing.indicators import NAMES
+from experiments.comparing.intervals import mean_intervals
 from experiments.comparing.runs import AS_PRINTED
 from experiments.paper.anytime.data import OF_TABLE_7, Case, Contested, Scores
 from experiments.paper.anytime.duels import COMPARED, Duel, duels
-from experiments.paper.anytime.intervals import mean_intervals
 from experiments.paper.anytime.measures import EQUAL, NORMALISED, RETURNED, TRUE, Scale
 from experiments.paper.anytime.moments import EXACT, N_SAMPLES
 from experiments.paper.anytime.readings import PRINTED, Reading

@@ -25,9 +25,6 @@ from experiments.studies.contest.problems import EVERY, problem_of
 _PARTITIONS = 99
 
 WELDED_BEAM = DATA / "front_welded_beam.csv"
-_STIFFEST = 2.1952 / (10.0**3 * 5.0)
-WELDED_BEAM_LEVELS = _STIFFEST * np.concatenate([[1.0], np.geomspace(1.0 + 1e-4, 36.0, 1200)])
-"""Deflections, in inches, from that of the stiffest beam to that of the cheapest."""
 
 
 def wfg_front(number: int) -> NDArray[np.float64]:

@@ -5,6 +5,7 @@ from itertools import product
 import numpy as np
 import pytest
 
+from experiments.comparing.intervals import a12_intervals, mean_intervals
 from experiments.comparing.runs import (
     AS_PRINTED,
     FIRST_STEP,
@@ -29,7 +30,6 @@ from experiments.paper.anytime.data import (
 )
 from experiments.paper.anytime.duels import COMPARED, duels
 from experiments.paper.anytime.experiment import run, table_7_picture
-from experiments.paper.anytime.intervals import a12_intervals, mean_intervals
 from experiments.paper.anytime.job import AnytimeRun, sets_of
 from experiments.paper.anytime.measures import EQUAL, MEASURES, RETURNED, SCALES, measure
 from experiments.paper.anytime.moments import (
