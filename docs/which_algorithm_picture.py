@@ -3,8 +3,8 @@
 from pathlib import Path
 
 from experiments.runner.committed import committed_file
-from experiments.suites.data import BBOB, NAME, read_outcome
-from experiments.suites.figures import how_to_choose
+from experiments.studies.suites.data import BBOB, NAME, read_outcome
+from experiments.studies.suites.figures import how_to_choose
 
 PICTURE = Path(__file__).with_name("which_algorithm.png")
 

@@ -13,15 +13,15 @@ from typing import Any
 import numpy as np
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
-from experiments.anytime.data import OF_TABLE_7, Case, Contested, Scores, committed_scores
-from experiments.anytime.leads import RIVALS, totals_of, who_finds
-from experiments.anytime.measures import RETURNED
-from experiments.anytime.moments import COMMON, EXACT, FRESH
-from experiments.anytime.readings import readings
-from experiments.anytime.sentences import closest_sentence
-from experiments.anytime.tables import SCALE, STATED
-from experiments.comparison.runs import AS_PRINTED, FIRST_STEP, VELOCITIES
+from experiments.comparing.runs import AS_PRINTED, FIRST_STEP, VELOCITIES
 from experiments.paper import later_prototypes, printed_times, published, table2, table5
+from experiments.paper.anytime.data import OF_TABLE_7, Case, Contested, Scores, committed_scores
+from experiments.paper.anytime.leads import RIVALS, totals_of, who_finds
+from experiments.paper.anytime.measures import RETURNED
+from experiments.paper.anytime.moments import COMMON, EXACT, FRESH
+from experiments.paper.anytime.readings import readings
+from experiments.paper.anytime.sentences import closest_sentence
+from experiments.paper.anytime.tables import SCALE, STATED
 from experiments.paper.calibrating import experiment as calibration
 from experiments.paper.calibrating.data import Outcome, read_outcomes
 from experiments.paper.calibrating.rigid import N_PARAMETERS, simplest

@@ -20,6 +20,6 @@ def setup(app: Sphinx) -> dict[str, Any]:
 def _write(app: Sphinx) -> None:
     # The experiments are no part of the installed package.
     sys.path.insert(0, str(_ROOT))
-    from experiments.cards.pages import write_pages
+    from experiments.studies.cards.pages import write_pages
 
     write_pages(Path(app.srcdir) / "cards")

@@ -2,8 +2,9 @@
 
     python docs/examples/virtual_campaign.py FOLDER
 
-FOLDER must be new or empty. The believed drive has no ripple, and its parameters are off
-within their tolerances, as those of a real one are.
+FOLDER must be new or empty. The believed drive has no ripple, and its parameters are off within
+their tolerances, as those of a real one are. The script needs a copy of the whole repository, since
+the rig belongs to its experiments and not to the package.
 """
 
 import sys
@@ -13,7 +14,12 @@ import numpy as np
 
 from pymoo_hdte.discrepancy import BelievedDrive, Rig, write_campaign
 from pymoo_hdte.units import ARCSEC
-from pymoo_hdte.virtual import draw_effect, draw_rig, run_campaign
+
+# Python looks for modules in the folder of this script, not in that of the repository.
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
+
+from experiments.studies.virtual_rig.hidden_forms import draw_effect
+from experiments.studies.virtual_rig.rig import draw_rig, run_campaign
 
 BELIEVED = BelievedDrive(
     ratio=101.0,

@@ -33,8 +33,6 @@ from pymoo_hdte.mechanism import (
     simulate_mechanism,
 )
 from pymoo_hdte.problems import RobustDTE
-from pymoo_hdte.virtual.own_effects import with_effects
-from pymoo_hdte.virtual.rig import draw_rig, run_campaign
 
 # %%
 # An effect
@@ -64,6 +62,9 @@ sys.path[:0] = [str(HERE.parents[1]), str(HERE.parent / "examples")]
 
 import virtual_campaign
 from eyring_drag import EYRING_DRAG, EyringDrag
+
+from experiments.studies.virtual_rig.own_effects import with_effects
+from experiments.studies.virtual_rig.rig import draw_rig, run_campaign
 
 register(EYRING_DRAG)
 

@@ -6,9 +6,9 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from experiments.comparison.figures import fronts, igd_of_runs
-from experiments.comparison.named import check_setting
-from experiments.comparison.paired import Comparison, compare, too_few_seeds
+from experiments.comparing.figures import fronts, igd_of_runs
+from experiments.comparing.named import check_setting
+from experiments.comparing.paired import Comparison, compare, too_few_seeds
 from experiments.paper.comparison_tables import (
     change,
     coverage_table,
@@ -23,24 +23,15 @@ from experiments.paper.comparison_tables import (
 from experiments.published_values import TABLE_7
 from experiments.runner.registry import Context
 from experiments.runner.result import Finding, Picture, Result, significant
+from experiments.runner.texts import paragraphs
 
 __all__ = ["check_setting", "run"]
 
 FULL = "AMP-MOPSO"
 PARTS = (FULL, "A-MOPSO", "MP-MOPSO", "MOPSO")
 
-SETTING = (
-    "A-MOPSO keeps only the entropy weight, MP-MOPSO only the pyramid, MOPSO neither. Budget, "
-    "seeds and measures are those of Table 7; another page has other "
-    "budgets. The paper shows this ablation as one picture of each "
-    "front and prints no numbers for A-MOPSO and MP-MOPSO."
-)
 
-
-FLOWCHART = (
-    "Fig. 16 is the flow chart of the algorithm and shows no result. It was not compared: our copy "
-    "of the text has no figures."
-)
+SETTING, FLOWCHART = paragraphs("ablation")
 
 
 def run(context: Context) -> Result:

@@ -8,8 +8,8 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.comparison.paired import designs, objectives
-from experiments.comparison.runs import OptimisationRun, robust_problem
+from experiments.comparing.paired import designs, objectives
+from experiments.comparing.runs import OptimisationRun, robust_problem
 from experiments.paper.scatter import dte_samples, exact_moments
 from experiments.published_values import TABLE_9, Moments
 from experiments.runner.campaign import Campaign

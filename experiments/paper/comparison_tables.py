@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
-from experiments.comparison.paired import Comparison
-from experiments.comparison.runs import FINAL_SIZE
-from experiments.comparison.statistics import summary
+from experiments.comparing.indicators import NAMES
+from experiments.comparing.paired import Comparison
+from experiments.comparing.runs import FINAL_SIZE
+from experiments.comparing.statistics import summary
 from experiments.paper.models import models_of
 from experiments.published_values import AlgorithmQuality
 from experiments.runner.registry import Context
@@ -14,7 +15,7 @@ from experiments.runner.result import Cell, Column, Finding, Table, significant
 from pymoo_hdte.drive import PRESETS
 
 WHO = (Column("problem"), Column("algorithm"))
-INDICATOR_NAMES = {"igd": "IGD", "spacing": "Spacing", "hypervolume": "hypervolume"}
+TESTED = ("igd", "spacing", "hypervolume")
 
 
 def least_igd(comparisons: Sequence[Comparison]) -> str:
@@ -121,9 +122,9 @@ def coverage_table(comparisons: Sequence[Comparison], findings: Sequence[Finding
 def paired_tests_table(comparisons: Sequence[Comparison], algorithm: str) -> Table:
     """Paired tests of ``algorithm`` against every other one."""
     rows = [
-        (comparison.model, INDICATOR_NAMES[indicator], test.rival, test.p, test.better)
+        (comparison.model, NAMES[indicator], test.rival, test.p, test.better)
         for comparison in comparisons
-        for indicator in INDICATOR_NAMES
+        for indicator in TESTED
         for test in comparison.paired_tests(algorithm, indicator)
     ]
     columns = (

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.comparison.runs import robust_problem
+from experiments.comparing.runs import robust_problem
 from experiments.paper.choices import BAND, MODEL, TRUE_FRONT, Choice, dominating_shares
 from experiments.paper.models import FITTED
 from experiments.paper.shares import design_indices

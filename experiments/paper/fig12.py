@@ -11,14 +11,15 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from scipy.stats import gaussian_kde, norm, skew
 
-from experiments.comparison.figures import BLUE, GREEN, GREY, ORANGE, grid
-from experiments.comparison.runs import robust_problem
+from experiments.comparing.figures import BLUE, GREEN, GREY, ORANGE, grid
+from experiments.comparing.runs import robust_problem
 from experiments.paper.models import FITTED, models_of
 from experiments.paper.scatter import dte_samples
 from experiments.paper.shares import scatter_indices
 from experiments.published_values import TABLE_8, Moments
 from experiments.runner.registry import Context
 from experiments.runner.result import Column, Finding, Picture, Result, Table, significant
+from experiments.runner.texts import paragraphs
 from pymoo_hdte.drive import PRESETS
 
 PAPER = TABLE_8["initial"]
@@ -31,14 +32,7 @@ SEED = 3
 ALIKE_PERCENT = 1.0
 """Differences that count as agreeing, as for Table 8."""
 
-SETTING = (
-    "theta_s follows its truncated normal distribution; K, J_in, B_in and B_fc are uniform around "
-    "their nominal values, within ±35 % (the range of the surrogate, as the text can be read), "
-    "within ±5 % (the tolerance of the optimised designs) or held fixed. Agreement with the paper "
-    "is judged at ±35 %, the only range that it states before this figure. Means, standard "
-    "deviations and shares are exact for the surrogate, percentiles and curves are from "
-    f"{N_SAMPLES:,} samples of it."
-)
+(SETTING,) = paragraphs("fig12", n_samples=f"{N_SAMPLES:,}")
 
 
 @dataclass(frozen=True)

@@ -13,8 +13,8 @@ import numpy as np
 from scipy.stats import t as student
 from scipy.stats import ttest_ind_from_stats
 
-from experiments.comparison.statistics import holm
-from experiments.paper.bench_campaign import COEFFICIENTS, N_PROTOTYPES, NOMINAL_STIFFNESS
+from experiments.comparing.statistics import holm
+from experiments.paper.bench.campaign import COEFFICIENTS, N_PROTOTYPES, NOMINAL_STIFFNESS
 from experiments.published_values import TABLE_3, TABLE_6
 from experiments.runner.result import WITHIN_PAPER, Column, Finding, Table, significant
 

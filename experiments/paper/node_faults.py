@@ -13,9 +13,10 @@ from scipy.optimize import brentq
 from scipy.special import gamma
 from scipy.stats import gennorm
 
-from experiments.comparison.figures import BLUE, GREEN, GREY, ORANGE, grid
+from experiments.comparing.figures import BLUE, GREEN, GREY, ORANGE, grid
 from experiments.published_values import TABLE_5
 from experiments.runner.result import Cell, Column, Finding, Table, significant
+from experiments.runner.texts import paragraphs
 from pymoo_hdte.drive import PARAMETERS
 from pymoo_hdte.surrogate.tensor import chebyshev_basis, coefficients_from_nodes, products
 
@@ -35,15 +36,6 @@ CENTRAL = (2.5, 50.0, 97.5)
 WITHIN = 2.45
 """Standard deviations within which 95 % of a normal variable of two dimensions lie."""
 
-FAULTS_NOTE = (
-    f"Faulty runs are off by one size, with random signs, at random nodes of the {HIGH + 1}^5; the "
-    f"size is chosen so that the RMSE at k = {HIGH} is the printed one. The error without them is "
-    f"that of a model at k = {HIGH}, or has the RMSE and the MAE that the paper prints at k = "
-    f"{LOW}. Ranges hold 95 % of the draws. The distance is that of the printed pair of MAE and "
-    f"largest error; 95 % of the draws lie within {WITHIN}. The three orders share their test "
-    f"points, so a faulty run among those would show at k = {LOW} as well."
-)
-
 
 def noise_share(order: int, dimensions: int = len(PARAMETERS)) -> float:
     """Return which share of the variance of noise in the node runs reaches the interpolant.
@@ -56,11 +48,13 @@ def noise_share(order: int, dimensions: int = len(PARAMETERS)) -> float:
     return float((1.0 - order / ((2.0 * order + 1.0) * (order + 1.0))) ** dimensions)
 
 
-NOISE_NOTE = (
-    "Simulated: independent normal noise in the node runs, none at the test points. Closed form: "
-    "the noise adds (1 - k / ((2k + 1)(k + 1)))^5 of its variance to the mean square error, "
-    f"averaged over the box. The RMSE that the paper prints at k = {LOW} leaves room for "
-    f"{significant(TABLE_5[LOW].rmse_arcsec / noise_share(LOW) ** 0.5, 3)} arcsec at most."
+FAULTS_NOTE, NOISE_NOTE = paragraphs(
+    "node_faults",
+    above=HIGH + 1,
+    high=HIGH,
+    low=LOW,
+    within=WITHIN,
+    rmse=significant(TABLE_5[LOW].rmse_arcsec / noise_share(LOW) ** 0.5, 3),
 )
 
 

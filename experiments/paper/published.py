@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from experiments.comparison.figures import BLUE, GREEN, GREY, ORANGE, grid
+from experiments.comparing.figures import BLUE, GREEN, GREY, ORANGE, grid
 from experiments.paper.models import models_of
 from experiments.paper.scatter import exact_moments
 from experiments.published_values import TABLE_8

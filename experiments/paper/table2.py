@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from experiments.comparison.rates import at_least
+from experiments.comparing.rates import at_least
 from experiments.paper.static_error.figures import heat_maps
 from experiments.paper.static_error.normality_tables import (
     common_sizes,
@@ -48,6 +48,7 @@ from experiments.runner.result import (
     Table,
     significant,
 )
+from experiments.runner.texts import paragraphs
 from pymoo_hdte.drive import hs_20_100
 from pymoo_hdte.identification import (
     ErrorStatistics,
@@ -60,14 +61,15 @@ SEED = 1
 N_CAMPAIGNS = 200
 CORRELATIONS = (0.3, 0.5, 0.7, 0.8, 0.9)
 
-SETTING = (
-    f"The prototypes are virtual: {N_PROTOTYPES} of them drawn from the printed Table 2, each "
-    f"measured {N_REPEATS} times with a noise of {NOISE_UM} µm. So agreement with Table 2 tests "
-    "the procedure, not the paper's data, which are not printed."
-)
-PLANTED = (
-    f"A second campaign hides {OUTLIER_UM:g} µm outliers, a correlation of {PLANTED_CORRELATION} "
-    f"between {' and '.join(PLANTED_PAIR)}, and a lognormal {PLANTED_LOGNORMAL}."
+SETTING, PLANTED = paragraphs(
+    "table2",
+    n_prototypes=N_PROTOTYPES,
+    n_repeats=N_REPEATS,
+    noise_um=NOISE_UM,
+    outlier_um=f"{OUTLIER_UM:g}",
+    planted_correlation=PLANTED_CORRELATION,
+    pair=" and ".join(PLANTED_PAIR),
+    planted_lognormal=PLANTED_LOGNORMAL,
 )
 
 

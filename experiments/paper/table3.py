@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from experiments.comparison.rates import at_least, rate_p
-from experiments.paper.bench_campaign import (
+from experiments.comparing.rates import at_least, rate_p
+from experiments.paper.bench.campaign import (
     COEFFICIENTS,
     N_PROTOTYPES,
     N_REPEATS,
@@ -31,6 +31,7 @@ from experiments.runner.result import (
     Table,
     significant,
 )
+from experiments.runner.texts import paragraphs
 from pymoo_hdte.drive import hs_20_100
 from pymoo_hdte.identification import Series, hysteresis_width, lost_energy
 from pymoo_hdte.identification.damping import INPUT_SPEEDS, OUTPUT_SPEEDS
@@ -48,18 +49,7 @@ FRICTIONS = (0.0, 0.5, 1.5, 3.0)
 SENSOR_SHARE = 1e-3
 """What a good torque sensor resolves, as a share of its range."""
 
-SETTING = (
-    f"The bench is virtual: {N_PROTOTYPES} prototypes are drawn around the printed Tables 3 and 4 "
-    f"(the scatter of K from Table 6), {N_REPEATS} no-load runs and one torsion loop each, with "
-    "sensor noise, zero errors, Coulomb friction and hysteresis of our choice. So agreement with "
-    "the tables tests the procedure, not the paper's data, which are not printed."
-)
-MEANING = (
-    "K is the slope of the forward loading branch a1 (torque over torsion), B_in and B_out slopes "
-    "of no-load torque over speed, B_fc that of the torque which flexspline and mesh add "
-    "(Eqs. 26-28). Intervals assume normal noise: independent from speed to speed, autocorrelated "
-    "along a torsion loop."
-)
+SETTING, MEANING = paragraphs("table3", n_prototypes=N_PROTOTYPES, n_repeats=N_REPEATS)
 
 
 def run(context: Context) -> Result:

@@ -6,8 +6,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from experiments.comparison.figures import BLUE, GREEN, ORANGE, PINK, grid
-from experiments.paper.bench_campaign import Records
+from experiments.comparing.figures import BLUE, GREEN, ORANGE, PINK, grid
+from experiments.paper.bench.campaign import Records
 from pymoo_hdte.identification import LinearFit, stiffness
 from pymoo_hdte.identification.prototypes import RunKey
 from pymoo_hdte.units import ARCSEC, REVOLUTION_PER_MINUTE

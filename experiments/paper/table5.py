@@ -11,8 +11,8 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from experiments.comparison.figures import BLUE, grid, reference_line
-from experiments.comparison.runs import robust_problem
+from experiments.comparing.figures import BLUE, grid, reference_line
+from experiments.comparing.runs import robust_problem
 from experiments.paper.models import FITTED, models_of
 from experiments.paper.node_faults import (
     HIGH,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.comparison.runs import robust_problem
+from experiments.comparing.runs import robust_problem
 from experiments.paper.models import models_of
 from experiments.paper.prototypes.consistency import (
     Prediction,
@@ -27,6 +27,7 @@ from experiments.runner.result import (
     Table,
     significant,
 )
+from experiments.runner.texts import paragraphs
 from pymoo_hdte.drive import PRESETS
 from pymoo_hdte.drive.measurement import CUTOFF, SAMPLING_RATE
 from pymoo_hdte.units import ARCSEC
@@ -36,12 +37,7 @@ RECORDED = (1, 2)
 
 PICTURED = "calibrated"
 
-SETTING = (
-    "Predictions take theta_s and the design of each prototype as Table 6 prints them, at rated "
-    "conditions. The paper prints neither its predictions nor its measurements, only statistics of "
-    "their differences and which prototypes measured highest and lowest. Every statement about "
-    "measured values below follows from these; none is a measurement."
-)
+(SETTING,) = paragraphs("table6")
 
 
 def run(context: Context) -> Result:

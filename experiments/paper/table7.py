@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from experiments.anytime.experiment import at_the_stated_setting, table_7_picture
-from experiments.comparison.figures import fronts, igd_of_runs
-from experiments.comparison.named import check_setting
-from experiments.comparison.paired import Comparison, compare, too_few_seeds
+from experiments.comparing.figures import fronts, igd_of_runs
+from experiments.comparing.indicators import NAMES
+from experiments.comparing.named import check_setting
+from experiments.comparing.paired import Comparison, compare, too_few_seeds
+from experiments.paper.anytime.experiment import at_the_stated_setting, table_7_picture
 from experiments.paper.comparison_tables import (
-    INDICATOR_NAMES,
     change,
     coverage_table,
     least_igd,
@@ -24,6 +24,7 @@ from experiments.paper.comparison_tables import (
 from experiments.published_values import TABLE_7
 from experiments.runner.registry import Context
 from experiments.runner.result import Finding, Picture, Result, significant
+from experiments.runner.texts import paragraphs
 
 __all__ = ["check_setting", "run"]
 
@@ -32,23 +33,7 @@ OURS = "AMP-MOPSO"
 CONFIRMED = 0.5
 """An advantage agrees with the paper's if it is significant and at least this share of it."""
 
-SETTING = (
-    "Every run spends 100 x 100 evaluations, the budget that the paper states; what is found holds "
-    "for this budget alone, and the picture above shows the others. Means and standard deviations "
-    "are exact here; the paper takes them from 1,000 samples, and the second table shows what "
-    "those, and another law of first velocities, change. The "
-    "final set holds at most 50 designs, for NSGA-II its non-dominated "
-    "population thinned by the crowding truncation that the archives use. IGD and Spacing come "
-    "from pymoo, with ideal and nadir point of the true front of the order-3 surrogate, which none "
-    "of the compared algorithms produced. The paper names neither its reference front nor its "
-    "normalisation, so ratios can be compared with it, but not the values themselves; an advantage "
-    "counts as agreeing if it is significant and at least half of what the paper prints."
-)
-LOST = (
-    "A piece of the front (parts separated by a gap above 0.02) counts as lost when no "
-    "solution lies within 0.05 of it, both in normalised objectives. Spacing alone misleads: a "
-    "front crowded into one corner has a good one."
-)
+SETTING, LOST = paragraphs("table7")
 
 
 def run(context: Context) -> Result:
@@ -103,7 +88,7 @@ def _advantages(comparisons: Sequence[Comparison]) -> Iterator[Finding]:
                     f"{change(theirs, ours)} {test.rival}'s (p = {significant(test.p, 2)}; the "
                     f"paper: {change(*paper)})"
                 )
-            name = INDICATOR_NAMES[indicator]
+            name = NAMES[indicator]
             sentence = (
                 f"On {comparison.model}, after 100 x 100 evaluations, {OURS}'s mean {name} is "
                 f"{' and '.join(clauses)}."

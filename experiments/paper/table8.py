@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from scipy.stats import gaussian_kde
 
-from experiments.comparison.figures import BLUE, GREEN, GREY, ORANGE, PINK, grid
+from experiments.comparing.figures import BLUE, GREEN, GREY, ORANGE, PINK, grid
 from experiments.paper.choices import (
     BAND,
     INITIAL,
@@ -37,21 +37,14 @@ from experiments.runner.result import (
     signed_percent,
     significant,
 )
+from experiments.runner.texts import paragraphs
 
 N_SAMPLES = 100_000
 SAMPLE_SEED = 2
 ALIKE_PERCENT = 1.0
 """Moments within this of the paper's count as agreeing: less than any gain that Table 8 claims."""
 
-SETTING = (
-    "Each preference picks one design by the weighted utopia distance, once from the archive of "
-    "AMP-MOPSO (seed 1) and once from the true front of the order-3 surrogate, which is not that "
-    f"of the drive model. The objectives of all designs hold for bands of ±{100 * BAND:g} %. The "
-    "paper can be read as sampling its initial design over ±35 %; then a part of the reductions it "
-    "prints would come from the narrower band alone, so the initial design is shown with both "
-    "bands. The paper's own designs are shown as our model sees them. "
-    f"Means and standard deviations within {ALIKE_PERCENT:g} % count as agreeing."
-)
+(SETTING,) = paragraphs("table8", band=f"{100 * BAND:g}", alike_percent=f"{ALIKE_PERCENT:g}")
 
 
 def run(context: Context) -> Result:

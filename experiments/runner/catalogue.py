@@ -21,7 +21,7 @@ EXPERIMENTS = (
     ),
     Experiment(
         "anytime",
-        "anytime.experiment",
+        "paper.anytime.experiment",
         "Table 7 and Fig. 17 at every budget, and what the printed numbers may mean",
         "At which budget, if any, does Table 7 come out, and what do its numbers mean?",
         reads_outcome=True,
@@ -109,7 +109,7 @@ EXPERIMENTS = (
     ),
     Experiment(
         "blind",
-        "blind.experiment",
+        "studies.blind.experiment",
         "Blind campaigns: what the discrepancy workflow finds of what is hidden",
         "Does the workflow name what is hidden in campaigns that it has never seen?",
         reads_outcome=True,
@@ -117,33 +117,33 @@ EXPERIMENTS = (
     ),
     Experiment(
         "sealed_rigs",
-        "measured.sealed_rigs",
+        "studies.measured.sealed_rigs",
         "Verdicts on fourteen rigs whose truth is not known here",
         "What does the workflow say of rigs whose truth is not known here?",
         reads_outcome=True,
     ),
     Experiment(
         "real",
-        "measured.real",
+        "studies.measured.real",
         "Machines that others measured: verdicts beside known answers and other tools",
         "Is it right on machines that others measured, whose answer is known?",
         reads_outcome=True,
     ),
     Experiment(
         "emps",
-        "measured.emps",
+        "studies.measured.emps",
         "EMPS: friction of a positioning system, measured by others",
         "Does it find the friction of a positioning system, and are the values those published?",
     ),
     Experiment(
         "kinova",
-        "measured.kinova",
+        "studies.measured.kinova",
         "Kinova Gen3: friction and ripple of a robot joint, measured by others",
         "Does it find friction and ripple of a robot joint?",
     ),
     Experiment(
         "peers",
-        "contest.peers",
+        "studies.contest.peers",
         "The elitist swarm against the best algorithms of other libraries",
         "Which swarm or evolutionary algorithm should one use?",
         reads_outcome=True,
@@ -151,7 +151,7 @@ EXPERIMENTS = (
     ),
     Experiment(
         "suites",
-        "suites.experiment",
+        "studies.suites.experiment",
         "The swarms on bbob-biobj and other suites that they were not tuned on",
         "Is the swarm the best on suites that no setting was chosen on?",
         reads_outcome=True,
@@ -159,7 +159,7 @@ EXPERIMENTS = (
     ),
     Experiment(
         "cards",
-        "cards.experiment",
+        "studies.cards.experiment",
         "Problem cards: what makes each robust problem hard, and which separate algorithms",
         "Which of our robust problems tell algorithms apart, and at which budget?",
         reads_outcome=True,
@@ -167,7 +167,7 @@ EXPERIMENTS = (
     ),
     Experiment(
         "swarm_parts",
-        "contest.swarm_parts",
+        "studies.contest.swarm_parts",
         "What each part of the elitist swarm is worth",
         "What is each part of the elitist swarm worth?",
         reads_outcome=True,
@@ -175,7 +175,7 @@ EXPERIMENTS = (
     ),
     Experiment(
         "robust",
-        "robust.experiment",
+        "studies.robust.experiment",
         "Model runs of a robust surrogate, beside chaospy and OpenTURNS",
         "How many model runs does a robust surrogate take, beside those of other libraries?",
         reads_outcome=True,
@@ -183,7 +183,7 @@ EXPERIMENTS = (
     ),
     Experiment(
         "reliability",
-        "reliability.experiment",
+        "studies.reliability.experiment",
         "Ten thousand wrong inputs, kills at any moment, full disks, memory",
         "What happens on wrong input, on a kill at any moment, on a full disk?",
         reads_outcome=True,
@@ -198,14 +198,14 @@ EXPERIMENTS = (
     ),
     Experiment(
         "reference_front",
-        "fronts.reference_front",
+        "studies.fronts.reference_front",
         "The true fronts of the surrogates, computed anew and compared: 35 minutes",
         "Are the stored fronts of the surrogates true?",
         by_default=False,
     ),
     Experiment(
         "direct_front",
-        "fronts.direct_front",
+        "studies.fronts.direct_front",
         "The front of the drive model itself, found twice, on a finer quadrature too: 5 minutes",
         "Is the stored front that of the drive model itself?",
         by_default=False,

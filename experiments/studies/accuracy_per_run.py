@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from matplotlib.figure import Figure
 from tqdm import tqdm
 
-from experiments.comparison.figures import BLUE, GREEN, GREY, ORANGE, PINK, YELLOW, grid
-from experiments.comparison.runs import robust_problem
+from experiments.comparing.figures import BLUE, GREEN, GREY, ORANGE, PINK, YELLOW, grid
+from experiments.comparing.runs import robust_problem
 from experiments.paper.table5 import N_TEST, TEST_SEED
 from experiments.published_values import TABLE_5
 from experiments.runner.result import Cell, Column, Finding, Table

@@ -12,8 +12,7 @@ from pymoo.algorithms.moo.nsga2 import NSGA2
 from pymoo.core.algorithm import Algorithm
 from tqdm import tqdm
 
-from experiments.comparison.runs import robust_problem
-from experiments.measured.cpu_time import measured_cpu
+from experiments.comparing.runs import robust_problem
 from experiments.paper.models import models_of
 from experiments.runner.machine import machine_table
 from experiments.runner.own_time import seconds_of_run
@@ -22,6 +21,7 @@ from experiments.runner.result import Column, Finding, Result, Table
 from experiments.studies.benchmark_parts import ratios_of_parts
 from experiments.studies.benchmark_verdicts import verdict_times
 from experiments.studies.benchmark_workers import ratios_of_workers, virtual_table
+from experiments.studies.measured.cpu_time import measured_cpu
 from experiments.studies.timing import Ratio, best_time, integration_time, ratio_table
 from pymoo_hdte.algorithms import AMPMOPSO, CompactSwarm, ElitistSwarm
 from pymoo_hdte.drive import (

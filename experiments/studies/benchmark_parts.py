@@ -13,9 +13,11 @@ from pymoo.core.problem import Problem
 from pymoo.util.nds.non_dominated_sorting import NonDominatedSorting
 from threadpoolctl import threadpool_limits
 
-from experiments.blind.cases import BELIEVED, RIG
-from experiments.comparison.runs import robust_problem
+from experiments.comparing.runs import robust_problem
+from experiments.studies.blind.cases import BELIEVED, RIG
 from experiments.studies.timing import Ratio, best_time
+from experiments.studies.virtual_rig.hidden_forms import draw_effect
+from experiments.studies.virtual_rig.rig import draw_rig, run_campaign
 from pymoo_hdte.algorithms.crowding import least_crowded
 from pymoo_hdte.algorithms.spread import most_spread
 from pymoo_hdte.discrepancy.drive.analysis import examine_drive
@@ -27,8 +29,6 @@ from pymoo_hdte.surrogate.sparse.adaptive import AdaptiveFit, fit_adaptively
 from pymoo_hdte.surrogate.sparse.moments import SparseMoments
 from pymoo_hdte.surrogate.sparse.polynomial import SparsePolynomial
 from pymoo_hdte.surrogate.threads import usable_cores
-from pymoo_hdte.virtual.hidden_forms import draw_effect
-from pymoo_hdte.virtual.rig import draw_rig, run_campaign
 
 N_POINTS = 1000
 SORTED = 200

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.comparison.runs import robust_problem
+from experiments.comparing.runs import robust_problem
 from experiments.paper.models import models_of
 from experiments.published_values import (
     BATCH_MODEL_SECONDS,
@@ -23,6 +23,7 @@ from experiments.published_values import (
 from experiments.runner.machine import machine_table, processor
 from experiments.runner.registry import Context
 from experiments.runner.result import OF_MODELS, Column, Finding, Result, Table, significant
+from experiments.runner.texts import paragraphs
 from experiments.studies.timing import best_time, integration_time
 from pymoo_hdte.drive import PRESETS, DriveModel, harmonic_balance
 from pymoo_hdte.one_thread import ONE_THREAD
@@ -41,14 +42,7 @@ RUN_DESIGNS = POPULATION * GENERATIONS
 NODES = (PAPERS_ORDER + 1) ** 5
 ALIKE = 1.05
 
-SETTING = (
-    f"Times of {BATCH_SIZE:,} DTEs at points of the uncertain box, each design on its own, on one "
-    "core. The drive model is solved in the frequency domain, for all designs at once: its steady "
-    "state by Hill's method, as everywhere in this report, and by harmonic balance with a free "
-    f"input angle. {METHOD} integrates the same equations from rest at a relative tolerance of "
-    "1e-8; its time is scaled from the nominal design's. The paper integrates as well, but names "
-    "neither method nor tolerance. Only ratios within one run mean anything on another machine."
-)
+(SETTING,) = paragraphs("cost", batch_size=f"{BATCH_SIZE:,}", method=METHOD)
 
 
 @dataclass(frozen=True)

@@ -7,13 +7,14 @@ from collections.abc import Iterator, Sequence
 import chaospy
 import numpy as np
 
-from experiments.comparison.runs import robust_problem
+from experiments.comparing.runs import robust_problem
 from experiments.paper.models import models_of
 from experiments.paper.scatter import theta_s_of
 from experiments.paper.shares import study_designs
 from experiments.published_values import REEVALUATION_LIMITS
 from experiments.runner.registry import Context
 from experiments.runner.result import Column, Finding, Picture, Result, Table, significant
+from experiments.runner.texts import paragraphs
 from experiments.studies.accuracy_per_run import (
     N_TEST,
     PAPER_ORDER,
@@ -31,13 +32,7 @@ from pymoo_hdte.units import ARCSEC
 MODELS = ("calibrated", "resonant")
 AGREEMENT = 1e-8
 
-SETTING = (
-    "chaospy builds its distributions, quadrature rules and orthogonal polynomials by other means "
-    "than we do, so that agreement to rounding checks both. The second half spends model runs on "
-    f"surrogates of several kinds and tests all on one hypercube of {N_TEST} points. 'Idle "
-    "parameters held' looks for parameters without influence on a grid of two nodes each, whose 32 "
-    "runs are counted, and gives those a single node."
-)
+(SETTING,) = paragraphs("crosscheck", n_test=N_TEST)
 
 
 def run(context: Context) -> Result:

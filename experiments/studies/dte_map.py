@@ -11,11 +11,12 @@ from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 from tqdm import tqdm
 
-from experiments.comparison.figures import BLUE, GREEN, GREY, ORANGE, grid
-from experiments.comparison.runs import robust_problem
+from experiments.comparing.figures import BLUE, GREEN, GREY, ORANGE, grid
+from experiments.comparing.runs import robust_problem
 from experiments.paper.models import models_of
 from experiments.runner.registry import Context
 from experiments.runner.result import Cell, Column, Picture, Result, Table, significant
+from experiments.runner.texts import paragraphs
 from pymoo_hdte.drive import PRESETS
 from pymoo_hdte.drive.dte_map import (
     SpeedLoadMap,
@@ -30,13 +31,7 @@ LOADS = np.arange(0.0, 41.0, 4.0)
 RATED_SPEED = 2000.0
 DRAWN_LOADS = {0.0: (GREY, ":"), 20.0: (GREEN, "--"), 40.0: (BLUE, "-")}
 
-SETTING = (
-    "DTE of the nominal design with its mean theta_s at every input speed and load; the last load "
-    "and the middle of the speeds are the rated condition. A resonance of order o stands where the "
-    "torsional mode is met o times per input turn. A mode with a damping ratio above 0.71 does "
-    "not resonate. Where a varying stiffness makes the motion grow there is no steady state, and "
-    "the map is black."
-)
+(SETTING,) = paragraphs("dte_map")
 
 
 def run(context: Context) -> Result:

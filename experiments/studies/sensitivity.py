@@ -9,8 +9,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from experiments.comparison.figures import BLUE, GREEN, GREY, ORANGE, PINK, grid
-from experiments.comparison.runs import robust_problem
+from experiments.comparing.figures import BLUE, GREEN, GREY, ORANGE, PINK, grid
+from experiments.comparing.runs import robust_problem
 from experiments.paper.choices import BAND, MODEL
 from experiments.paper.models import models_of
 from experiments.paper.shares import (
@@ -21,6 +21,7 @@ from experiments.paper.shares import (
 )
 from experiments.runner.registry import Context
 from experiments.runner.result import Cell, Column, Finding, Picture, Result, Table, significant
+from experiments.runner.texts import paragraphs
 from pymoo_hdte.drive import PARAMETERS, PRESETS
 from pymoo_hdte.surrogate import SobolIndices
 
@@ -33,12 +34,7 @@ SMALLEST_DRAWN = 1e-4
 DECIMALS = 6
 NEXT_TO_NOTHING = "0 stands for less than a millionth of a percent."
 
-SETTING = (
-    "First-order Sobol indices are the shares of the variance of the DTE that one parameter causes "
-    "by itself, total ones include its interactions. They are computed in closed form from the "
-    "coefficients of the surrogate; no sample is drawn. Chosen designs are those that the three "
-    f"preferences pick from the surrogate's front; their bands are ±{100 * BAND:g} %."
-)
+(SETTING,) = paragraphs("sensitivity", band=f"{100 * BAND:g}")
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,7 @@
 """From measurements to parameters: error statistics of prototypes, stiffness and damping.
 
 Knows the drive's units and data sheet, nothing of surrogates or of pymoo. `records` says which CSV
-files a user can bring; `pymoo_hdte.virtual.bench` makes records with known truth.
+files a user can bring; `experiments.paper.bench` makes records with known truth.
 """
 
 from pymoo_hdte.identification.damping import NoLoadRun, bearing_damping, mesh_damping

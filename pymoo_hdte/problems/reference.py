@@ -1,8 +1,8 @@
 """Stored fronts: reading, writing, and matching a front to its problem.
 
-`experiments/fronts` computes them: `reference_front.py` those of surrogates, `direct_front.py` that
-of the drive model. A file is a CSV with one header comment that
-holds the settings of the problem as JSON; a front is only used for a problem of the same settings.
+`experiments/studies/fronts` computes them: `reference_front.py` those of surrogates,
+`direct_front.py` that of the drive model. A file is a CSV with one header comment that holds the
+settings of the problem as JSON; a front is only used for a problem of the same settings.
 """
 
 from __future__ import annotations

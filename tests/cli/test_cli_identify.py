@@ -10,10 +10,10 @@ from bench_records import BENCH, TRUTH, write_runs, write_series
 from scipy.stats import linregress
 from scipy.stats import t as student
 
+from experiments.paper.bench.rigs import INPUT_BEARING
 from pymoo_hdte.cli import command_line as cli
 from pymoo_hdte.drive import hs_20_100, load_datasheet
 from pymoo_hdte.units import ARCSEC, REVOLUTION_PER_MINUTE
-from pymoo_hdte.virtual.bench import INPUT_BEARING
 
 
 def identify(*arguments):

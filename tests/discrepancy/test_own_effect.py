@@ -10,6 +10,9 @@ from measured_oscillator import EYRING_DRAG, OF_ROTOR, ROTOR, EyringDrag, report
 from quick_campaigns import CONDITIONS
 from virtual_rig_cases import BELIEVED, RIG
 
+from experiments.studies.virtual_rig.own_effects import with_effects
+from experiments.studies.virtual_rig.rig import draw_rig, run_campaign
+from experiments.studies.virtual_rig.runs import Condition
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy import MeasuredMechanism, analyse, read_mechanism_model
 from pymoo_hdte.drive import (
@@ -23,9 +26,6 @@ from pymoo_hdte.drive import (
 )
 from pymoo_hdte.effects import known_effects, register, registered
 from pymoo_hdte.problems import RobustDTE
-from pymoo_hdte.virtual.own_effects import with_effects
-from pymoo_hdte.virtual.rig import draw_rig, run_campaign
-from pymoo_hdte.virtual.runs import Condition
 
 PLANTED = EyringDrag(level=0.03, knee=30.0)
 SLOW = tuple(Condition(speed, 20.0, 500.0, 2, "train") for speed in (300.0, 400.0, 800.0))

@@ -6,20 +6,21 @@ import numpy as np
 import pytest
 from places import PAGES, WORDS
 
-from experiments.contest import swarm_parts
-from experiments.contest.peers_data import committed_scores
-from experiments.contest.peers_rivals import (
+from experiments.comparing.indicators import NAMES
+from experiments.runner.campaign import Campaign
+from experiments.runner.registry import Context
+from experiments.studies.contest import swarm_parts
+from experiments.studies.contest.peers_data import committed_scores
+from experiments.studies.contest.peers_rivals import (
     FAITHFUL,
     must_reach_table,
     nearest_rival_table,
     subsets_table,
 )
-from experiments.contest.peers_tables import NAMES, median_ranks
-from experiments.robust.data import ahead, outcome_for
-from experiments.robust.functions import FUNCTIONS
-from experiments.robust.job import METHODS, OPENTURNS, OURS
-from experiments.runner.campaign import Campaign
-from experiments.runner.registry import Context
+from experiments.studies.contest.peers_tables import median_ranks
+from experiments.studies.robust.data import ahead, outcome_for
+from experiments.studies.robust.functions import FUNCTIONS
+from experiments.studies.robust.job import METHODS, OPENTURNS, OURS
 
 
 def test_runs_of_robust_surrogates_are_those_of_the_stored_outcome(tmp_path):

@@ -12,20 +12,20 @@ from pymoo.problems import get_problem
 from experiments.runner.campaign import Campaign
 from experiments.runner.registry import Context
 from experiments.runner.result import MISSED, significant
-from experiments.suites import data as suites
-from experiments.suites.bbob.published import CITED
-from experiments.suites.bbob_tables import reached
-from experiments.suites.demands import demands
-from experiments.suites.jobs import MEASURES
-from experiments.suites.own_time import own_time_table
-from experiments.suites.parts import part_tests
-from experiments.suites.protocol import BUDGETS
-from experiments.suites.reduced import without_all
-from experiments.suites.rule import steps
-from experiments.suites.suite_tables import feasible_runs, in_short
-from experiments.suites.suite_tables import ranks as suite_ranks
-from experiments.suites.suite_tables import tests as rival_tests
-from experiments.suites.together import ranks_together, signs_together
+from experiments.studies.suites import data as suites
+from experiments.studies.suites.bbob.published import CITED
+from experiments.studies.suites.bbob_tables import reached
+from experiments.studies.suites.demands import demands
+from experiments.studies.suites.jobs import MEASURES
+from experiments.studies.suites.own_time import own_time_table
+from experiments.studies.suites.parts import part_tests
+from experiments.studies.suites.protocol import BUDGETS
+from experiments.studies.suites.reduced import without_all
+from experiments.studies.suites.rule import steps
+from experiments.studies.suites.suite_tables import feasible_runs, in_short
+from experiments.studies.suites.suite_tables import ranks as suite_ranks
+from experiments.studies.suites.suite_tables import tests as rival_tests
+from experiments.studies.suites.together import ranks_together, signs_together
 from pymoo_hdte.algorithms import CompactSwarm
 
 

@@ -4,6 +4,7 @@ import contextlib
 import io
 import json
 import re
+import runpy
 import shlex
 import sys
 from itertools import product
@@ -125,7 +126,7 @@ def test_the_campaign_to_try_holds_the_effect_that_is_named(tmp_path, monkeypatc
     monkeypatch.chdir(ROOT)
     script, folder, arguments = campaign_to_try()
     monkeypatch.setattr(sys, "argv", [script, str(tmp_path / folder)])
-    exec(compile(Path(script).read_text(), script, "exec"), {"__name__": "__main__"})
+    runpy.run_path(script, run_name="__main__")
     monkeypatch.chdir(tmp_path)
     assert cli.main(arguments) == 0
     printed = capsys.readouterr().out

@@ -9,8 +9,8 @@ from importlib.util import find_spec
 import pytest
 from places import ROOT
 
-from experiments.contest.peers_data import committed_scores
-from experiments.contest.peers_tables import median_ranks
+from experiments.studies.contest.peers_data import committed_scores
+from experiments.studies.contest.peers_tables import median_ranks
 
 CHECKLIST = (ROOT / "docs" / "review_checklist.md").read_text(encoding="utf-8")
 PAPER = (ROOT / "paper.md").read_text(encoding="utf-8")

@@ -4,12 +4,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from drive_mechanism import drive_mechanism
 from hypothesis import given
 from hypothesis import strategies as st
 from planted_features import known_data, library, measured
 from quick_campaigns import CONDITIONS, quick_campaign
 from virtual_rig_cases import BELIEVED, RIG, effect
 
+from experiments.studies.virtual_rig.own_effects import with_effects
+from experiments.studies.virtual_rig.rig import draw_rig, run_campaign
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy import analyse
 from pymoo_hdte.discrepancy.engine.fitting import fit
@@ -22,10 +25,7 @@ from pymoo_hdte.effects.law import PortState, periodic_phase
 from pymoo_hdte.effects.load_friction import LoadFriction
 from pymoo_hdte.effects.shear_thinning import ShearThinningDrag
 from pymoo_hdte.mechanism import BelievedValue, Input, LawAt, Mechanism, Port, Record
-from pymoo_hdte.mechanism.drive import drive_mechanism
 from pymoo_hdte.mechanism.simulation import simulate_mechanism
-from pymoo_hdte.virtual.own_effects import with_effects
-from pymoo_hdte.virtual.rig import draw_rig, run_campaign
 
 STIFF = SpeedLoop(1e4, 0.0)
 """Holds the input at its speed, so that means are those of an even motion."""

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from drive_mechanism import drive_mechanism
 
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.drive import (
@@ -19,7 +20,6 @@ from pymoo_hdte.drive.effects.base import DriveEffect
 from pymoo_hdte.drive.solve.free_angle import harmonic_balance
 from pymoo_hdte.drive.solve.hill import transfer_function
 from pymoo_hdte.drive.solve.stability import UnstableDrive
-from pymoo_hdte.mechanism.drive import drive_mechanism
 
 INERTIA, TIME = 0.05, 2e-4
 """kg.m2, and s after which a viscous clutch has brought it to speed."""

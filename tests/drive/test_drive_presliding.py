@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from drive_mechanism import drive_mechanism
 
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.drive import (
@@ -18,7 +19,6 @@ from pymoo_hdte.effects.effect import effect_named
 from pymoo_hdte.effects.friction import CoulombFriction
 from pymoo_hdte.effects.guess import Sizes
 from pymoo_hdte.effects.hysteresis import MaxwellSlip
-from pymoo_hdte.mechanism.drive import drive_mechanism
 from pymoo_hdte.mechanism.effects import law_effects
 
 LEVEL, WAY, SPREAD = 1.5, 4e-5, 1.4

@@ -5,6 +5,8 @@ from kept_results import kept
 from planted_features import SCALES
 from virtual_rig_cases import BELIEVED, RIG, effect, true_rig
 
+from experiments.studies.virtual_rig.rig import run_campaign
+from experiments.studies.virtual_rig.runs import Condition
 from pymoo_hdte.discrepancy.drive.analysis import DriveFinding
 from pymoo_hdte.discrepancy.drive.candidates import drive_candidates
 from pymoo_hdte.discrepancy.drive.evidence import Data, start_parameters
@@ -13,8 +15,6 @@ from pymoo_hdte.discrepancy.drive.sizes import port_sizes
 from pymoo_hdte.discrepancy.engine.fitting import fit
 from pymoo_hdte.discrepancy.engine.hypothesis import Hypothesis
 from pymoo_hdte.discrepancy.engine.verdict import Verdict
-from pymoo_hdte.virtual.rig import run_campaign
-from pymoo_hdte.virtual.runs import Condition
 
 ORDERS = [1.0, 2.0, 2.02, 3.0, 4.0, 6.0]
 CONDITIONS = tuple(

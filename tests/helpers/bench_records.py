@@ -4,8 +4,8 @@ from pathlib import Path
 
 import numpy as np
 
+from experiments.paper.bench.rigs import COMPLETE_DRIVE, INPUT_BEARING, OUTPUT_BEARING, TorsionBench
 from pymoo_hdte.units import ARCSEC, REVOLUTION_PER_MINUTE
-from pymoo_hdte.virtual.bench import COMPLETE_DRIVE, INPUT_BEARING, OUTPUT_BEARING, TorsionBench
 
 TRUTH = {"K": 2.4e4, "B_in": 1.7e-4, "B_fc": 4.4e-4, "B_out": 5.0e-4}
 BENCH = TorsionBench()

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from experiments.blind.candidate_terms import terms
+from experiments.studies.blind.candidate_terms import terms
 from pymoo_hdte.discrepancy.drive.torsion_curve import TorsionPoints
 from pymoo_hdte.drive import (
     Eccentricity,

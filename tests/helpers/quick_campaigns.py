@@ -7,6 +7,8 @@ import numpy as np
 from kept_results import files_in, kept
 from virtual_rig_cases import BELIEVED, RIG, effect
 
+from experiments.studies.virtual_rig.rig import draw_rig, run_campaign
+from experiments.studies.virtual_rig.runs import Condition
 from pymoo_hdte.cli import optimum_report
 from pymoo_hdte.cli.design_study import DesignStudy, Settings, run_design_study
 from pymoo_hdte.discrepancy import (
@@ -17,8 +19,6 @@ from pymoo_hdte.discrepancy import (
     write_campaign,
 )
 from pymoo_hdte.drive import preset
-from pymoo_hdte.virtual.rig import draw_rig, run_campaign
-from pymoo_hdte.virtual.runs import Condition
 
 CONDITIONS = tuple(
     Condition(speed, load, 500.0 if speed < 1000.0 else 1000.0, 2 if speed < 1000.0 else 1, role)

@@ -12,6 +12,7 @@ from places import SHARED
 from quick_campaigns import CONDITIONS
 from virtual_rig_cases import BELIEVED, RIG, true_rig
 
+from experiments.studies.virtual_rig.rig import run_campaign
 from pymoo_hdte.discrepancy import read_campaign
 from pymoo_hdte.discrepancy.campaign.rows.findings import RowFindings
 from pymoo_hdte.discrepancy.drive import analysis, evidence
@@ -19,7 +20,6 @@ from pymoo_hdte.discrepancy.drive.misfit import location
 from pymoo_hdte.discrepancy.engine import fitting, verdict
 from pymoo_hdte.discrepancy.engine.candidate import Candidate
 from pymoo_hdte.discrepancy.engine.search import Search
-from pymoo_hdte.virtual.rig import run_campaign
 
 
 def case_campaign(name):

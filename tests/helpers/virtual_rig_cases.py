@@ -2,10 +2,10 @@
 
 from dataclasses import replace
 
-from experiments.blind.cases import BELIEVED, RIG
-from pymoo_hdte.virtual.hidden_forms import HiddenEffect
-from pymoo_hdte.virtual.rig import TrueRig
-from pymoo_hdte.virtual.runs import Condition
+from experiments.studies.blind.cases import BELIEVED, RIG
+from experiments.studies.virtual_rig.hidden_forms import HiddenEffect
+from experiments.studies.virtual_rig.rig import TrueRig
+from experiments.studies.virtual_rig.runs import Condition
 
 __all__ = ["BELIEVED", "FAST", "PHASES", "RIG", "SHORT", "effect", "true_rig"]
 

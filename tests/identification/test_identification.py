@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from experiments.paper.bench.rigs import COMPLETE_DRIVE, INPUT_BEARING, OUTPUT_BEARING, TorsionBench
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.identification import (
     NoLoadRun,
@@ -22,7 +23,6 @@ from pymoo_hdte.identification import (
 from pymoo_hdte.identification.damping import INPUT_SPEEDS, OUTPUT_SPEEDS
 from pymoo_hdte.identification.noise import noise_of
 from pymoo_hdte.units import ARCSEC, REVOLUTION_PER_MINUTE
-from pymoo_hdte.virtual.bench import COMPLETE_DRIVE, INPUT_BEARING, OUTPUT_BEARING, TorsionBench
 
 K = 2.583e4
 QUIET = TorsionBench(torque_noise=0.0, torsion_noise=0.0, torque_zero=0.0, torsion_zero=0.0)

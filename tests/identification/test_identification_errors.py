@@ -6,6 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
+from experiments.paper.bench.prototypes import draw_prototypes, plant_outliers, repeat_measurements
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.identification import (
     NormalSample,
@@ -17,7 +18,6 @@ from pymoo_hdte.identification import (
 )
 from pymoo_hdte.identification.error_samples import holm
 from pymoo_hdte.identification.outliers import mean_of_valid
-from pymoo_hdte.virtual.bench import draw_prototypes, plant_outliers, repeat_measurements
 
 SYMBOLS = tuple(f"e{number}" for number in range(13))
 MEANS, STDS = np.linspace(4.0, 10.0, 13), np.linspace(0.6, 1.7, 13)

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from experiments.paper.bench.rigs import INPUT_BEARING, TorsionBench
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.identification import read_error_measurements, read_no_load_runs, read_torsion_loops
 from pymoo_hdte.units import ARCSEC, REVOLUTION_PER_MINUTE
-from pymoo_hdte.virtual.bench import INPUT_BEARING, TorsionBench
 
 TORQUES = [0, 10, 20, 30, 40, 30, 20, 10, 0, -10, -20, -30, -40, -30, -20, -10, 0]
 

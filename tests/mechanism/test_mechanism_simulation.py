@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from drive_mechanism import drive_mechanism
 from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicSpline
 from scipy.linalg import expm
@@ -28,7 +29,6 @@ from pymoo_hdte.mechanism import (
     Record,
     exponential_steps,
 )
-from pymoo_hdte.mechanism.drive import drive_mechanism
 from pymoo_hdte.mechanism.simulation import simulate_mechanism
 from pymoo_hdte.units import ARCSEC
 

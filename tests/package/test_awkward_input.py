@@ -9,12 +9,12 @@ import pytest
 from quick_campaigns import CONDITIONS
 from virtual_rig_cases import BELIEVED, RIG
 
+from experiments.studies.virtual_rig.rig import draw_rig, run_campaign
 from pymoo_hdte.checks import InvalidInput, finite_array, whole_number
 from pymoo_hdte.discrepancy import read_campaign, write_campaign
 from pymoo_hdte.drive import load_datasheet
 from pymoo_hdte.identification import error_statistics, read_no_load_runs
 from pymoo_hdte.problems.operating_conditions import OperatingCondition, load_conditions, shares
-from pymoo_hdte.virtual.rig import draw_rig, run_campaign
 
 
 @pytest.mark.parametrize(

@@ -18,7 +18,7 @@ from numba.core import caching
 for locator in caching.CacheImpl._locator_classes:
     locator.from_function = classmethod(lambda cls, function, file: None)
 import pymoo_hdte.algorithms, pymoo_hdte.drive, pymoo_hdte.mechanism, pymoo_hdte.problems
-from pymoo_hdte.virtual.laws import softplus
+from experiments.studies.virtual_rig.laws import softplus
 print(softplus(0.0), softplus.stats.cache_path)
 """
 
@@ -35,7 +35,7 @@ import sys
 sys.modules["numba"] = None
 import numpy as np
 from pymoo.optimize import minimize
-import pymoo_hdte.discrepancy, pymoo_hdte.drive, pymoo_hdte.virtual
+import pymoo_hdte.discrepancy, pymoo_hdte.drive, experiments.studies.virtual_rig.rig
 from pymoo_hdte.algorithms import ElitistSwarm
 from pymoo_hdte.problems import RobustDTE
 result = minimize(RobustDTE(), ElitistSwarm(), ("n_eval", 1000), seed=1)

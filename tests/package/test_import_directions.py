@@ -30,7 +30,7 @@ LOWEST_FIRST = (
         "discrepancy.mechanism",
         "discrepancy.joint",
     ),
-    *("discrepancy.report", "virtual"),
+    "discrepancy.report",
     *("problems.simulator", "problems.closed_form", "problems"),
     *("algorithms", "parallel", "decision", "discrepancy", "cli"),
 )
@@ -39,22 +39,13 @@ LOWEST_FIRST = (
 The modules of `discrepancy` itself are what users call, above all that they put together.
 """
 LOWEST_EXPERIMENTS_FIRST = (
-    *("published_values", "runner", "command_line", "__main__", "comparison", "fronts", "anytime"),
-    *("paper.static_error", "paper.prototypes", "paper", "paper.calibrating", "paper.inference"),
-    *(
-        "contest",
-        "suites.formulas",
-        "suites.bbob",
-        "suites",
-        "cards",
-        "robust",
-        "blind.rig",
-        "blind",
-        "measured",
-        "reliability",
-        "studies",
-        "paper_page",
-    ),
+    *("published_values", "runner", "command_line", "__main__", "comparing"),
+    *("paper.bench", "paper.static_error", "paper.prototypes", "paper.anytime", "paper"),
+    *("paper.calibrating", "paper.inference"),
+    *("studies.virtual_rig", "studies.fronts", "studies.contest"),
+    *("studies.suites.formulas", "studies.suites.bbob", "studies.suites", "studies.cards"),
+    *("studies.robust", "studies.blind.rig", "studies.blind", "studies.measured"),
+    *("studies.reliability", "studies", "paper_page"),
 )
 OUTSIDE = ("experiments", "tests")
 

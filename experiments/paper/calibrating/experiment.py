@@ -24,23 +24,14 @@ from experiments.runner.committed import committed_file, stored_outcome
 from experiments.runner.registry import Context
 from experiments.runner.result import OF_MODELS, Picture, Result
 from experiments.runner.store import write_atomically
+from experiments.runner.texts import paragraphs
 
 OUTCOMES = "calibration.csv"
 SEEDS = {"table8": (1, 2), "table5": (1,)}
 """Seeds of the fits, by direction; four numbers need no second seed."""
 REPLICATES = 20
 
-SETTING = (
-    "Each rung of the ladder adds effects to Eq. (9), reads theta_s as a peak-to-peak (p2p) or a "
-    "semi-amplitude (semi), and reads the bands of the paper's Monte Carlo runs in one of two "
-    "ways. R1: ±5 % everywhere, and ±35 % in all five parameters for the surrogate's box. R2: "
-    "±35 % for the initial design, ±5 % for the optima, theta_s over mean ± 3 std. A fit sees one "
-    "set of published numbers; the others are held out. The gap is the root mean square relative "
-    "difference to the published numbers. Under either reading the surrogate that moments come "
-    "through spans theta_s over mean ± 3 std, as RobustDTE has it; the box scatter belongs to both "
-    "directions. Nine parameters meet nine numbers in the largest rungs: what is held out judges. "
-    "Chi-square takes the published numbers as independent."
-)
+(SETTING,) = paragraphs("calibration")
 
 
 def run(context: Context) -> Result:

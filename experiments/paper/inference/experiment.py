@@ -43,6 +43,7 @@ from experiments.runner.committed import committed_file, stored_outcome
 from experiments.runner.registry import Context, require
 from experiments.runner.result import OF_MODELS, Picture, Result
 from experiments.runner.store import write_atomically
+from experiments.runner.texts import paragraphs
 
 NAME = "inference"
 FITS, DRAWN, PROFILED = (f"{NAME}{part}.csv" for part in ("", "_posterior", "_profiles"))
@@ -56,31 +57,13 @@ STEPS = 2000
 FULL = {bands: Rung(Candidate(EFFECTS, "semi_amplitude", bands)) for bands in (NARROW, WIDE)}
 """The rung of ``calibrated``, under either reading of the bands."""
 
-SETTING = (
-    f"Means and standard deviations of Table 8 are those of {SAMPLES} samples; the three optima "
-    "share their random numbers, the initial design has its own. Their covariance is computed from "
-    "the model itself: second, third and fourth moments of its surrogate of order 3, exact by "
-    f"quadrature. To each of the eight numbers {READING} arcsec, independent, are added for what "
-    "the text leaves open: half the root mean square by which they move in calibrated between two "
-    "readings of the surrogate's interval of theta_s. The scatter over the box of Table 5 is the "
-    "ninth number. The deviance, -2 log "
-    "likelihood, holds the determinant of that covariance, which differs from model to model. A "
-    "search follows Latin hypercube starts alone; starts that reach the best basin end within 2 of "
-    "its deviance."
-)
-DEPTH = (
-    "Depth says how far a published optimum lies below the model's front: the largest t for which "
-    "one design of the box is better by t widths of the published front in the mean and in the std "
-    f"at once. An archive as in the paper leaves some 0.02; {DEPTH_TOLERANCE:g} is taken as not "
-    "dominated. Where depth is fitted, its three values count in units of that."
-)
-NOISE = (
-    "Runs of a solver carry errors of their own, and a surrogate interpolates them. Node noise is "
-    "independent from run to run, of one unknown size, and the same for every design that is read "
-    "off the surrogate; a mean is linear in it, a standard deviation to first order, so that its "
-    "covariance follows exactly from the cardinal functions. Its size is fitted as one more "
-    f"parameter, up to {LARGEST:.2f} arcsec, where it alone makes up the RMSE of order "
-    f"{ORDER} in Table 5."
+SETTING, DEPTH, NOISE = paragraphs(
+    "inference",
+    samples=SAMPLES,
+    reading=READING,
+    depth_tolerance=f"{DEPTH_TOLERANCE:g}",
+    largest=f"{LARGEST:.2f}",
+    order=ORDER,
 )
 WORDS = (
     "R1 and R2 are the readings of the bands of the calibration: R1 has every Monte "

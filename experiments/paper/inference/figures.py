@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from experiments.comparison.figures import BLACK, BLUE, GREEN, GREY, ORANGE, PINK, grid
+from experiments.comparing.figures import BLACK, BLUE, GREEN, GREY, ORANGE, PINK, grid
 from experiments.paper.calibrating.ladder import LOGARITHMIC
 from experiments.paper.inference.data import Draws, Profiled
 from experiments.paper.inference.knowledge import BOUND, title

@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from experiments.comparison.figures import BLUE, GREY, ORANGE, grid
+from experiments.comparing.figures import BLUE, GREY, ORANGE, grid
 from experiments.paper.prototypes.printed_validation import NUMBERS, Assignment, bounds
 from experiments.paper.prototypes.records import Record
 

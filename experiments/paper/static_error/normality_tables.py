@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from experiments.comparison.rates import at_least
+from experiments.comparing.rates import at_least
 from experiments.paper.static_error.normality import (
     implied_size,
     pooled_rejection_rate,

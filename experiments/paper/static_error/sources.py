@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import norm
 
+from experiments.paper.bench.prototypes import draw_prototypes, plant_outliers, repeat_measurements
 from experiments.published_values import TABLE_2
 from pymoo_hdte.identification import (
     ErrorStatistics,
@@ -16,7 +17,6 @@ from pymoo_hdte.identification import (
     find_outliers,
 )
 from pymoo_hdte.identification.outliers import SIGMAS
-from pymoo_hdte.virtual.bench import draw_prototypes, plant_outliers, repeat_measurements
 
 SYMBOLS = tuple(TABLE_2)
 MEANS = np.array([row.mean_um for row in TABLE_2.values()])

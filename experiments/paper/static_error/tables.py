@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from scipy.stats import chi2, gaussian_kde, shapiro
 
-from experiments.comparison.figures import BLUE, GREEN, GREY, ORANGE, PINK, YELLOW, grid
+from experiments.comparing.figures import BLUE, GREEN, GREY, ORANGE, PINK, YELLOW, grid
 from experiments.paper.static_error.statistics import (
     ANGLES,
     ASSUMED_ANGLE,

@@ -10,14 +10,14 @@ from places import SHARED
 from quick_campaigns import quick_campaign
 from virtual_rig_cases import BELIEVED, RIG, effect
 
+from experiments.studies.virtual_rig.rig import draw_rig, run_campaign
+from experiments.studies.virtual_rig.runs import Condition
 from pymoo_hdte.discrepancy import analyse, order_lines, read_campaign
 from pymoo_hdte.discrepancy.campaign.rows.examination import examined_rows
 from pymoo_hdte.discrepancy.drive.analysis import expected_orders
 from pymoo_hdte.discrepancy.engine.rules import RULES
 from pymoo_hdte.discrepancy.report.row_words import rows_sentence
 from pymoo_hdte.units import ARCSEC
-from pymoo_hdte.virtual.rig import draw_rig, run_campaign
-from pymoo_hdte.virtual.runs import Condition
 
 NOISES = ("angle_noise", "input_torque_noise", "output_torque_noise", "torsion_angle_noise")
 CASES = SHARED / "cases" / "campaigns"

@@ -8,11 +8,11 @@ import pytest
 from quick_campaigns import CONDITIONS
 from virtual_rig_cases import BELIEVED, RIG
 
+from experiments.studies.virtual_rig.rig import draw_rig, run_campaign
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy import analyse, read_campaign, write_campaign
 from pymoo_hdte.discrepancy.campaign.sensor_hints import inertia_felt, sensor_hints
 from pymoo_hdte.units import FOREIGN
-from pymoo_hdte.virtual.rig import draw_rig, run_campaign
 
 AT_BRAKE = replace(RIG, output_torque_at="brake")
 

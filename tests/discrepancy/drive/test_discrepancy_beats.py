@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 from virtual_rig_cases import BELIEVED, PHASES, RIG, SHORT, effect, true_rig
 
+from experiments.studies.virtual_rig.rig import run_campaign
+from experiments.studies.virtual_rig.runs import Condition
 from pymoo_hdte.discrepancy.drive.features import measure
 from pymoo_hdte.discrepancy.drive.parameters import base_parameters
 from pymoo_hdte.discrepancy.drive.plan.imagined import imagined_campaign, possible_tests
@@ -13,8 +15,6 @@ from pymoo_hdte.discrepancy.drive.plan.limits import PlanLimits
 from pymoo_hdte.discrepancy.drive.prediction import predict
 from pymoo_hdte.drive.effects import MeshStiffnessVariation
 from pymoo_hdte.units import REVOLUTION_PER_MINUTE
-from pymoo_hdte.virtual.rig import run_campaign
-from pymoo_hdte.virtual.runs import Condition
 
 DEPTH, PHASE, SECOND = 0.05, 0.7, 0.2
 QUIET = replace(RIG, angle_noise=1e-12, input_torque_noise=1e-9, output_torque_noise=1e-6,

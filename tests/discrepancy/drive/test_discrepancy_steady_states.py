@@ -8,6 +8,8 @@ import pytest
 from planted_features import known_data, library, listed, measured, with_sweep
 from virtual_rig_cases import BELIEVED, RIG, effect, true_rig
 
+from experiments.studies.virtual_rig.rig import run_campaign
+from experiments.studies.virtual_rig.runs import Condition
 from pymoo_hdte.discrepancy.drive import rattling
 from pymoo_hdte.discrepancy.drive.evidence import flanks_held
 from pymoo_hdte.discrepancy.drive.features import measure, unexpected_lines
@@ -26,8 +28,6 @@ from pymoo_hdte.drive.effects import LawAtPort
 from pymoo_hdte.effects.hysteresis import MaxwellSlip
 from pymoo_hdte.effects.stiffness import SoftWindup
 from pymoo_hdte.units import ARCSEC
-from pymoo_hdte.virtual.rig import run_campaign
-from pymoo_hdte.virtual.runs import Condition
 
 LOADED_OR_NOT = [(rpm, load) for rpm in (10.0, 2000.0) for load in (0.0, 10.0, 20.0, 40.0)]
 

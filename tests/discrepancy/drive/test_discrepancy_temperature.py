@@ -9,6 +9,7 @@ from quick_campaigns import CONDITIONS
 from small_campaigns import small_campaign
 from virtual_rig_cases import BELIEVED, RIG
 
+from experiments.studies.virtual_rig.rig import draw_rig, run_campaign
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy import analyse, read_campaign, write_campaign
 from pymoo_hdte.discrepancy.drive.analysis import expected_orders
@@ -21,7 +22,6 @@ from pymoo_hdte.discrepancy.engine.rules import RULES
 from pymoo_hdte.drive import LawAtPort
 from pymoo_hdte.effects.law import PortState
 from pymoo_hdte.effects.temperature_friction import TemperatureFriction
-from pymoo_hdte.virtual.rig import draw_rig, run_campaign
 
 NAME, RATE, MIDDLE = "temperature_dependent_friction", 0.03, 303.0
 

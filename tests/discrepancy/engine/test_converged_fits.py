@@ -10,8 +10,9 @@ from quick_campaigns import quick_analysis, ripple_analysis_and_report
 from verdict_cases import case_campaign
 from virtual_rig_cases import BELIEVED, RIG, effect, true_rig
 
-from experiments.blind.campaigns import campaign_of, hiding
-from experiments.blind.cases import Case
+from experiments.studies.blind.campaigns import campaign_of, hiding
+from experiments.studies.blind.cases import Case
+from experiments.studies.virtual_rig.rig import run_campaign
 from pymoo_hdte.discrepancy import analyse
 from pymoo_hdte.discrepancy.engine.fitting import fit
 from pymoo_hdte.discrepancy.engine.hypothesis import hypothesis_of, label_of
@@ -21,7 +22,6 @@ from pymoo_hdte.discrepancy.engine.verdict import judge
 from pymoo_hdte.drive import LoadInertia
 from pymoo_hdte.drive.effects import KinematicErrorLine
 from pymoo_hdte.drive.solve import free_angle
-from pymoo_hdte.virtual.rig import run_campaign
 
 STARTS = 10
 SAME = 0.1

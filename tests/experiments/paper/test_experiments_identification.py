@@ -5,9 +5,9 @@ import pytest
 from night import others_at_night
 from scipy import stats
 
-from experiments.comparison.rates import at_least
+from experiments.comparing.rates import at_least
 from experiments.paper import later_prototypes, table2, table3
-from experiments.paper.bench_campaign import draw_campaign, slope_error_per_noise, summaries
+from experiments.paper.bench.campaign import draw_campaign, slope_error_per_noise, summaries
 from experiments.paper.static_error import statistics as static_error_statistics
 from experiments.paper.static_error.normality import (
     pooled_rejection_rate,

@@ -8,7 +8,7 @@ from night import others_at_night
 from numpy.polynomial.legendre import leggauss
 from scipy.signal import butter, sosfreqz
 
-from experiments.comparison.runs import robust_problem
+from experiments.comparing.runs import robust_problem
 from experiments.paper import design_tables, fig12, published, table8
 from experiments.paper.choices import BAND, initial_choices, paper_choices
 from experiments.paper.design_tables import _idle_sweep, deviation_table

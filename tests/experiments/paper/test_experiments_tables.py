@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from experiments.command_line import main
-from experiments.comparison import paired
-from experiments.comparison.runs import ALGORITHMS, OptimisationRun, robust_problem
+from experiments.comparing import paired
+from experiments.comparing.runs import ALGORITHMS, OptimisationRun, robust_problem
 from experiments.paper.scatter import dte_samples, exact_moments
 from experiments.published_values import TABLE_6, TABLE_9
 from experiments.runner.campaign import Campaign
@@ -26,7 +26,7 @@ SMALL_RUNS = f"""
 import sys
 from functools import partial
 from experiments.command_line import main
-from experiments.comparison import paired
+from experiments.comparing import paired
 paired.OptimisationRun = partial(paired.OptimisationRun, **{SMALL})
 sys.exit(main())
 """

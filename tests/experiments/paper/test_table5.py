@@ -7,7 +7,7 @@ import pytest
 from numpy.polynomial.legendre import leggauss
 from scipy.interpolate import lagrange
 
-from experiments.comparison.runs import robust_problem
+from experiments.comparing.runs import robust_problem
 from experiments.paper import node_faults, table5
 from experiments.paper.node_faults import (
     AS_PRINTED,

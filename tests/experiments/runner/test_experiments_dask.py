@@ -19,7 +19,7 @@ import walk_jobs
 from places import ROOT
 from walk_jobs import DeadlyWalk, EndlesslyDeadlyWalk, Walk
 
-from experiments.comparison.runs import OptimisationRun
+from experiments.comparing.runs import OptimisationRun
 from experiments.runner.campaign import Campaign
 from experiments.runner.workers import WorkerLost, WrongWorker, make_executor
 from pymoo_hdte.checks import InvalidInput

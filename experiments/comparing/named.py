@@ -1,0 +1,169 @@
+"""Problems and algorithms by the names that a command line gives, those of strangers included.
+
+A name is one of this package, one of pymoo, or ``module:name`` of a module that can be imported.
+"""
+
+from __future__ import annotations
+
+import inspect
+import pkgutil
+from collections.abc import Callable
+from functools import cache
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import pymoo.algorithms.moo
+from pymoo.core.algorithm import Algorithm
+from pymoo.core.problem import Problem
+from pymoo.problems import get_problem
+from pymoo.util.ref_dirs import get_reference_directions
+
+from experiments.comparing.runs import ALGORITHMS, FINAL_SIZE, robust_problem
+from experiments.runner.provenance import fingerprint
+from experiments.runner.setting import Setting
+from pymoo_hdte.algorithms import ElitistSwarm
+from pymoo_hdte.checks import InvalidInput
+from pymoo_hdte.drive import PRESETS
+from pymoo_hdte.problems import robust_benchmarks, robust_dte_family
+
+OF_PROBLEMS, OF_ALGORITHMS = "--problems", "--algorithms"
+_OF_PYMOO = "a name of this package or of pymoo, or module:name of a module that can be imported"
+
+
+def check_setting(setting: Setting) -> None:
+    """Refuse names that are unknown, and algorithms that cannot be made for a problem.
+
+    Raises
+    ------
+    InvalidInput
+        Naming the option, the name and what is allowed.
+    """
+    for problem in setting.problems:
+        problem_named(problem)
+        for algorithm in setting.algorithms:
+            algorithm_named(algorithm, setting.population, problem)
+
+
+@cache
+def problem_named(name: str) -> Problem:
+    """Return the problem of that name, built once per process.
+
+    Raises
+    ------
+    InvalidInput
+        If there is none, or it has fewer than two objectives or variables that are not real.
+    """
+    own: dict[str, Callable[[], Problem]] = {**robust_dte_family(), **robust_benchmarks()}
+    if name in PRESETS:
+        problem = robust_problem(name)
+    elif name in own:
+        problem = own[name]()
+    else:
+        make = _imported(OF_PROBLEMS, name) if ":" in name else lambda: get_problem(name)
+        problem = make if isinstance(make, Problem) else _made(OF_PROBLEMS, name, make)
+    if not isinstance(problem, Problem) or problem.n_obj < 2 or problem.vtype not in (None, float):
+        allowed = "a pymoo problem of real variables and two objectives or more"
+        raise InvalidInput(OF_PROBLEMS, name, allowed)
+    return problem
+
+
+def algorithm_named(name: str, population: int, problem: str) -> Algorithm:
+    """Return a new algorithm of that name for the problem of a name.
+
+    It is given ``pop_size``, ``archive_size`` and ``ref_dirs`` as far as its constructor names
+    them, and ``pop_size`` also if it takes any keyword and no directions.
+
+    Raises
+    ------
+    InvalidInput
+        If there is none, or if it cannot be made from these arguments alone.
+    """
+    if name in ALGORITHMS:
+        return ALGORITHMS[name](population, FINAL_SIZE)
+    if name == ElitistSwarm.__name__:
+        factory: Any = ElitistSwarm
+    else:
+        factory = _imported(OF_ALGORITHMS, name) if ":" in name else _pymoo_algorithm(name)
+    if not callable(factory):
+        raise InvalidInput(OF_ALGORITHMS, name, "a class or a function that makes an algorithm")
+    arguments = _arguments(factory, population, problem_named(problem).n_obj)
+    algorithm = _made(OF_ALGORITHMS, name, lambda: factory(**arguments))
+    if not isinstance(algorithm, Algorithm):
+        raise InvalidInput(OF_ALGORITHMS, name, "something that makes a pymoo Algorithm")
+    return algorithm
+
+
+def source_of(*names: str) -> str:
+    """Identify the files behind the names of strangers: a changed file gives other runs.
+
+    Empty for names of this package and of pymoo, which the origin of a run covers.
+    """
+    modules = [import_module(name.partition(":")[0]) for name in names if ":" in name]
+    files = [Path(module.__file__) for module in modules if module.__file__]
+    return fingerprint(*_with_neighbours(files)) if files else ""
+
+
+def _with_neighbours(files: list[Path]) -> list[Path]:
+    """Return the files with all others of their packages."""
+    found = set(files)
+    for path in files:
+        if (path.parent / "__init__.py").is_file():
+            found |= set(path.parent.rglob("*.py"))
+    return sorted(found)
+
+
+def _arguments(factory: Callable[..., Any], population: int, n_obj: int) -> dict[str, Any]:
+    takes = inspect.signature(factory).parameters
+    any_keyword = any(one.kind is one.VAR_KEYWORD for one in takes.values())
+    arguments: dict[str, Any] = {}
+    if "pop_size" in takes or (any_keyword and "ref_dirs" not in takes):
+        arguments["pop_size"] = population
+    if "archive_size" in takes:
+        arguments["archive_size"] = FINAL_SIZE
+    if "ref_dirs" in takes:
+        arguments["ref_dirs"] = _directions(n_obj, population)
+    return arguments
+
+
+@cache
+def _directions(n_obj: int, population: int) -> Any:
+    """Return as many reference directions as there are individuals."""
+    if n_obj == 2:
+        return get_reference_directions("das-dennis", n_obj, n_partitions=population - 1)
+    return get_reference_directions("energy", n_obj, population, seed=1)
+
+
+def _pymoo_algorithm(name: str) -> Any:
+    """Return a class of `pymoo.algorithms.moo` by its name."""
+    for module in pkgutil.iter_modules(pymoo.algorithms.moo.__path__):
+        try:
+            found = getattr(import_module(f"pymoo.algorithms.moo.{module.name}"), name, None)
+        except ModuleNotFoundError:
+            # One module of pymoo (kgb) needs scikit-learn, which pymoo does not ask for.
+            continue
+        if inspect.isclass(found) and issubclass(found, Algorithm):
+            return found
+    raise InvalidInput(OF_ALGORITHMS, name, f"{', '.join(ALGORITHMS)}, ElitistSwarm, {_OF_PYMOO}")
+
+
+def _imported(option: str, name: str) -> Any:
+    module_name, _, attribute = name.partition(":")
+    try:
+        module = import_module(module_name)
+    # A stranger's module may fail in any way.
+    except Exception as error:
+        allowed = f"a module that can be imported ({type(error).__name__}: {error})"
+        raise InvalidInput(option, name, allowed) from error
+    if not hasattr(module, attribute):
+        raise InvalidInput(option, name, f"a name in {module_name}, which has no {attribute!r}")
+    return getattr(module, attribute)
+
+
+def _made(option: str, name: str, make: Callable[[], Any]) -> Any:
+    try:
+        return make()
+    # pymoo raises plain exceptions for unknown names, and a stranger's code any.
+    except Exception as error:
+        allowed = f"{_OF_PYMOO}, made without further arguments ({type(error).__name__}: {error})"
+        raise InvalidInput(option, name, allowed) from error

@@ -1,0 +1,190 @@
+"""What holds of Table 7 and at which budget, in sentences computed from the scores."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from itertools import groupby
+
+import numpy as np
+
+from experiments.comparing.indicators import NAMES
+from experiments.comparing.runs import AS_PRINTED
+from experiments.paper.anytime.data import Case, Contested, Scores
+from experiments.paper.anytime.duels import COMPARED, Duel
+from experiments.paper.anytime.leads import leads_sentence, who_finds
+from experiments.paper.anytime.measures import EQUAL, RETURNED
+from experiments.paper.anytime.moments import EXACT
+from experiments.paper.anytime.readings import Reading
+from experiments.paper.anytime.tables import (
+    OURS,
+    RIVALS,
+    STATED,
+    Contest,
+    Contests,
+    drawn,
+    standing,
+    stated_place,
+)
+from experiments.runner.result import AT_EVERY_BUDGET, Finding, significant
+
+SPOKEN_OF = Contested("calibrated", EXACT, AS_PRINTED)
+"""What the first sentence of the report speaks of."""
+
+
+def advantage_findings(found: Contests) -> Iterator[Finding]:
+    """Say where AMP-MOPSO is ahead of both rivals, and how it stands at the stated setting."""
+    for contest, entries in found.items():
+        at_stated = _of_stated(entries)
+        if contest.indicator == "hypervolume" or not at_stated:
+            continue
+        word = standing(at_stated)
+        yield Finding(
+            word == "ahead of both",
+            f"On {contest.contested.model} with velocities drawn {drawn(contest.contested)}, "
+            f"{OURS} is ahead of both rivals in {NAMES[contest.indicator]} beyond chance "
+            f"{settings_ahead(entries) or 'nowhere'}; at the stated 100 x 100 it is "
+            f"{_level(word)}.",
+        )
+
+
+def _of_stated(entries: Sequence[Duel]) -> list[Duel]:
+    """Return the duels at the setting that the paper states."""
+    return [duel for duel in entries if (duel.population, duel.evaluations) == STATED]
+
+
+def settings_ahead(entries: Sequence[Duel]) -> str:
+    """Name the populations and budgets at which both rivals are beaten; empty if there are none."""
+    populations: dict[str, list[int]] = {}
+    for population, of_population in groupby(entries, key=lambda duel: duel.population):
+        ahead = [
+            (budget, all(duel.ahead == 1 for duel in of_budget))
+            for budget, of_budget in groupby(of_population, key=lambda duel: duel.evaluations)
+        ]
+        spans = [
+            [budget for budget, _ in span]
+            for is_ahead, span in groupby(ahead, key=lambda entry: entry[1])
+            if is_ahead
+        ]
+        if spans:
+            populations.setdefault(" and ".join(map(_span, spans)), []).append(population)
+    parts = [
+        f"at {words} evaluations with {_listed(sizes)}" for words, sizes in populations.items()
+    ]
+    return "; ".join(parts)
+
+
+def _listed(populations: Sequence[int]) -> str:
+    *first, last = map(str, populations)
+    return f"{', '.join(first)} or {last} particles" if first else f"{last} particles"
+
+
+def _span(budgets: Sequence[int]) -> str:
+    return f"{budgets[0]:,}" if len(budgets) == 1 else f"{budgets[0]:,} to {budgets[-1]:,}"
+
+
+def readings_findings(ranked: Sequence[Reading]) -> Iterator[Finding]:
+    """Say which reading comes closest, and how close the stated setting does."""
+    best, place = ranked[0], stated_place(ranked)
+    if place is None:
+        return
+    yield Finding(
+        (best.population, best.evaluations) == STATED,
+        f"The six printed numbers come closest with {_setting(best)}: off by a factor of "
+        f"{significant(best.factor, 2)}. At the stated 100 x 100 the closest of all readings "
+        f"is off by {significant(ranked[place].factor, 2)}, place {place + 1} of {len(ranked)}.",
+    )
+
+
+def closest_sentence(ranked: Sequence[Reading]) -> str:
+    """Say which setting comes closest to the six printed numbers, and how close the stated does."""
+    best, place = ranked[0], stated_place(ranked)
+    against = (
+        "" if place is None else f", against {significant(ranked[place].factor, 2)} at 100 x 100"
+    )
+    return (
+        f"The printed numbers come closest with {_setting(best)}: off by a factor of "
+        f"{significant(best.factor, 2)}{against}."
+    )
+
+
+def number_of_designs(scores: Scores, ranked: Sequence[Reading]) -> str:
+    """Say what the number of designs counted does to the lead in the closest reading."""
+    best = ranked[0]
+    ratios = [_lead(scores, best, counted) for counted in (RETURNED, EQUAL)]
+    if not np.all(np.isfinite(ratios)):
+        return ""
+    return (
+        f" In the first, NSGA-II's mean IGD is {significant(ratios[0], 2)} times {OURS}'s as "
+        f"sets are returned, and {significant(ratios[1], 2)} times where the archives of the "
+        f"swarms, too, count no more than {best.population} designs."
+    )
+
+
+def _lead(scores: Scores, one: Reading, counted: str) -> float:
+    """Return how many times AMP-MOPSO's mean IGD NSGA-II's is; NaN if that was not counted."""
+    means = []
+    for algorithm in ("NSGA-II", OURS):
+        case = Case(*one.contested, counted, one.population, one.evaluations, algorithm)
+        if case not in scores.values:
+            return np.nan
+        means.append(scores.of(case, f"igd_{one.scale.suffix}").mean())
+    return float(means[0] / means[1])
+
+
+def _setting(one: Reading) -> str:
+    unit = "in arcsec" if one.scale.unit == "arcsec" else one.scale.unit
+    return (
+        f"{one.population} particles after {one.evaluations:,} evaluations "
+        f"({one.contested.model}, {one.contested.moments} moments, velocities drawn "
+        f"{drawn(one.contested)}, against the {one.scale.reference}, {unit})"
+    )
+
+
+def opening(scores: Scores, found: Contests, ranked: Sequence[Reading]) -> str:
+    """Return the first sentences of the report, about the stated setting where it was run."""
+    at_stated = _of_stated(found.get(Contest(SPOKEN_OF, "igd"), []))
+    if not at_stated:
+        return f"O{leads_sentence(scores)[1:]}."
+    igd, spacing = (
+        settings_ahead(found[Contest(SPOKEN_OF, indicator)]) or "nowhere"
+        for indicator in ("igd", "spacing")
+    )
+    return (
+        f"Of the paper's Table 7, {OURS}'s advantage over both MOPSO and NSGA-II holds, on "
+        f"{SPOKEN_OF.model}, in IGD {igd}, and in Spacing {spacing}. At the stated 100 x 100 "
+        f"evaluations {_at_stated(scores, standing(at_stated))} {closest_sentence(ranked)}"
+    )
+
+
+def first_page(scores: Scores, found: Contests) -> dict[str, str]:
+    """Return what holds of Table 7, and what does not, as a part of the first page."""
+    entries = found.get(Contest(SPOKEN_OF, "igd"), [])
+    at_stated = _of_stated(entries)
+    if not at_stated:
+        return {}
+    stated = f"at the stated 100 x 100 evaluations {OURS} is {_level(standing(at_stated))}"
+    near = _near_each_other(scores)
+    return {AT_EVERY_BUDGET: f"{stated}, where {near}; {leads_sentence(scores)}"}
+
+
+def _level(word: str) -> str:
+    return "level with both" if word == "level" else word
+
+
+def _at_stated(scores: Scores, word: str) -> str:
+    if word == "ahead of both":
+        return "it holds in IGD as well."
+    return f"it does not hold: {_near_each_other(scores)}."
+
+
+def _near_each_other(scores: Scores) -> str:
+    runs = [
+        scores.of(Case(*SPOKEN_OF, RETURNED, *STATED, name), COMPARED["igd"])
+        for name in (OURS, *RIVALS)
+    ]
+    medians = [float(np.median(run)) for run in runs]
+    percent = 100.0 * (max(medians) / min(medians) - 1.0)
+    return (
+        f"{who_finds(scores, SPOKEN_OF)}, and the median IGDs lie within {significant(percent, 2)} "
+        "% of each other"
+    )

@@ -1,0 +1,135 @@
+"""What the sensors of the bench make of the motion: errors, noise, steps of the scale, averages."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from experiments.studies.blind.rig.elements import Values
+from experiments.studies.blind.rig.machine import Matrix
+from experiments.studies.blind.rig.shapes import wave
+
+
+@dataclass(frozen=True)
+class ScaleError:
+    """An error of the output encoder that repeats with its angle.
+
+    ``amplitude`` in rad, ``order`` in cycles per turn, ``phase`` in rad; ``form`` of `shapes.wave`.
+    """
+
+    amplitude: float
+    order: float
+    phase: float
+    form: float = 0.0
+
+    def at(self, angle: Values) -> Values:
+        """Return the error at angles (n,), rad."""
+        heights = np.linspace(0.0, 2.0 * np.pi, 721)
+        shape = [wave(self.form, x)[0] for x in heights]
+        turned = (self.order * angle + self.phase) % (2.0 * np.pi)
+        return self.amplitude * np.interp(turned, heights, shape)
+
+
+@dataclass(frozen=True)
+class Drift:
+    """A zero of the output encoder that runs away during the session.
+
+    ``size`` in rad and ``time`` in s; ``form`` 0 has one time constant, 1 two, 2 is hyperbolic, 3
+    begins as the root of the time, as heat that diffuses does.
+    """
+
+    size: float
+    time: float
+    form: int = 0
+
+    def at(self, clock: Values) -> Values:
+        """Return the drift at times (n,) of the session, rad."""
+        age = clock / self.time
+        if self.form == 1:
+            return -self.size * (0.6 * np.expm1(-age) + 0.4 * np.expm1(-6.0 * age))
+        if self.form == 2:
+            return self.size * age / (1.0 + age)
+        if self.form == 3:
+            return self.size * np.sqrt(age) / (1.0 + np.sqrt(age))
+        return -self.size * np.expm1(-age)
+
+
+@dataclass(frozen=True)
+class Sensors:
+    """The sensors of one bench.
+
+    Attributes
+    ----------
+    angle_noise, torsion_noise : float
+        Standard deviation of a sample of each encoder, at the output, rad; in torsion records.
+    angle_step : float
+        Of both scales, at the output, rad.
+    input_noise, output_noise : float
+        Of the torque sensors, N.m.
+    gains, zeros : tuple of float
+        Relative errors and zeros (N.m) of the torque sensors of input and output.
+    curvature : float
+        Share by which the output's torque sensor shows too much at `FULL_SCALE`.
+    scale : tuple of ScaleError
+    drift : tuple of Drift
+    """
+
+    angle_noise: float
+    torsion_noise: float
+    angle_step: float
+    input_noise: float
+    output_noise: float
+    gains: tuple[float, float] = (0.0, 0.0)
+    zeros: tuple[float, float] = (0.0, 0.0)
+    curvature: float = 0.0
+    scale: tuple[ScaleError, ...] = ()
+    drift: tuple[Drift, ...] = ()
+
+    def shown(self, seen: Matrix, clock: Values) -> Matrix:
+        """Return what the sensors would show without noise, as ``seen``.
+
+        Parameters
+        ----------
+        seen : ndarray, shape (4, n)
+            Input angle, output angle, torques of motor and load; rad and N.m.
+        clock : ndarray, shape (n,)
+            Time of the session, s.
+        """
+        shown = seen.copy()
+        for error in self.scale:
+            shown[1] += error.at(seen[1])
+        for drift in self.drift:
+            shown[1] += drift.at(clock)
+        shown[2] = (1.0 + self.gains[0]) * seen[2] + self.zeros[0]
+        shown[3] = self.load_shown(seen[3])
+        return shown
+
+    def load_shown(self, torque: Values) -> Values:
+        """Return what the torque sensor of the output shows without noise, N.m, shape (n,)."""
+        bent = torque * (1.0 + self.curvature * np.abs(torque) / FULL_SCALE)
+        return (1.0 + self.gains[1]) * bent + self.zeros[1]
+
+    def sampled(
+        self, shown: Matrix, ratio: float, averaged: int, rng: np.random.Generator
+    ) -> Matrix:
+        """Return rows with noise and rounding: each the mean of ``averaged`` raw samples."""
+        noise = np.array([self.angle_noise * ratio, self.angle_noise])
+        torque_noise = np.array([self.input_noise, self.output_noise]) / averaged**0.5
+        angles = shown[:2] + noise[:, None] * rng.standard_normal(shown[:2].shape)
+        steps = self.angle_step * np.array([[ratio], [1.0]])
+        angles = steps * np.rint(angles / steps)
+        # A sensor without steps averages the same, drawn with fewer numbers.
+        torques = rows_of(shown[2:], averaged)
+        torques = torques + torque_noise[:, None] * rng.standard_normal(torques.shape)
+        return np.vstack([rows_of(angles, averaged), torques])
+
+
+FULL_SCALE = 40.0
+"""N.m."""
+
+
+def rows_of(samples: Matrix, averaged: int) -> Matrix:
+    """Return the means of groups of samples (k, n averaged) as rows (k, n)."""
+    rows: Matrix = samples.reshape(len(samples), -1, averaged).mean(axis=2)
+    return rows

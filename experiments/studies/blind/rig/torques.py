@@ -1,0 +1,252 @@
+"""Torques of a machine beyond its linear part, compiled."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from numba import njit
+
+from experiments.studies.blind.rig import elements as el
+from experiments.studies.blind.rig.elements import Values
+from experiments.studies.blind.rig.shapes import (
+    beyond_gap,
+    bouc_wen,
+    bump,
+    copy_into,
+    decay,
+    rounded_sign,
+    wave,
+)
+
+RATED = 40.0
+"""N.m, at which friction by load with another exponent than 1 has its share."""
+LOAD = 3
+"""Place of the load's torque, N.m, behind the three torques that move the machine."""
+
+
+class Plant(NamedTuple):
+    """A machine in one record, as compiled code takes it: see `machine.Machine`.
+
+    ``speed`` (rad/s), ``start`` (rad) and ``clock`` (s) are set speed, input angle and time of the
+    session at t = 0; ``load`` is the load's torque and ``motor`` the constant of the speed loop,
+    N.m.
+    """
+
+    ratio: float
+    stiffness: float
+    damping: float
+    input_damping: float
+    output_damping: float
+    orders: Values
+    amplitudes: Values
+    phases: Values
+    offset: float
+    rows: Values
+    speed: float
+    start: float
+    clock: float
+    load: float
+    motor: float
+    load_row: int
+
+
+@njit(cache=True)
+def static_error(plant: Plant, angle: float) -> tuple[float, float]:
+    """Return theta_s, rad, and its slope over the input angle."""
+    value, slope = plant.offset, 0.0
+    for line in range(len(plant.orders)):
+        order, amplitude = plant.orders[line], plant.amplitudes[line]
+        x = order * angle + plant.phases[line]
+        value += amplitude * math.sin(x)
+        slope += amplitude * order * math.cos(x)
+    for row in plant.rows:
+        if row[0] == el.ERROR_WAVE:
+            height, rise = wave(row[4], row[2] * angle + row[3])
+            value += row[1] * height
+            slope += row[1] * row[2] * rise
+    return value, slope
+
+
+@njit(cache=True)
+def elastic_torque(
+    plant: Plant,
+    torsion: float,
+    angle: float,
+    speed: float,
+    time: float,
+    kept: Values,
+    before: Values,
+    moved: Values,
+) -> float:
+    """Return the mesh torque without damping, N.m; write states of memory to ``moved``.
+
+    ``kept`` are the states when the torsion was ``before`` (of each element, rad).
+    """
+    d, factor, further = torsion, 1.0, 0.0
+    for e in range(len(plant.rows)):
+        row = plant.rows[e]
+        if row[0] == el.PLAY:
+            height = wave(row[7], row[3] * angle + row[4])[0] if row[2] != 0.0 else 0.0
+            half_width = max(row[1] + row[2] * height * (1.0 - row[6]), 0.0)
+            d = beyond_gap(row[5], d - row[2] * height * row[6], half_width)
+        elif row[0] == el.CREEP:
+            d -= kept[e]
+    for e in range(len(plant.rows)):
+        row = plant.rows[e]
+        kind = row[0]
+        if kind > el.STIFFNESS_OF_SPEED:
+            continue
+        size = abs(d)
+        if kind == el.CUBIC:
+            further += row[1] * d**3
+        elif kind == el.SINH:
+            further += row[1] * (math.sinh(row[2] * d) / row[2] - d)
+        elif kind == el.OVERLOAD:
+            x = size - row[2]
+            pressed = 0.5 * (x + math.sqrt(x * x + row[3] * row[3]))
+            rest = 0.5 * (-row[2] + math.sqrt(row[2] * row[2] + row[3] * row[3]))
+            further += row[1] * math.copysign(pressed - rest, d)
+        elif kind == el.SOFT_ROOT:
+            further -= row[1] * d / math.sqrt(1.0 + (d / row[2]) ** 2)
+        elif kind == el.SOFT_PIECES:
+            further -= row[1] * min(max(d, -row[2]), row[2])
+        elif kind == el.SOFT_EXPONENTIAL:
+            further -= row[1] * row[2] * math.copysign(-math.expm1(-size / row[2]), d)
+        elif kind == el.SOFT_ARCTANGENT:
+            reach = 2.0 * row[2] / math.pi
+            further -= row[1] * reach * math.atan(d / reach)
+        elif kind == el.SLIP:
+            stuck = kept[e] + row[1] * (torsion - before[e])
+            moved[e] = min(max(stuck, -row[2]), row[2])
+            further += moved[e]
+        elif kind == el.BOUC_WEN:
+            moved[e] = bouc_wen(kept[e], (torsion - before[e]) / row[2], row[3], row[4])
+            further += row[1] * moved[e]
+        elif kind == el.STIFFNESS_WAVE:
+            factor += row[1] * wave(row[4], row[2] * angle + row[3])[0]
+        elif kind == el.COMPLIANCE_WAVE:
+            give = 1.0 + row[1] * math.cos(row[2] * angle + row[3])
+            factor += math.sqrt(1.0 - row[1] * row[1]) / give - 1.0
+        elif kind == el.STIFFNESS_OF_SPEED:
+            factor += row[1] * abs(speed)
+    return plant.stiffness * factor * d + further
+
+
+@njit(cache=True)
+def friction_torque(
+    plant: Plant, row: Values, speed: float, angle: float, clock: float, mean_mesh: float
+) -> float:
+    """Return the torque of an element of friction without memory, N.m, against a positive speed."""
+    kind, fast = row[0], abs(speed)
+    if kind == el.DRY:
+        return row[1] * rounded_sign(row[3], speed / row[2])
+    if kind == el.STRIBECK:
+        level = row[1] + row[2] * decay(row[4], speed / row[3])
+        return level * math.tanh(speed / row[5])
+    if kind == el.UNEVEN:
+        height = wave(row[5], row[3] * angle + row[4])[0]
+        return (row[1] + row[2] * height) * math.tanh(speed / row[6])
+    if kind == el.DRAG:
+        return row[1] * math.copysign((fast / row[2]) ** row[3], speed)
+    if kind == el.SHEAR_DRAG:
+        return row[1] * math.asinh(speed / row[2]) / math.asinh(row[3] / row[2])
+    turning = math.tanh(speed / 0.05)
+    if kind == el.LOAD_FRICTION:
+        load = math.sqrt(plant.load * plant.load + row[2] * row[2]) - row[2]
+        load = RATED * (load / RATED) ** row[3]
+        return row[1] * load / plant.ratio * turning
+    if kind == el.MESH_FRICTION:
+        return row[1] * abs(mean_mesh) / plant.ratio * turning
+    if kind == el.BURSTS:
+        return row[1] * bump(clock, row[2], row[3]) * turning
+    if kind == el.WARMING:
+        return row[1] * (1.0 + row[3] * math.expm1(-clock / row[2])) * turning
+    return 0.0
+
+
+@njit(cache=True)
+def relaxed(state: float, aim: float, share: float) -> float:
+    """Return a state that runs to an aim for ``share`` time constants."""
+    return aim + (state - aim) * math.exp(-share)
+
+
+@njit(cache=True)
+def torques(
+    plant: Plant,
+    time: float,
+    y: Values,
+    kept: Values,
+    before: Values,
+    since: float,
+    moved: Values,
+    now: Values,
+    f: Values,
+) -> float:
+    """Write torques beyond the linear part to ``f``; return the motor's further torque, N.m.
+
+    ``f`` has the torques of `machine.LinearPart` and, at `LOAD`, that of the load alone.
+
+    States of memory ``kept`` belong to positions ``before`` at time ``since``; those at this time
+    are written to ``moved`` and ``now``.
+    """
+    turned, clock = plant.start + plant.speed * time, plant.clock + time
+    angle, speed = turned + y[0], plant.speed + y[2]
+    out_angle, out_speed = turned / plant.ratio + y[1], plant.speed / plant.ratio + y[3]
+    value, slope = static_error(plant, angle)
+    d = y[0] / plant.ratio - y[1] - value
+    rate = y[2] / plant.ratio - y[3] - slope * speed
+    copy_into(moved, kept)
+    for e in range(len(now)):
+        now[e] = d
+    spring = elastic_torque(plant, d, angle, speed, time, kept, before, moved)
+    dashpot = plant.damping * rate
+    motor, on_input, on_output, load = plant.motor, 0.0, 0.0, plant.load
+    for row in plant.rows:
+        if row[0] == el.DAMPING:
+            growth = (1.0 + row[2] * abs(speed)) * (1.0 + row[3] * abs(rate))
+            dashpot += row[1] * rate * growth
+    mesh = spring + dashpot
+    for e in range(len(plant.rows)):
+        row = plant.rows[e]
+        kind = row[0]
+        if kind == el.CREEP:
+            moved[e] = relaxed(kept[e], row[1] * d, (time - since) / row[2])
+        elif kind == el.REACTION:
+            aim = slope * (spring if row[2] == 1.0 else mesh)
+            if row[3] > 0.0:
+                moved[e] = relaxed(kept[e], aim, (time - since) / row[3])
+                aim = moved[e]
+            on_input += row[1] * aim
+        elif kind == el.BRISTLES:
+            out = row[7] == el.OUTPUT
+            now[e] = out_angle if out else angle
+            w = out_speed if out else speed
+            way = now[e] - before[e]
+            moved[e] = relaxed(kept[e], math.copysign(1.0, way), abs(way) / row[4])
+            torque = (row[1] + row[2] * decay(row[5], w / row[3])) * moved[e]
+            if out:
+                on_output -= torque
+            else:
+                on_input -= torque
+        elif kind == el.RIPPLE:
+            motor += row[1] * wave(row[4], row[2] * angle + row[3])[0]
+        elif kind == el.VIBRATION:
+            load += row[1] * math.cos(row[2] * clock + row[3])
+        elif kind == el.LOAD_RIPPLE:
+            load += plant.load * row[1] * wave(row[4], row[2] * out_angle + row[3])[0]
+        elif kind >= el.DRY:
+            if kind == el.MESH_FRICTION:
+                moved[e] = relaxed(kept[e], mesh, (time - since) / row[2])
+            if row[7] == el.OUTPUT:
+                on_output -= friction_torque(plant, row, out_speed, out_angle, clock, moved[e])
+            else:
+                on_input -= friction_torque(plant, row, speed, angle, clock, moved[e])
+    linear = plant.stiffness * (y[0] / plant.ratio - y[1])
+    linear += plant.damping * (y[2] / plant.ratio - y[3])
+    f[0] = motor + on_input - (mesh - linear) / plant.ratio - plant.input_damping * plant.speed
+    f[1] = on_output + mesh - linear - plant.output_damping * plant.speed / plant.ratio
+    f[2] = 0.0
+    f[plant.load_row] -= load
+    f[LOAD] = load
+    return motor

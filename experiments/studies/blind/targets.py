@@ -1,0 +1,175 @@
+"""Rates and medians with their intervals, held against what must be reached."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from experiments.comparing.rates import Estimate, median, rate
+from experiments.studies.blind.outcome import Outcome
+from experiments.studies.blind.runs import Counts
+
+# What must be reached, as rates.
+MOST_WRONG = {
+    "single": 10 / 1000,
+    "pair": 4 / 400,
+    "triple": 1 / 100,
+    "unlisted": 2 / 200,
+    "stressed": 4 / 400,
+}
+"""Confident wrong answers among the cases of each kind."""
+MOST_WRONG_OF_PLAIN = 0.01
+"""Share of the unqualified answers that are wrong."""
+LEAST_RIGHT = 0.97
+"""Share of singles whose first name or class is right."""
+LEAST_BOTH = 0.80
+"""Share of pairs of which both effects are named, or are in a small class."""
+LEAST_TWO_OF_THREE = 0.60
+MOST_ALARMS = 6 / 300
+"""Share of false alarms where nothing is hidden, with misstated noise and faulty rows too."""
+MOST_BIAS_LEFT = 0.1
+"""Bias of the base parameters after the revision over that before it."""
+COVERED = (0.92, 0.97)
+"""Share of true values in the 95 % intervals of named effects."""
+LEAST_F1 = 0.9
+"""F1 score of the flagged cells; as in the campaign before this one."""
+LEAST_SHRINKAGE = 0.85
+"""Median shrinkage of the gap on the held-out records; as before."""
+FLOOR_MULTIPLE = 1.5
+"""Multiple of the noise floor within which a gap has closed."""
+LEAST_CLOSED = 0.70
+MOST_SECONDS = 5.5
+"""Median time of a case on one core: half of the 9 to 13 s of the workflow before."""
+WRONG = "wrong name with confidence"
+RIGHT = "first name or class right"
+BOTH = "both named, or in a class of at most three"
+TWO = "two named"
+ALARM = "alarm"
+ALARM_STRESSES = ("noise", "outliers")
+KINDS = {
+    "none": "nothing",
+    "single": "one listed effect",
+    "pair": "two listed effects",
+    "triple": "three listed effects",
+    "unlisted": "one unlisted effect",
+    "stressed": "one or nothing, under stress",
+}
+NOTHING_STRESSED = "nothing, with misstated noise or faulty rows"
+
+NOT_RUN = "Not run"
+
+
+@dataclass(frozen=True)
+class Judged:
+    """A demand and what was measured.
+
+    Attributes
+    ----------
+    what, cases : str
+    required : float
+    measured : Estimate
+    at_least : bool
+        Whether more is better.
+    """
+
+    what: str
+    cases: str
+    required: float
+    measured: Estimate
+    at_least: bool = True
+
+    @property
+    def verdict(self) -> str:
+        """One of `SCORE_STATES`, or `NOT_RUN`."""
+        if self.measured.n == 0:
+            return NOT_RUN
+        return self.measured.state(self.required, at_least=self.at_least)
+
+
+def select(outcomes: Sequence[Outcome], kind: str, name: str | None = None) -> list[Outcome]:
+    """Return the outcomes of a kind, and of one truth where it is given."""
+    of_kind = [one for one in outcomes if one.case.kind == kind]
+    return of_kind if name is None else [one for one in of_kind if one.case.truth == name]
+
+
+def share(flags: Sequence[bool]) -> Estimate:
+    """Return the share of true flags."""
+    return rate(sum(map(bool, flags)), len(flags))
+
+
+def demands(outcomes: Sequence[Outcome]) -> Iterator[Judged]:
+    """Judge everything that must be reached but the time."""
+    single, listed = select(outcomes, "single"), KINDS["single"]
+    for kind, most in MOST_WRONG.items():
+        wrong = share([one.wrong_confident for one in select(outcomes, kind)])
+        yield Judged(WRONG, KINDS[kind], most, wrong, at_least=False)
+    yield Judged(RIGHT, listed, LEAST_RIGHT, share([one.right for one in single]))
+    both = share([one.all_named for one in select(outcomes, "pair")])
+    yield Judged(BOTH, KINDS["pair"], LEAST_BOTH, both)
+    two = share([one.two_named for one in select(outcomes, "triple")])
+    yield Judged(TWO, KINDS["triple"], LEAST_TWO_OF_THREE, two)
+    for words, chosen in (
+        (KINDS["none"], select(outcomes, "none")),
+        (NOTHING_STRESSED, nothing_stressed(outcomes)),
+    ):
+        alarms = share([one.status != "adequate" for one in chosen])
+        yield Judged(ALARM, words, MOST_ALARMS, alarms, at_least=False)
+    bias = median([one.bias_ratio for one in single])
+    what = "bias left in the base over bias before, median"
+    yield Judged(what, listed, MOST_BIAS_LEFT, bias, at_least=False)
+    yield from _covered(share([flag for one in outcomes for flag in one.covered]))
+    f1 = median([one.f1 for one in single])
+    yield Judged("F1 of the flagged cells, median", listed, LEAST_F1, f1)
+    for gap in ("transmission_error", "leading"):
+        yield from _proof(gap, single)
+
+
+def pooled_demands(counts: Counts) -> Iterator[Judged]:
+    """Judge what is counted over several runs."""
+    wrong = rate(counts.plain_wrong, counts.plain)
+    yield Judged("wrong", "unqualified answers", MOST_WRONG_OF_PLAIN, wrong, at_least=False)
+    yield Judged(RIGHT, KINDS["single"], LEAST_RIGHT, rate(counts.single_right, counts.single))
+    yield Judged(BOTH, KINDS["pair"], LEAST_BOTH, rate(counts.pair_both, counts.pair))
+    two = rate(counts.triple_two, counts.triple)
+    yield Judged(TWO, KINDS["triple"], LEAST_TWO_OF_THREE, two)
+    alarms = rate(counts.clean_alarms, counts.clean)
+    yield Judged(ALARM, KINDS["none"], MOST_ALARMS, alarms, at_least=False)
+    yield from _covered(rate(counts.interval_holds, counts.interval))
+
+
+def _covered(measured: Estimate) -> Iterator[Judged]:
+    what = "95 % intervals that hold the true value"
+    for end, at_least in zip(COVERED, (True, False), strict=True):
+        yield Judged(what, "what is named", end, measured, at_least)
+
+
+def nothing_stressed(outcomes: Sequence[Outcome]) -> list[Outcome]:
+    """Return the outcomes in which only what is stated of noise or rows is wrong."""
+    return [
+        one
+        for one in select(outcomes, "stressed")
+        if one.nothing_hidden and one.case.stress in ALARM_STRESSES
+    ]
+
+
+def time_demand(outcomes: Sequence[Outcome]) -> Judged:
+    """Judge the time of all parts together."""
+    whole = median([sum(one.seconds) if one.seconds else np.inf for one in outcomes])
+    return Judged("time of a campaign, median, s", "all kinds", MOST_SECONDS, whole, at_least=False)
+
+
+_GAP_WORDS = {
+    "transmission_error": "transmission error",
+    "leading": "the channel that stands out most",
+}
+
+
+def _proof(gap: str, single: Sequence[Outcome]) -> Iterator[Judged]:
+    where, multiple = f"one listed effect, {_GAP_WORDS[gap]}", FLOOR_MULTIPLE
+    shrunk = median([one.shrinkage(gap) for one in single])
+    yield Judged("shrinkage of the held-out gap, median", where, LEAST_SHRINKAGE, shrunk)
+    closed = [one.closed(gap, multiple) for one in single if one.open_before(gap, multiple)]
+    what = f"held-out gap within {multiple:g} x the noise floor"
+    yield Judged(what, where, LEAST_CLOSED, share(closed))

@@ -1,0 +1,286 @@
+"""The cards as pages in Markdown, from the code of the problems and the stored numbers."""
+
+from __future__ import annotations
+
+import inspect
+import re
+import textwrap
+from collections.abc import Iterable
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+from pymoo.core.problem import Problem
+
+from experiments.comparing.figures import BLUE, GREY, grid
+from experiments.runner.result import Table, significant
+from experiments.studies.cards.data import Numbers, committed_numbers
+from experiments.studies.cards.experiment import LEFT_OUT, SETTING
+from experiments.studies.cards.separation import Separation, separations
+from experiments.studies.cards.tables import (
+    HARDNESS_NOTE,
+    SEPARATION_NOTE,
+    hardness_table,
+    medians_table,
+    separation_table,
+)
+from experiments.studies.contest.peers_data import MEASURES
+from experiments.studies.contest.problems import CARDS, problem_of
+from pymoo_hdte.io.text_table import csv_text
+from pymoo_hdte.problems import RobustDTEGrades, RobustDTETolerance
+from pymoo_hdte.surrogate import TruncatedNormal
+from pymoo_hdte.units import REVOLUTION_PER_MINUTE
+
+FORMULA = (
+    r"f_1(u) = \mathrm{E}\,[y(\xi)], \qquad f_2(u) = \sqrt{\mathrm{Var}\,[y(\xi)]}, \qquad "
+    r"\xi_j = u_j (1 + t s_j), \qquad s_j \sim U(-1, 1)"
+)
+FURTHER = {
+    RobustDTETolerance: r"f_3(t) = 0.05 / t",
+    RobustDTEGrades: (
+        r"\sum_j \frac{w_j}{g_j} \le c, \qquad "
+        r"\left| \frac{1}{2 \Omega_p} \sqrt{K \left( \frac{1}{J_{out}} + \frac{1}{N^2 J_{in}} "
+        r"\right)} - 1 \right| \ge m"
+    ),
+}
+"""What a class has beside the two moments: a further objective, or constraints."""
+
+_RANDOM_DESIGNS = 2000
+_FEW_DESIGNS = 200
+
+
+def write_pages(folder: Path) -> None:
+    """Write an index and, for each problem, a page, a picture of its front and a table of runs."""
+    folder.mkdir(parents=True, exist_ok=True)
+    numbers = committed_numbers()
+    for name in numbers.scores.problems:
+        stem = stem_of(name)
+        front_picture(problem_of(name)).savefig(
+            folder / f"{stem}.png", dpi=110, metadata={"Software": None}
+        )
+        (folder / f"{stem}.csv").write_text(runs_text(numbers, name), encoding="utf-8")
+        (folder / f"{stem}.md").write_text(page(numbers, name), encoding="utf-8")
+    (folder / "index.md").write_text(index_page(numbers), encoding="utf-8")
+
+
+def stem_of(name: str) -> str:
+    """Return the name of a problem's files."""
+    return name.removeprefix("RobustDTE-")
+
+
+def index_page(numbers: Numbers) -> str:
+    """Return the page that leads to all cards: which problem is hard why, and what it tells."""
+    separating = separation_table(numbers)
+    stems = "\n".join(stem_of(name) for name in numbers.scores.problems)
+    return "\n\n".join(
+        [
+            "# Problem cards",
+            "One page for each robust problem with a stored front: what it is, what makes it hard, "
+            "and how up to twelve algorithms do on it. The numbers are those of `python -m "
+            "experiments cards`, which `--full` computes anew.",
+            f"```{{toctree}}\n:maxdepth: 1\n\n{stems}\n```",
+            "## Which problems separate algorithms",
+            *(finding.sentence for finding in separating.findings),
+            SEPARATION_NOTE,
+            table_text(separating),
+            "## What makes each hard",
+            table_text(hardness_table(numbers)),
+            HARDNESS_NOTE,
+            "## How they were run",
+            SETTING,
+            LEFT_OUT,
+        ]
+    )
+
+
+def page(numbers: Numbers, name: str) -> str:
+    """Return the card of one problem."""
+    problem, stem = problem_of(name), stem_of(name)
+    medians = medians_table(numbers.scores, name)
+    parts = [
+        f"# {stem}",
+        f"`{_constructor(name)}`: {problem.n_var} variables, {problem.n_obj} objectives, "
+        f"{problem.n_ieq_constr} constraints.",
+        "## Definition",
+        f"```{{math}}\n{FORMULA}\n```",
+        *(
+            f"```{{math}}\n{text}\n```"
+            for kind, text in FURTHER.items()
+            if isinstance(problem, kind)
+        ),
+        *_limits(problem),
+        _description(problem),
+        "## What scatters",
+        _scatter(problem),
+        "## Variables",
+        _variables(problem),
+        "## Front",
+        f"![True front of {stem}, and random designs]({stem}.png)",
+        f"{len(problem.pareto_front())} points are stored; grey are allowed random designs.",
+        "## What makes it hard",
+        table_text(_of(hardness_table(numbers), name)),
+        "How these numbers are defined stands with [all cards](index).",
+        "## Algorithms",
+        _verdicts(numbers, name),
+        f"{medians.title.partition(': ')[2].capitalize()}, best IGD at the largest budget first; "
+        f"{{download}}`every run <{stem}.csv>`.",
+        table_text(medians),
+    ]
+    return "\n\n".join(parts) + "\n"
+
+
+def runs_text(numbers: Numbers, name: str) -> str:
+    """Return the CSV of all runs on a problem."""
+    scores = numbers.scores
+    row = scores.problems.index(name)
+    lines = []
+    for place in np.ndindex(*scores.spent[row].shape):
+        if scores.spent[(row, *place)]:
+            algorithm, budget, seed = place
+            key = scores.algorithms[algorithm], scores.budgets[budget], scores.seeds[seed]
+            lines.append([*key, *scores.values[: len(_SHOWN), row, *place].tolist()])
+    return csv_text(["algorithm", "evaluations", "seed", *_SHOWN], lines)
+
+
+_SHOWN = MEASURES[:4]
+"""IGD, IGD+, hypervolume, Spacing."""
+
+
+def table_text(table: Table) -> str:
+    """Return a table in Markdown, with as many digits as its columns show."""
+    head = [column.heading for column in table.columns]
+    shown = [
+        [column.show(cell) for column, cell in zip(table.columns, row, strict=True)]
+        for row in table.rows
+    ]
+    return _markdown(head, shown)
+
+
+def _markdown(head: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
+    lines = [list(head)]
+    lines += [["---"] * len(lines[0]), *map(list, rows)]
+    return "\n".join("| " + " | ".join(line) + " |" for line in lines)
+
+
+def _of(table: Table, name: str) -> Table:
+    kept = [row for row in table.rows if row[0] == name]
+    return Table(table.name, table.title, table.columns, tuple(kept))
+
+
+def _verdicts(numbers: Numbers, name: str) -> str:
+    found = [one for one in separations(numbers.scores, numbers.hardness) if one.problem == name]
+    return " ".join(map(_verdict, found))
+
+
+def _verdict(one: Separation) -> str:
+    at = f"At {one.evaluations:,} evaluations"
+    reach = f"{one.reached} of {one.algorithms} reach the front."
+    if one.separates is None:
+        return f"{at} too few algorithms ran to say whether it separates them; {reach}"
+    return (
+        f"{at} it {'separates' if one.separates else 'does not separate'} algorithms: quartiles "
+        f"of their median IGD differ {significant(one.spread, 2)} times, one algorithm's seeds "
+        f"{significant(one.scatter, 2)} times; {reach}"
+    )
+
+
+def _constructor(name: str) -> str:
+    if name not in CARDS or not name.startswith("RobustDTE-"):
+        return f"{name}()"
+    return f"robust_dte_family()[{stem_of(name)!r}]()"
+
+
+def _description(problem: Problem) -> str:
+    """Return what the class and its module say about the problem, and about its drive model."""
+    words = inspect.getdoc(type(problem)) or ""
+    parts = [words.partition("\nParameters\n")[0].strip()]
+    module = inspect.getmodule(type(problem))
+    further = (module.__doc__ or "").partition("\n\n")[2] if module else ""
+    parts.append(textwrap.dedent(further).strip())
+    model = getattr(problem, "model", None)
+    if model is not None:
+        parts.append(f"The drive model is `{model.name}`: {model.description}")
+    # Docstrings are reStructuredText, of which the footnotes stay behind.
+    body = re.sub(r" \[\d+\]_", "", "\n\n".join(part for part in parts if part))
+    return f"```{{eval-rst}}\n{body}\n```"
+
+
+def _limits(problem: Problem) -> list[str]:
+    if not isinstance(problem, RobustDTEGrades):
+        return []
+    speed = problem.process_speed / REVOLUTION_PER_MINUTE
+    shares = ", ".join(f"{share:.3f}" for share in problem.cost_shares)
+    return [
+        f"The shares of the grades in the cost are w = {shares}; c = {problem.cost_limit:g} is its "
+        f"limit, Ω_p = {speed:.0f} r/min the process speed, m = {problem.margin:g} the margin, and "
+        "N the ratio."
+    ]
+
+
+def _scatter(problem: Problem) -> str:
+    uncertainty = getattr(problem.moments, "uncertainty", None)
+    inputs = getattr(problem, "inputs", getattr(uncertainty, "inputs", ()))
+    if not inputs:
+        return "As in `RobustDTE`, with the tolerance of the design in place of 5 %."
+    names = _input_names(problem, len(inputs))
+    rows = []
+    for name, entry in zip(names, inputs, strict=True):
+        if isinstance(entry, TruncatedNormal):
+            law = f"normal, mean {entry.mean:.4g}, std {entry.std:.4g}, cut at {entry.cut:g} std"
+        else:
+            law = f"uniform within ±{100 * entry.tolerance:g} % of the design"
+        rows.append([name, law])
+    return _markdown(["input", "law (SI)"], rows)
+
+
+def _input_names(problem: Problem, n: int) -> list[str]:
+    surrogate = getattr(problem, "surrogate", None)
+    if surrogate is not None:
+        return list(surrogate.box.names)
+    return ["theta_s", *problem.var_names][:n]
+
+
+def _variables(problem: Problem) -> str:
+    rows = [
+        [name, f"{low:.4g}", f"{high:.4g}", problem.units[name]]
+        for name, low, high in zip(problem.var_names, problem.xl, problem.xu, strict=True)
+    ]
+    return _markdown(["variable", "lower", "upper", "unit"], rows)
+
+
+def front_picture(problem: Problem) -> Figure:
+    """Draw the front over random designs; a third objective as colour."""
+    figure, axes = grid(1, 1, width=6.0, height=3.8)
+    axis = axes.flat[0]
+    front = problem.pareto_front()
+    n = _RANDOM_DESIGNS if hasattr(problem, "surrogate") else _FEW_DESIGNS
+    designs = np.random.default_rng(1).uniform(problem.xl, problem.xu, (n, problem.n_var))
+    F, G = problem.evaluate(designs, return_values_of=["F", "G"])
+    F = F[np.all(G <= 0.0, axis=1)]
+    axis.plot(*F[:, :2].T, ".", color=GREY, markersize=2, label="random designs")
+    if problem.n_obj == 2:
+        axis.plot(*front.T, ".", color=BLUE, markersize=3, label="true front")
+    else:
+        points = axis.scatter(*front[:, :2].T, c=front[:, 2], s=3, cmap="viridis")
+        figure.colorbar(points, ax=axis, label=_label(problem, 2))
+    _around(axis, front[:, :2])
+    axis.set_xlabel(_label(problem, 0))
+    axis.set_ylabel(_label(problem, 1))
+    return figure
+
+
+def _around(axis: Axes, front: NDArray[np.float64]) -> None:
+    """Show the front with as much again on either side: the whole box would leave it a dot."""
+    low, high = front.min(axis=0), front.max(axis=0)
+    margin = 1.5 * (high - low)
+    axis.set_xlim(low[0] - 0.2 * margin[0], high[0] + margin[0])
+    axis.set_ylim(low[1] - 0.2 * margin[1], high[1] + margin[1])
+
+
+def _label(problem: Problem, place: int) -> str:
+    name = problem.obj_names[place]
+    unit = problem.units[name]
+    words = name.removesuffix(f"_{unit}").replace("_", " ").replace("dte", "DTE")
+    return words if unit == "1" else f"{words} [{unit}]"

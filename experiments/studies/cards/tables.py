@@ -1,0 +1,146 @@
+"""Tables of the cards, for the report and for the pages of the documentation."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from experiments.comparing.indicators import NAMES, smaller_is_better
+from experiments.comparing.paired import SIGNIFICANT
+from experiments.comparing.ranks import medians
+from experiments.comparing.rates import state_of
+from experiments.comparing.statistics import holm
+from experiments.runner.result import Cell, Column, Finding, Table, scored
+from experiments.runner.texts import paragraphs
+from experiments.studies.cards.data import Numbers
+from experiments.studies.cards.hardness import NEAR, POINTS, STARTS
+from experiments.studies.cards.separation import (
+    FEWEST,
+    LEAST_SPREAD,
+    RANDOM,
+    REACHES,
+    Separation,
+    separations,
+)
+from experiments.studies.contest.peers_data import Scores
+
+HARDNESS_NOTE, SEPARATION_NOTE = paragraphs(
+    "cards_tables",
+    starts=STARTS,
+    near=f"{NEAR[0]:g}",
+    wide=f"{NEAR[1]:g}",
+    points=POINTS,
+    random=RANDOM,
+    significant=f"{SIGNIFICANT:g}",
+    least_spread=f"{LEAST_SPREAD:g}",
+    reaches=f"{REACHES:g}",
+    fewest=FEWEST,
+)
+_SAID = {True: "yes", False: "no", None: "too few to say"}
+
+
+def hardness_table(numbers: Numbers) -> Table:
+    """Return what makes each problem hard."""
+    return Table(
+        "hardness",
+        "What makes each problem hard",
+        (
+            Column("problem"),
+            Column("local optima"),
+            Column("starts that reach the best", "%", 3),
+            Column("pieces of the front"),
+            Column("allowed designs", "%", 3),
+            *(Column(f"within {share:g} widths", "% of designs", 2) for share in NEAR),
+            Column("floor of the IGD", "", 3),
+        ),
+        tuple(
+            (
+                name,
+                one.optima,
+                _percent(one.best_reached),
+                one.pieces,
+                *(_percent(share) for share in (one.feasible, one.near, one.wide)),
+                one.floor,
+            )
+            for name, one in numbers.hardness.items()
+        ),
+        note=HARDNESS_NOTE,
+    )
+
+
+def separation_table(numbers: Numbers) -> Table:
+    """Return how far the algorithms lie apart, with a sentence on which problems separate them."""
+    found = separations(numbers.scores, numbers.hardness)
+    return Table(
+        "separation",
+        "Which problems separate algorithms",
+        (
+            Column("problem"),
+            Column("evaluations"),
+            Column("algorithms"),
+            Column("p", "", 2),
+            Column("upper by lower quartile", "times", 3),
+            Column("scatter of the seeds", "times", 3),
+            Column("reach the front"),
+            Column("separates"),
+        ),
+        tuple((*entry, _SAID[entry.separates]) for entry in found),
+        note=SEPARATION_NOTE,
+        findings=(summary(found),),
+    )
+
+
+def summary(found: list[Separation]) -> Finding:
+    """Say which problems separate algorithms at which budgets."""
+    counts, parts = [], []
+    for budget in sorted({entry.evaluations for entry in found}):
+        names = [
+            entry.problem for entry in found if entry.evaluations == budget and entry.separates
+        ]
+        counts.append(f"{len(names)} after {budget:,}")
+        if names:
+            parts.append(f"After {budget:,}: {', '.join(names)}.")
+    largest = max(entry.evaluations for entry in found)
+    last = [one for one in found if one.evaluations == largest and one.separates is not None]
+    corrected = holm([one.p for one in last])
+    separate = [bool(one.separates) for one in last]
+    shown = any(one and p <= SIGNIFICANT for one, p in zip(separate, corrected, strict=True))
+    return scored(
+        state_of(any(separate), shown=shown),
+        f"Robust problems that separate the algorithms: {', '.join(counts)} evaluations; at least "
+        f"one is wanted at the largest budget, with p after Holm over the {len(last)} problems "
+        f"there. {' '.join(parts)}".rstrip(),
+        answers=True,
+    )
+
+
+def medians_table(scores: Scores, problem: str) -> Table:
+    """Return the medians of every algorithm at every budget on one problem, best IGD first."""
+    row = scores.problems.index(problem)
+    ran = scores.spent[row].min(axis=-1) > 0
+    budgets = [place for place in range(len(scores.budgets)) if ran[:, place].any()]
+    columns = [Column("algorithm")]
+    cells: list[list[Cell]] = [[name] for name in scores.algorithms]
+    order = np.zeros(len(cells))
+    for place in budgets:
+        for indicator, name in NAMES.items():
+            better = smaller_is_better(indicator)
+            values = scores.of(indicator, scores.budgets[place])[row][None]
+            middle = medians(values, smaller_is_better=better)[0]
+            group = f"{scores.budgets[place]:,} evaluations"
+            columns.append(Column(name, "", 3, group))
+            for line, value, took_part in zip(cells, middle, ran[:, place], strict=True):
+                line.append(float(value) if took_part else None)
+            if indicator == "igd":
+                order = np.where(ran[:, place], middle, np.inf)
+    rows = [cells[i] for i in np.argsort(order, kind="stable") if ran[i].any()]
+    return Table(
+        f"medians_{problem}",
+        f"{problem}: medians of {len(scores.seeds)} seeds",
+        tuple(columns),
+        tuple(tuple(line) for line in rows),
+        folded=True,
+    )
+
+
+def _percent(share: float | None) -> Cell:
+    return None if share is None else 100.0 * share

@@ -1,0 +1,195 @@
+"""What is known of measured rigs from elsewhere, and how an answer is held against it.
+
+An answer is *right* if it is plain and names every effect that is known and none that is not;
+*partly right* if it names the main effect, but not all or more, or says itself that it is not all;
+*confidently wrong* if it is plain and does not name the main effect; *wrong* otherwise.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+RIGHT, PARTLY, WRONG, CONFIDENT = "right", "partly right", "wrong", "confidently wrong"
+UNKNOWN = "no answer known"
+FALLS_SHORT = (CONFIDENT, WRONG, PARTLY, UNKNOWN, RIGHT)
+"""Judgements, what falls short first."""
+PLAIN = ("named", "adequate", "parameter")
+"""Statuses of an answer without a reservation."""
+_DRY = frozenset({"coulomb_friction", "stribeck_friction"})
+_RIPPLE = frozenset({"torque_ripple", "kinematic_error", "position_dependent_friction"})
+
+
+@dataclass(frozen=True)
+class Friction:
+    """A known curve of friction: dry + viscous speed + root speed^(1/3), N.m; speed in rad/s."""
+
+    dry: float
+    viscous: float
+    root: float = 0.0
+
+    def at(self, speed: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the friction at speeds (n,) above 0."""
+        return self.dry + self.viscous * speed + self.root * np.cbrt(speed)
+
+
+@dataclass(frozen=True)
+class KnownRig:
+    """A rig of ``data/<name>.toml`` and what is known of it.
+
+    Attributes
+    ----------
+    name : str
+    folder : str
+        With its records, in `experiments.studies.measured.rigs.MEASURED`.
+    answer : str
+        What is missing in the believed model, in words.
+    source : str
+        Who says so.
+    effects : tuple of frozenset of str
+        Effects that are missing, the main one first; any of a set counts as that effect.
+    also : frozenset of str
+        Further effects that are plausible there, and that no published answer excludes.
+    values : dict of str to float
+        Known values by effect and quantity, SI.
+    friction : Friction or None
+        Known curve of the friction.
+    order : float or None
+        Cycles of a ripple per turn of the joint, known within ``reach``: of the resolution of the
+        travel, and of whether the ripple turns with the housing or with the output, which is off by
+        the ripple's cycles per input turn.
+    reach : float
+    """
+
+    name: str
+    folder: str
+    answer: str
+    source: str
+    effects: tuple[frozenset[str], ...] = ()
+    also: frozenset[str] = frozenset()
+    values: tuple[tuple[str, float], ...] = ()
+    friction: Friction | None = None
+    order: float | None = None
+    reach: float = 0.0
+
+
+def judged(rig: KnownRig, status: str, names: Collection[str]) -> str:
+    """Return the judgement on an answer.
+
+    Parameters
+    ----------
+    rig : KnownRig
+    status : str
+        Of a verdict; ``"named"`` for a tool that has no doubts.
+    names : collection of str
+        Effects that it names.
+    """
+    if not rig.effects:
+        return UNKNOWN
+    main = bool(rig.effects[0] & set(names))
+    every = all(one & set(names) for one in rig.effects)
+    known = frozenset().union(*rig.effects, rig.also)
+    if main:
+        return RIGHT if every and known >= set(names) and status in PLAIN else PARTLY
+    return CONFIDENT if status in (*PLAIN, "class") else WRONG
+
+
+def beside(rig: KnownRig, names: Collection[str]) -> list[str]:
+    """Return which names are no part of the known answer, and only allowed beside it."""
+    known = frozenset().union(*rig.effects)
+    return [name for name in names if name in rig.also and name not in known]
+
+
+_UR10E = "identification in shamilmamedov/dynamic_calibration, and least squares of our own"
+KNOWN_RIGS = (
+    KnownRig(
+        "ur10e_joint_1",
+        "ur10e",
+        "dry friction; ripple twice per input turn (202 per joint turn)",
+        _UR10E,
+        (_DRY | {"nonlinear_drag"}, _RIPPLE),
+        # A term that grows more slowly than the speed fits better than a viscous one.
+        frozenset({"nonlinear_drag"}),
+        friction=Friction(5.6, 11.8, 17.5),
+        order=202.0,
+        reach=2.0 + 2.0,
+    ),
+    KnownRig(
+        "ur10e_joint_4",
+        "ur10e",
+        "gravity 3.0 N.m; Coulomb friction 2.3 N.m; ripple twice per input turn",
+        _UR10E,
+        (frozenset({"gravity"}), _DRY, _RIPPLE),
+        values=(("gravity: torque", 3.0), ("coulomb_friction: level", 2.3)),
+        order=202.0,
+        reach=2.0 + 2.0,
+    ),
+    KnownRig(
+        "ur10e_joint_6",
+        "ur10e",
+        "Coulomb friction 2.30 N.m; ripple four times per input turn (404 per joint turn)",
+        _UR10E,
+        (_DRY, _RIPPLE),
+        values=(("coulomb_friction: level", 2.30),),
+        order=404.0,
+        reach=3.7 + 4.0,
+    ),
+    KnownRig(
+        "tx40_joint_4",
+        "tx40_j4",
+        "Coulomb friction 2.48 N.m beside viscous friction 1.11 N.m.s/rad",
+        "thanhndv212/figaroh-examples",
+        (_DRY,),
+        _RIPPLE | {"force_offset"},
+        friction=Friction(2.48, 1.11),
+    ),
+    KnownRig(
+        "silverbox",
+        "silverbox",
+        "a cubic spring that hardens, 3.76 to 3.9",
+        "band-limited least squares, R2 of the force .9997 on the arrow",
+        (frozenset({"hardening_stiffness"}),),
+        # The circuit is known to have an offset.
+        frozenset({"force_offset"}),
+        (("hardening_stiffness: coefficient", 3.83),),
+    ),
+    KnownRig(
+        "bouc_wen",
+        "bouc_wen",
+        "hysteresis of Bouc and Wen",
+        "simulated with the parameters of the public benchmark",
+        (frozenset({"hysteresis"}),),
+        # With gamma + delta below 0 a loop that is loaded stiffens, unlike springs that slip.
+        frozenset({"hardening_stiffness"}),
+    ),
+    KnownRig(
+        "emps",
+        "emps",
+        "Coulomb friction 20.39 N; friction differs with the direction, or there is an offset",
+        "Janot, Gautier, Brunot (2019)",
+        (_DRY, frozenset({"direction_dependent_friction", "force_offset"})),
+        values=(
+            ("coulomb_friction: level", 20.39),
+            ("inertia of position", 95.109),
+            ("damping of joint", 203.5),
+        ),
+    ),
+    KnownRig(
+        "kinova",
+        "kinova_gen3_j7",
+        "dry friction with a Stribeck dip; ripple at 200 and 400 per joint turn",
+        "means and lines of the ten runs; HBRS-SDP/joint-friction-model",
+        (_DRY, _RIPPLE),
+        order=200.0,
+        reach=1.0,
+    ),
+    KnownRig(
+        "lara8_joint_3",
+        "lara8_j3",
+        "none published, of torques or torsion",
+        "allwinlucious/MasterThesis",
+    ),
+)

@@ -1,0 +1,156 @@
+"""What the workflow says of fourteen rigs whose truth it has never been told.
+
+Without ``--full`` the table is the committed one, ``experiments/data/sealed_rigs.csv``; with it the
+campaigns in ``../shared/rig`` are analysed and both files left in the results folder.
+"""
+
+from __future__ import annotations
+
+import time
+from collections import Counter
+from collections.abc import Sequence
+from pathlib import Path
+
+from tqdm import tqdm
+
+from experiments.runner.committed import (
+    committed_file,
+    read_rows,
+    stored_outcome,
+    table_with_origin,
+)
+from experiments.runner.registry import Context
+from experiments.runner.result import Cell, Column, Result, Table
+from experiments.runner.store import TIMES, write_atomically
+from experiments.runner.texts import paragraphs
+from experiments.studies.measured.rigs import MEASURED
+from pymoo_hdte.discrepancy import DriveAnalysis, analyse, read_campaign
+from pymoo_hdte.discrepancy.engine.candidate import Candidate
+from pymoo_hdte.discrepancy.report.tables import STATUSES as SHOWN
+from pymoo_hdte.effects.sentence_blanks import in_words
+from pymoo_hdte.io.text_table import csv_text
+
+NAME = "sealed_rigs"
+RIGS = MEASURED.parent / "rig"
+"""Folder of the campaigns, which are not part of the project."""
+COLUMNS = (
+    Column("rig"),
+    Column("status"),
+    Column("effects"),
+    Column("or"),
+    Column("doubts"),
+    Column("before", digits=4, group="chi-square per degree of freedom"),
+    Column("after", digits=4, group="chi-square per degree of freedom"),
+    Column("before", "noise", 4, "held-out gap"),
+    Column("after", "noise", 4, "held-out gap"),
+    Column("before", '"', 3, "transmission error held out"),
+    Column("after", '"', 3, "transmission error held out"),
+    Column("noise", '"', 3, "transmission error held out"),
+)
+SECONDS = (
+    Column("rig"),
+    *(Column(part, "s", 3, "CPU time") for part in ("verdict", "proof")),
+)
+SETTING, NOTE = paragraphs("sealed_rigs")
+
+Rows = list[list[str]]
+_WORDS = 5
+"""Columns of a verdict before its numbers."""
+
+
+def run(context: Context) -> Result:
+    """Analyse the rigs, or read what was found, and show it."""
+    if context.full and not RIGS.is_dir():
+        sentence = f"Skipped: there are no campaigns in {RIGS}."
+        return Result("Verdicts on sealed rigs", context.command(NAME), sentence)
+    if context.full:
+        found, seconds = _analysed(context)
+    else:
+        found, seconds = (_committed(name) for name in (f"{NAME}.csv", f"{NAME}_seconds.csv"))
+    return Result(
+        title="Verdicts on sealed rigs",
+        command=context.command(NAME),
+        answer=_counted([row[1] for row in found]),
+        paragraphs=(*stored_outcome(context, NAME), SETTING),
+        tables=(
+            Table(
+                "verdicts", "What is said to be missing", COLUMNS, _cells(_told(found)), note=NOTE
+            ),
+            Table("seconds", "CPU time", SECONDS, _cells(seconds), wall_times=True),
+        ),
+    )
+
+
+def _counted(statuses: Sequence[str]) -> str:
+    """Say how many rigs end with each status."""
+    counts = Counter(statuses).most_common()
+    told = ", ".join(f"{SHOWN[one]} in {n}" for one, n in counts)
+    return f"Verdicts on {len(statuses)} rigs: {told}."
+
+
+def verdict_row(name: str, analysis: DriveAnalysis) -> list[str]:
+    """Return what is said of a rig, in the order of `COLUMNS`."""
+    verdict, proof = analysis.verdict, analysis.prove()
+    accepted = verdict.accepted
+    effects = "" if accepted is verdict.base else _labels(accepted.candidates)
+    rivals = " or ".join(_labels(one.candidates) for one in verdict.equivalent)
+    fits = [one.chi_square / verdict.degrees_of_freedom for one in (verdict.base, accepted)]
+    words = [name, verdict.status, effects, rivals, "; ".join(verdict.doubts)]
+    gaps = [float("nan")] * 5
+    if proof is not None:
+        error = proof.channels["transmission_error"]
+        gaps = [proof.overall.before, proof.overall.after]
+        gaps += [error.before, error.after, error.noise_floor]
+    return [*words, *(f"{one:.5g}" for one in (*fits, *gaps))]
+
+
+def _labels(candidates: Sequence[Candidate]) -> str:
+    return " + ".join(one.label for one in candidates)
+
+
+def _analysed(context: Context) -> tuple[Rows, Rows]:
+    found, seconds = [], []
+    for folder in tqdm(sorted(RIGS.glob("rig-*")), desc="sealed rigs", leave=False):
+        started = time.process_time()
+        analysis = analyse(read_campaign(folder))
+        judged = time.process_time()
+        found.append(verdict_row(folder.name, analysis))
+        ended = time.process_time()
+        seconds.append([folder.name, f"{judged - started:.3g}", f"{ended - judged:.3g}"])
+    texts = table_with_origin(_headings(COLUMNS), found), csv_text(_headings(SECONDS), seconds)
+    write_atomically(context.out / NAME / f"{NAME}.csv", texts[0].encode())
+    write_atomically(context.out / TIMES / NAME / f"{NAME}_seconds.csv", texts[1].encode())
+    return found, seconds
+
+
+def _headings(columns: Sequence[Column]) -> list[str]:
+    return [column.heading for column in columns]
+
+
+def _committed(name: str) -> Rows:
+    path: Path = committed_file(name, NAME)
+    return [list(row.values()) for row in read_rows(path)]
+
+
+def _told(rows: Rows) -> Rows:
+    """Return the rows of verdicts with statuses and labels in words."""
+    return [
+        [
+            row[0],
+            SHOWN[row[1]],
+            *(in_words(text).replace("_", " ") for text in row[2:_WORDS]),
+            *row[_WORDS:],
+        ]
+        for row in rows
+    ]
+
+
+def _cells(rows: Rows) -> tuple[tuple[Cell, ...], ...]:
+    return tuple(tuple(_cell(text) for text in row) for row in rows)
+
+
+def _cell(text: str) -> Cell:
+    try:
+        return float(text)
+    except ValueError:
+        return text

@@ -1,0 +1,164 @@
+"""Curves and stops of all functions: computed, and as the two CSV files that the repo keeps."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from experiments.runner.campaign import Run
+from experiments.runner.committed import committed_file, read_rows, table_with_origin
+from experiments.runner.registry import Context, require
+from experiments.runner.store import write_atomically
+from experiments.studies.robust.functions import FUNCTIONS
+from experiments.studies.robust.job import ACCURACY, BUDGET, METHODS, OURS, STEP, Curve, Grown
+from experiments.studies.robust.rivals import CHAOSPY_WAYS, Step, runs_needed
+
+NAME = "robust"
+STOPS = f"{NAME}_stops"
+SEEDS = (1, 2, 3)
+FURTHER = 3
+"""Others are tried up to so many times the runs that ours needs, and at most `BUDGET`."""
+QUICK_BUDGET = 60
+QUICK_FUNCTIONS = ("Ishigami", "kink")
+CURVE_COLUMNS = ("function", "method", "way", "runs", "error_at_designs", "error_overall")
+STOP_NUMBERS = (
+    "runs",
+    "spent",
+    "covered_mean",
+    "covered_std",
+    "true_mean_error",
+    "true_std_error",
+    "stated_mean_error",
+    "stated_std_error",
+)
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What was found.
+
+    Attributes
+    ----------
+    curves : dict of list of tuple
+        By function, method and way: runs and both errors.
+    stops : dict of dict
+        By function and seed: the numbers of `STOP_NUMBERS`.
+    """
+
+    curves: dict[tuple[str, str, str], list[Step]]
+    stops: dict[tuple[str, int], dict[str, float]]
+
+    def functions(self) -> list[str]:
+        """Names of the functions, in the order of `FUNCTIONS`."""
+        found = {function for function, _, _ in self.curves}
+        return [one.name for one in FUNCTIONS if one.name in found]
+
+    def needed(self, function: str, method: str, column: int = 1) -> int | None:
+        """Return the least runs that a method needs by its best way, None if above the budget."""
+        counts = [
+            runs_needed(steps, ACCURACY, column)
+            for (name, who, _), steps in self.curves.items()
+            if (name, who) == (function, method)
+        ]
+        return min((one for one in counts if one is not None), default=None)
+
+    def tried(self, function: str, method: str) -> int:
+        """Return the most runs that a method was given on a function; 0 if it was not run."""
+        runs = [
+            step[0]
+            for key, steps in self.curves.items()
+            if key[:2] == (function, method)
+            for step in steps
+        ]
+        return max(runs, default=0)
+
+
+def outcome_for(context: Context) -> Outcome:
+    """Return the committed outcome, or that of a full or quick run, which leaves its files."""
+    if not (context.full or context.quick):
+        return read_outcome(*(committed_file(f"{name}.csv", NAME) for name in (NAME, STOPS)))
+    require("openturns", "uq")
+    require("sklearn", "uq")
+    names = [one.name for one in FUNCTIONS] if context.full else QUICK_FUNCTIONS
+    budget, seeds = (BUDGET, SEEDS) if context.full else (QUICK_BUDGET, SEEDS[:1])
+    # The curve is that of the first seed.
+    ours = [Grown(name, seed, seed == seeds[0], budget) for name in names for seed in seeds]
+    grown = dict(zip(ours, context.campaign.run(ours, "ours"), strict=True))
+    needed = gathered(grown, {}).needed
+    rivals = [
+        Curve(name, method, min(budget, FURTHER * (needed(name, OURS) or budget)))
+        for name in names
+        for method in METHODS
+        if method != OURS
+    ]
+    found = gathered(grown, dict(zip(rivals, context.campaign.run(rivals, "rivals"), strict=True)))
+    for name, text in ((NAME, curves_text(found)), (STOPS, stops_text(found))):
+        write_atomically(context.out / NAME / f"{name}.csv", text.encode())
+    return found
+
+
+def gathered(grown: dict[Grown, Run], rivals: dict[Curve, Run]) -> Outcome:
+    """Return the outcome of finished jobs."""
+    curves: dict[tuple[str, str, str], list[Step]] = {}
+    stops = {}
+    for growth, run in grown.items():
+        if growth.whole_curve:
+            steps = run.values[:, : len(STEP)].tolist()
+            curves[growth.function, OURS, OURS] = [(int(n), one, all_) for n, one, all_ in steps]
+        numbers = run.values[0, len(STEP) :].tolist()
+        stops[growth.function, growth.seed] = dict(zip(STOP_NUMBERS, numbers, strict=True))
+    for job, run in rivals.items():
+        names = ways_of(job.method)
+        for way, runs, *errors in run.values.tolist():
+            key = job.function, job.method, names[int(way)]
+            curves.setdefault(key, []).append((int(runs), errors[0], errors[1]))
+    return Outcome(curves, stops)
+
+
+def ways_of(method: str) -> Sequence[str]:
+    """Return the names of a method's ways."""
+    return CHAOSPY_WAYS if method == "chaospy" else (method,)
+
+
+def curves_text(outcome: Outcome) -> str:
+    """Return the CSV text of the curves, with date and versions in a first comment line."""
+    rows = (
+        [*key, runs, f"{at_designs:.4g}", f"{overall:.4g}"]
+        for key, steps in outcome.curves.items()
+        for runs, at_designs, overall in steps
+    )
+    return table_with_origin(CURVE_COLUMNS, rows)
+
+
+def stops_text(outcome: Outcome) -> str:
+    """Return the CSV text of the stops."""
+    rows: Iterable[list[object]] = (
+        [*key, *(f"{numbers[name]:.4g}" for name in STOP_NUMBERS)]
+        for key, numbers in outcome.stops.items()
+    )
+    return table_with_origin(["function", "seed", *STOP_NUMBERS], rows)
+
+
+def read_outcome(curves: Path, stops: Path) -> Outcome:
+    """Read what `curves_text` and `stops_text` wrote."""
+    by_way: dict[tuple[str, str, str], list[Step]] = {}
+    for row in read_rows(curves):
+        step = int(row["runs"]), float(row["error_at_designs"]), float(row["error_overall"])
+        by_way.setdefault((row["function"], row["method"], row["way"]), []).append(step)
+    numbers = {
+        (row["function"], int(row["seed"])): {name: float(row[name]) for name in STOP_NUMBERS}
+        for row in read_rows(stops)
+    }
+    return Outcome(by_way, numbers)
+
+
+def ahead(outcome: Outcome, function: str) -> bool:
+    """Whether ours needs fewer runs than every rival, and than those it was tried with in vain."""
+    ours = outcome.needed(function, OURS)
+    rivals = [
+        outcome.needed(function, method) or outcome.tried(function, method)
+        for method in METHODS
+        if method != OURS
+    ]
+    return ours is not None and all(ours < one for one in rivals)

@@ -1,0 +1,169 @@
+"""What came out on bbob-biobj: shares of targets beside published ones, and duels."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from experiments.comparing.rivals import RivalTest, holm_against
+from experiments.runner.result import Cell, Column, Table
+from experiments.studies.suites.bbob.published import curves
+from experiments.studies.suites.data import Outcome
+from experiments.studies.suites.peers import BBOB_PEERS, ON_BBOB, OURS
+from experiments.studies.suites.protocol import BESIDE_PEERS, BUDGETS, DIMENSIONS
+
+
+def reached_shares(outcome: Outcome, dimension: int, evaluations: int) -> list[float]:
+    """Return the share of our swarm after so many evaluations on each function that was run.
+
+    It moves alike whatever its budget, so that its longest runs tell of shorter ones. Only the
+    held-out instance counts.
+    """
+    where = dimension, OURS, BUDGETS[-1], BESIDE_PEERS
+    return [
+        shares[evaluations]
+        for run, shares in outcome.bbob.items()
+        if (run.dimension, run.algorithm, run.told, run.instance) == where and evaluations in shares
+    ]
+
+
+def reached(outcome: Outcome, dimension: int, evaluations: int) -> float | None:
+    """Return the mean of `reached_shares`; None if it was not run."""
+    found = reached_shares(outcome, dimension, evaluations)
+    return float(np.mean(found)) if found else None
+
+
+class Duel(NamedTuple):
+    """Our swarm beside a rival on the problems that both ran; mean shares and the test."""
+
+    rival: str
+    evaluations: int
+    problems: int
+    ours: float
+    theirs: float
+    test: RivalTest
+
+
+def duels(
+    outcome: Outcome,
+    evaluations: int,
+    rivals: Iterable[str] = tuple(BBOB_PEERS),
+    control: str = OURS,
+) -> list[Duel]:
+    """Return the duels after so many evaluations, p corrected over the rivals that ran.
+
+    Ours and a rival that move alike whatever their budget may have been told more.
+    """
+    found = []
+    for rival in rivals:
+        pairs = _pairs(outcome, control, rival, evaluations)
+        if rival != control and len(pairs):
+            found.append((rival, pairs))
+    # Each rival has problems of its own: its differences are padded with problems without any.
+    most = max((len(pairs) for _, pairs in found), default=0)
+    values = np.zeros((most, 1 + len(found)))
+    for column, (_, pairs) in enumerate(found, start=1):
+        values[: len(pairs), column] = pairs[:, 1] - pairs[:, 0]
+    if not found:
+        return []
+    names = [control, *(rival for rival, _ in found)]
+    tests = holm_against(control, names, values, smaller_is_better=False)
+    return [
+        Duel(
+            rival,
+            evaluations,
+            len(pairs),
+            float(pairs[:, 0].mean()),
+            float(pairs[:, 1].mean()),
+            test,
+        )
+        for (rival, pairs), test in zip(found, tests, strict=True)
+    ]
+
+
+def _pairs(outcome: Outcome, control: str, rival: str, evaluations: int) -> NDArray[np.float64]:
+    """Return our share and the rival's on the problems that both ran, shape (problems, 2)."""
+    ours = {
+        (run.dimension, run.function, run.instance, run.seed): shares[evaluations]
+        for run, shares in outcome.bbob.items()
+        if run.algorithm == control and evaluations in shares
+    }
+    anew = ON_BBOB[rival].starts_anew
+    pairs = []
+    for run, shares in outcome.bbob.items():
+        place = run.dimension, run.function, run.instance, run.seed
+        fits = run.told == evaluations or (not anew and evaluations in shares)
+        if run.algorithm == rival and fits and place in ours:
+            pairs.append((ours[place], shares[evaluations]))
+    return np.array(pairs).reshape(-1, 2)
+
+
+def shares_table(outcome: Outcome) -> Table:
+    """Mean shares of targets by dimension and evaluations, ours before the published ones."""
+    rows: list[tuple[Cell, ...]] = []
+    for dimension in DIMENSIONS:
+        for algorithm, budget in told_most(outcome, dimension):
+            shares = outcome.shares(dimension, algorithm, budget)
+            where = f"here{_extent(outcome, dimension, algorithm, budget)}"
+            rows.append((algorithm, dimension, where, *(shares.get(one) for one in BUDGETS)))
+        for name, curve in curves(dimension).items():
+            rows.append((name, dimension, "published", *(curve.get(one) for one in BUDGETS)))
+    return Table(
+        "shares",
+        "bbob-biobj, held out: share of COCO's 58 targets reached, every evaluation counted",
+        (
+            *(Column("algorithm"), Column("dimension"), Column("from")),
+            *(Column(f"{budget:,}", "", 3, "evaluations") for budget in BUDGETS),
+        ),
+        tuple(rows),
+        note="On all 55 functions where it does not say otherwise, one run each; published are "
+        "averages over all functions and instances, read from pictures to some .01.",
+    )
+
+
+def told_most(outcome: Outcome, dimension: int) -> list[tuple[str, int]]:
+    """Return which peers ran in a dimension, each with its largest budget."""
+    ran = {(run.algorithm, run.told) for run in outcome.bbob if run.dimension == dimension}
+    largest = {name: max(told for one, told in ran if one == name) for name, _ in ran}
+    return [(name, largest[name]) for name in BBOB_PEERS if name in largest]
+
+
+def _extent(outcome: Outcome, dimension: int, algorithm: str, told: int) -> str:
+    """Say on which instances an algorithm ran, and on how many functions if not on all."""
+    ran = [
+        run
+        for run in outcome.bbob
+        if (run.dimension, run.algorithm, run.told) == (dimension, algorithm, told)
+    ]
+    functions = {run.function for run in ran}
+    instances = sorted({run.instance for run in ran})
+    said = [f"{len(functions)} functions"] if len(functions) < 55 else []
+    said.append(f"instance {' and '.join(map(str, instances))}")
+    return f" ({', '.join(said)})"
+
+
+def duels_table(outcome: Outcome) -> Table:
+    """Our swarm beside others that ran here, problem by problem."""
+    rows = [
+        (
+            *(duel.rival, duel.evaluations, duel.problems, duel.ours, duel.theirs),
+            *(duel.test.better, duel.test.worse, duel.test.p),
+        )
+        for budget in BUDGETS
+        for duel in duels(outcome, budget)
+    ]
+    return Table(
+        "bbob_duels",
+        f"bbob-biobj, held out: {OURS} beside others on the same problems",
+        (
+            *(Column("rival"), Column("evaluations"), Column("problems")),
+            *(Column(name, "", 3, "mean share") for name in ("ours", "theirs")),
+            *(Column("better"), Column("worse"), Column("p", digits=2)),
+        ),
+        tuple(rows),
+        note="Better and worse count problems; p is Wilcoxon's over them, after Holm over the "
+        "rivals of a row's budget.",
+    )

@@ -1,0 +1,124 @@
+"""Who takes part, by name: those of ``peers``, the compact swarm, and four more."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import cache, partial
+
+import numpy as np
+from numpy.typing import NDArray
+from pymoo.algorithms.moo.ctaea import CTAEA
+from pymoo.core.algorithm import Algorithm
+from pymoo.core.problem import Problem
+from pymoo.util.ref_dirs import get_reference_directions
+
+from experiments.comparing.contestants import CONTESTANTS, Contestant, of_jmetal
+from experiments.comparing.indicators import front_among
+from experiments.comparing.offers import POPULATION, Offer
+from experiments.comparing.peers_pymoo import OWN, PYMOO, run_pymoo
+from experiments.studies.suites.bbob.coco import StartBox
+from experiments.studies.suites.reduced import LESS
+from pymoo_hdte.algorithms import CompactSwarm
+
+OURS = "CompactSwarm"
+
+KERNELS = 10
+"""Of COMO-CMA-ES, each a CMA-ES of its own."""
+STEP = 0.2
+"""First step size, as a part of the box in which first positions are drawn."""
+
+
+@cache
+def _directions(n_obj: int) -> NDArray[np.float64]:
+    return get_reference_directions("energy", n_obj, POPULATION, seed=1)
+
+
+def _como(problem: Problem, budgets: Sequence[int], seed: int) -> list[Offer]:
+    """Run several CMA-ES that share the hypervolume; return the front of all points evaluated.
+
+    It needs to be told a point that bounds the hypervolume: ``problem.reference`` (2,), the corner
+    to which the experiment measures, which no other algorithm here knows.
+    """
+    # Imported where it is used, because the extra may be absent.
+    import comocma
+
+    # Kernels draw from numpy's global generator; nothing else in this process uses it.
+    np.random.seed(seed)  # noqa: NPY002
+    low, high = problem.start
+    bounds = [problem.xl.tolist(), problem.xu.tolist()]
+    options = {"bounds": bounds, "verbose": -9, "seed": np.nan, "CMA_stds": high - low}
+    places = [np.random.uniform(low, high) for _ in range(KERNELS)]  # noqa: NPY002
+    kernels = comocma.get_cmas(places, STEP, inopts=options)
+    optimiser = comocma.Sofomore(kernels, reference_point=list(problem.reference))
+    found, spent, offers = [np.empty((0, 2))], 0, []
+    asked = optimiser.ask()
+    for budget in budgets:
+        while spent + len(asked) <= budget and not optimiser.stop():
+            F = problem.evaluate(np.array(asked), return_values_of=["F"])
+            found.append(F)
+            spent += len(asked)
+            optimiser.tell(asked, F.tolist())
+            asked = optimiser.ask()
+        found = [front_among(np.concatenate(found))]
+        offers.append(Offer(found[0], spent))
+    return offers
+
+
+MADE: dict[str, Callable[[Problem], Algorithm]] = {
+    OURS: lambda _: CompactSwarm(),
+    **{name: make for name, (make, _) in OWN.items()},
+    **PYMOO,
+    "C-TAEA": lambda problem: CTAEA(_directions(problem.n_obj)),
+}
+"""Those that come with pymoo's interface, which can be told where to start."""
+
+
+def _started(make: Callable[[Problem], Algorithm], problem: Problem) -> Algorithm:
+    """Make an algorithm that starts in the box ``start`` of the problem."""
+    algorithm = make(problem)
+    algorithm.initialization.sampling = StartBox()
+    return algorithm
+
+
+PEERS: dict[str, Contestant] = {
+    OURS: Contestant("pymoo_hdte", partial(run_pymoo, MADE[OURS]), starts_anew=True),
+    **CONTESTANTS,
+    "GDE3": Contestant("jmetal", of_jmetal("GDE3")),
+    "MOEA/D-DE": Contestant("jmetal", of_jmetal("MOEA/D-DE"), takes_constraints=False),
+    "COMO-CMA-ES": Contestant("comocma", _como, takes_constraints=False, two_objectives_only=True),
+    "C-TAEA": Contestant("pymoo", partial(run_pymoo, MADE["C-TAEA"])),
+}
+"""On problems whose first positions may lie anywhere in the box.
+
+Ours starts anew for each budget, because its size follows from that where there are constraints;
+without them the shorter run is the beginning of the longer one.
+"""
+
+BBOB_PEERS: dict[str, Contestant] = {
+    name: Contestant(
+        PEERS[name].library,
+        partial(run_pymoo, partial(_started, make)),
+        starts_anew=PEERS[name].starts_anew and name != OURS,
+    )
+    for name, make in MADE.items()
+} | {"COMO-CMA-ES": PEERS["COMO-CMA-ES"]}
+"""On bbob-biobj, where first positions lie in a part of the box: those that can be told so."""
+
+ON_BBOB: dict[str, Contestant] = BBOB_PEERS | {
+    name: Contestant("pymoo_hdte", partial(run_pymoo, partial(_started, make)))
+    for name, make in LESS.items()
+}
+"""Peers on bbob-biobj, and our swarm with a part left out."""
+ON_SUITES: dict[str, Contestant] = PEERS | {
+    name: Contestant("pymoo_hdte", partial(run_pymoo, make), starts_anew=True)
+    for name, make in LESS.items()
+}
+"""The same on the other suites."""
+
+
+def takes(algorithm: str, problem: Problem) -> bool:
+    """Say whether an algorithm takes the problem at all."""
+    peer = ON_SUITES[algorithm]
+    return (peer.takes_constraints or not problem.has_constraints()) and (
+        problem.n_obj == 2 or not peer.two_objectives_only
+    )

@@ -1,0 +1,244 @@
+"""What came out on the suites: in short, ranks, tests, feasible runs and medians."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from experiments.comparing import indicators as measures
+from experiments.comparing.paired import SIGNIFICANT
+from experiments.comparing.ranks import average_ranks
+from experiments.comparing.rates import rate
+from experiments.comparing.rivals import RivalTest, tests_of_medians
+from experiments.runner.result import Cell, Column, Table
+from experiments.studies.suites.bbob.published import BEST, CITED
+from experiments.studies.suites.bbob_tables import reached
+from experiments.studies.suites.data import Outcome
+from experiments.studies.suites.jobs import MEASURES
+from experiments.studies.suites.peers import OURS
+from experiments.studies.suites.problems import PROBLEMS, SUITES
+from experiments.studies.suites.protocol import (
+    BUDGETS,
+    CONSTRAINED,
+    DIMENSIONS,
+    HELD_OUT,
+    VALIDATION,
+)
+
+NAMES = {name: measures.NAMES[name] for name in ("hypervolume", "igd_plus")}
+SWARMS = (OURS, "ElitistSwarm")
+
+
+def indicators(suite: str) -> list[str]:
+    """Return the indicators of a suite: IGD+ only where all fronts are known in closed form."""
+    known = all(one.front is not None for one in SUITES[suite])
+    return list(NAMES) if known else ["hypervolume"]
+
+
+def named(outcome: Outcome, suite: str) -> str:
+    """Return the name of a suite, with the number of its problems that ran if not all did."""
+    ran = len(outcome.problems(suite, outcome.budgets(suite)[-1])) if outcome.budgets(suite) else 0
+    whole = len(SUITES[suite])
+    return suite if ran in (0, whole) else f"{suite} ({ran} of {whole} problems)"
+
+
+def ranks(outcome: Outcome, suite: str, budget: int, measure: str) -> dict[str, float]:
+    """Return average ranks of the medians over the seeds by algorithm, 1 being the best."""
+    algorithms = outcome.algorithms(suite, budget)
+    values = outcome.medians(suite, budget, measure, algorithms)
+    means = average_ranks(values, smaller_is_better=measures.smaller_is_better(measure))
+    return dict(zip(algorithms, means.tolist(), strict=True))
+
+
+def tests(outcome: Outcome, suite: str, budget: int, measure: str) -> list[RivalTest]:
+    """Test ours against every other over the problems of a suite, corrected after Holm.
+
+    Only on problems that both took.
+    """
+    algorithms = outcome.algorithms(suite, budget)
+    values = outcome.medians(suite, budget, measure, algorithms)
+    return tests_of_medians(OURS, algorithms, missing_as_ours(values, algorithms), measure)
+
+
+def can_show(problems: int, rivals: int) -> bool:
+    """Say whether so few problems can show a lead over each of so many rivals beyond chance.
+
+    If ours wins on all n problems, Wilcoxon's two-sided p is 2 / 2^n, and Holm multiplies the
+    smallest p by the number of rivals.
+    """
+    return rivals * 2.0 ** (1 - problems) < SIGNIFICANT
+
+
+def missing_as_ours(values: NDArray[np.float64], algorithms: Sequence[str]) -> NDArray[np.float64]:
+    """Return the values with ours in the place of those of a problem that a rival cannot take."""
+    ours = values[:, [list(algorithms).index(OURS)]]
+    return np.where(np.isnan(values), ours, values)
+
+
+def feasible_runs(outcome: Outcome, suite: str, budget: int, algorithm: str) -> tuple[int, int]:
+    """Return in how many runs an algorithm found feasible solutions, and how many it made."""
+    place = 1 + MEASURES.index("solutions")
+    counts = [
+        count
+        for problem in outcome.problems(suite, budget)
+        for count in outcome.runs(problem, algorithm, budget, place)
+    ]
+    return sum(count > 0 for count in counts), len(counts)
+
+
+class Feasible(NamedTuple):
+    """In how many runs ours found feasible solutions, a rival did, and ours alone, of how many."""
+
+    ours: int
+    theirs: int
+    ours_alone: int
+    runs: int
+
+    @property
+    def state(self) -> str:
+        """Whether ours is feasible as often; shown by the runs in which one of the two is alone."""
+        theirs_alone = self.theirs - (self.ours - self.ours_alone)
+        return rate(self.ours_alone, self.ours_alone + theirs_alone).state(0.5)
+
+
+def feasible_beside(outcome: Outcome, suite: str, budget: int, rival: str) -> Feasible:
+    """Count the feasible runs of the pairs of problem and seed with which ours and a rival ran."""
+    place = 1 + MEASURES.index("solutions")
+    pairs = [
+        (row[place] > 0, outcome.suites[problem, rival, budget, seed][place] > 0)
+        for (problem, name, spent, seed), row in outcome.suites.items()
+        if (name, spent) == (OURS, budget)
+        and PROBLEMS[problem].suite == suite
+        and (problem, rival, budget, seed) in outcome.suites
+    ]
+    ours, theirs = (sum(flags) for flags in zip(*pairs, strict=True))
+    return Feasible(ours, theirs, pairs.count((True, False)), len(pairs))
+
+
+def ranks_tables(outcome: Outcome) -> list[Table]:
+    """Return average ranks on each suite that ran, the held-out one first."""
+    return [
+        _ranks_table(outcome, suite) for suite in (*HELD_OUT, *VALIDATION) if outcome.budgets(suite)
+    ]
+
+
+def _ranks_table(outcome: Outcome, suite: str) -> Table:
+    budgets, measures = outcome.budgets(suite), indicators(suite)
+    by_place = {(b, m): ranks(outcome, suite, b, m) for b in budgets for m in measures}
+    algorithms = max(by_place.values(), key=len)
+    order = sorted(algorithms, key=lambda name: by_place[budgets[-1], measures[0]].get(name, 99.0))
+    columns = [Column("algorithm")]
+    columns += [Column(NAMES[m], "", 3, f"{b:,} evaluations") for b, m in by_place]
+    constrained = suite in CONSTRAINED
+    rows: list[tuple[Cell, ...]] = []
+    for name in order:
+        row: list[Cell] = [name, *(found.get(name) for found in by_place.values())]
+        if constrained:
+            row.append("{} of {}".format(*feasible_runs(outcome, suite, budgets[-1], name)))
+        rows.append(tuple(row))
+    if constrained:
+        columns.append(Column("feasible runs"))
+    kind = "held out" if suite in HELD_OUT else "validation"
+    problems = outcome.problems(suite, budgets[-1])
+    ran = f"{len(problems)} of its {len(SUITES[suite])} problems"
+    if len(problems) < len(SUITES[suite]):
+        ran += f" ({', '.join(problems)})"
+    return Table(
+        f"ranks_{suite.lower().replace('-', '')}",
+        f"{suite}, {kind}: average ranks over {ran}, 1 being the best",
+        tuple(columns),
+        tuple(rows),
+        note=f"Ranks of medians over {outcome.seeds(suite)} seeds or more, single runs if 1; one "
+        "that cannot take a problem ranks last there.",
+        folded=suite not in HELD_OUT,
+    )
+
+
+def rivals_table(outcome: Outcome) -> Table:
+    """Test ours against each other on the held-out suite."""
+    rows: list[tuple[Cell, ...]] = []
+    for suite in HELD_OUT:
+        for budget in outcome.budgets(suite):
+            by_measure = [tests(outcome, suite, budget, measure) for measure in NAMES]
+            for pair in zip(*by_measure, strict=True):
+                cells = [cell for test in pair for cell in (test.better, test.worse, test.p)]
+                rows.append((pair[0].rival, budget, *cells))
+    columns = [Column("rival"), Column("evaluations")]
+    for name in NAMES.values():
+        columns += [Column("better", group=name), Column("worse", group=name)]
+        columns.append(Column("p", digits=2, group=name))
+    return Table(
+        "rivals",
+        f"{' and '.join(HELD_OUT)}, held out: {OURS} against every other",
+        tuple(columns),
+        tuple(rows),
+        note="Better and worse compare medians; on problems of which nobody found any hypervolume "
+        "all are equal. p is Wilcoxon's over the problems that both take, after Holm over the "
+        "rivals of a budget.",
+        folded=True,
+    )
+
+
+def medians_tables(outcome: Outcome) -> list[Table]:
+    """Return the median hypervolume of every algorithm on every problem at the largest budget."""
+    tables = []
+    for suite in SUITES:
+        for budget in outcome.budgets(suite)[-1:]:
+            algorithms = outcome.algorithms(suite, budget)
+            values = outcome.medians(suite, budget, "hypervolume", algorithms)
+            tables.append(
+                Table(
+                    f"medians_{suite.lower().replace('-', '')}",
+                    f"{suite}: median hypervolume after {budget:,} evaluations",
+                    (Column("problem"), *map(Column, algorithms)),
+                    tuple(
+                        (one, *(None if np.isnan(value) else float(value) for value in row))
+                        for one, row in zip(outcome.problems(suite, budget), values, strict=True)
+                    ),
+                    folded=True,
+                )
+            )
+    return tables
+
+
+def in_short(outcome: Outcome) -> Table:
+    """Shares of targets beside the best published, average ranks beside the best rival's."""
+    rows = [_shares_in_short(outcome, dimension) for dimension in DIMENSIONS]
+    rows += [_ranks_in_short(outcome, suite, measure) for suite in HELD_OUT for measure in NAMES]
+    return Table(
+        "in_short",
+        "The held-out suites in short",
+        (Column("suite"), *(Column(f"{budget:,}", group="evaluations") for budget in BUDGETS)),
+        tuple(rows),
+        note=f"bbob-biobj: {OURS}, in brackets the best published. Ranks: {' / '.join(SWARMS)}, in "
+        "brackets the best of the others; 1 is the best.",
+    )
+
+
+def _shares_in_short(outcome: Outcome, dimension: int) -> tuple[str | None, ...]:
+    cells: list[str | None] = [f"bbob-biobj, {dimension} dimensions: share of targets"]
+    for budget in BUDGETS:
+        share, cited = reached(outcome, dimension, budget), CITED.get((dimension, budget))
+        beside = "" if cited is None else f" ({BEST} {cited:.3f})"
+        cells.append(None if share is None else f"{share:.4f}{beside}")
+    return tuple(cells)
+
+
+def _ranks_in_short(outcome: Outcome, suite: str, measure: str) -> tuple[str | None, ...]:
+    budgets = outcome.budgets(suite)
+    count = max((len(outcome.algorithms(suite, budget)) for budget in budgets), default=0)
+    cells: list[str | None] = [
+        f"{named(outcome, suite)}: average rank of up to {count} by {NAMES[measure]}"
+    ]
+    for budget in BUDGETS:
+        if budget not in budgets:
+            cells.append(None)
+            continue
+        found = ranks(outcome, suite, budget, measure)
+        ours = " / ".join(f"{found.pop(name):.2f}" for name in SWARMS if name in found)
+        best = min(found, key=lambda name: found[name])
+        cells.append(f"{ours} ({best} {found[best]:.2f})")
+    return tuple(cells)

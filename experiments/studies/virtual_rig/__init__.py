@@ -1,0 +1,1 @@
+"""Virtual rigs with hidden effects, to test the discrepancy analysis."""

@@ -1,0 +1,71 @@
+"""Campaigns on a drive with user-defined effects, which the integrator of the rig does not have."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from experiments.studies.virtual_rig.rig import TrueRig
+from pymoo_hdte.discrepancy.campaign.campaign import Campaign
+from pymoo_hdte.discrepancy.campaign.records import RunningRecord
+from pymoo_hdte.discrepancy.drive.parameters import base_parameters
+from pymoo_hdte.discrepancy.drive.prediction import Conditions, predict
+from pymoo_hdte.drive import DriveEffect, SteadyMotion
+
+_CHANNELS = ("transmission_error", "motor_torque", "coupling_torque", "lead")
+
+
+def with_effects(campaign: Campaign, rig: TrueRig, effects: Sequence[DriveEffect]) -> Campaign:
+    """Return a campaign with the change of the rig's steady state by effects added, with its noise.
+
+    By harmonic balance of the true drive with and without them; torsion sweeps stay as they are.
+
+    Parameters
+    ----------
+    campaign : Campaign
+        Of `rig.run_campaign`.
+    rig : TrueRig
+        The rig of the campaign.
+    effects : sequence of DriveEffect
+        Laws of friction or drag.
+
+    Returns
+    -------
+    Campaign
+    """
+    records = campaign.running
+    speed, load = np.array([(one.input_speed, one.load_torque) for one in records]).T
+    base = base_parameters(rig.drive, campaign.rig, rig.error_phases, 0.0)
+    values = {one.name: np.array([one.start]) for one in base}
+    count = len(records)
+    when = Conditions(speed, load, np.zeros(count), np.zeros((count, 3, 2), dtype=complex))
+    calm, changed = (
+        predict(rig.drive, campaign.rig, when, [1.0], values, added).balance
+        for added in ((), tuple(effects))
+    )
+    running = tuple(
+        _changed(record, row, calm, changed, rig.drive.ratio) for row, record in enumerate(records)
+    )
+    if campaign.rig.output_torque_at == "brake":
+        pairs = zip(running, records, strict=True)
+        running = tuple(replace(one, output_torque=old.output_torque) for one, old in pairs)
+    return replace(campaign, running=running)
+
+
+def _changed(
+    record: RunningRecord, row: int, calm: SteadyMotion, changed: SteadyMotion, ratio: float
+) -> RunningRecord:
+    waves = np.exp(1j * np.outer(record.input_angle, calm.torus.orders))
+    error, motor, coupling, lead = (
+        (waves @ (getattr(changed, name)[row] - getattr(calm, name)[row])).real
+        for name in _CHANNELS
+    )
+    return replace(
+        record,
+        input_angle=record.input_angle + lead,
+        output_angle=record.output_angle + lead / ratio - error,
+        input_torque=record.input_torque + motor,
+        output_torque=record.output_torque + coupling,
+    )

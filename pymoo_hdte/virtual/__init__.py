@@ -1,5 +1,0 @@
-"""Virtual rigs with hidden effects, to test the discrepancy analysis."""
-
-from pymoo_hdte.lazy import lazy_names
-
-__getattr__, __dir__, __all__ = lazy_names(__name__, __file__)
