@@ -1,8 +1,8 @@
 """Outcomes of the reliability suite: as objects, and as the small CSV files that are kept.
 
 Memory and seconds are in a separate file, because they differ from run to run. ``python -m
-experiments.studies.reliability.data FILE`` tells what failed in a file of tallies, since an experiment ends
-well whatever it finds.
+experiments.studies.reliability.data FILE`` tells what failed in a file of tallies, since an
+experiment ends well whatever it finds.
 """
 
 from __future__ import annotations
