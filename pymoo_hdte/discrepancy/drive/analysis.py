@@ -125,47 +125,44 @@ def examine_drive(campaign: Campaign, rules: Rules = RULES) -> DriveFinding:
     elif rattles:
         data = rattling.with_clearance(data)
     _check_steady(data)
-    wider, harmonics = _with_harmonics(data)
-    judged = rattling.judged(wider, _candidates)
-    if harmonics and judged[-1].status not in EXPLAINED:
+    base = fit(data)
+    if harmonics := _harmonics(data, base):
+        orders = sorted([*data.features.orders.tolist(), *harmonics])
+        wider = replace(data, features=measure(campaign, data.features.records, orders, rules))
+        judged = rattling.judged(wider, fit(wider, start=base.values), _candidates)
+    if not harmonics or judged[-1].status not in EXPLAINED:
         # Where no fit follows the harmonics, as in a record that then has no steady state, the
         # lower orders may still be explained.
-        judged, harmonics = rattling.judged(data, _candidates), []
+        judged, harmonics = rattling.judged(data, base, _candidates), []
     data, listed, verdict = judged
     data, verdict = _judged_again(verdict, data, listed)
     return DriveFinding(campaign, data, verdict, (*unexpected, *harmonics), rows)
 
 
-def _with_harmonics(data: Data) -> tuple[Data, list[float]]:
-    """Return the data with the harmonics of strong lines that lie above the orders looked at.
+def _harmonics(data: Data, base: Fit) -> list[float]:
+    """Return the harmonics of strong lines that are strong, too, above the orders looked at.
 
-    With them their orders: those at which the records that show them have strong lines, too.
+    Those of a line belong to its effect, and what they leave out of a fit ends in other values, as
+    in the gains of sensors. Each record is asked for what its rows show.
     """
     campaign, features, rules = data.campaign, data.features, data.rules
-    base = fit(data)
-    least = highest_order(campaign, rules)
+    orders, lowest = features.orders.tolist(), highest_order(campaign, rules)
     most = max(shown_order(record, rules) for record in features.records)
     multiples = {
         round(multiple * order, 9)
         for order in _strong_lines(features, base.residuals, rules)
         for multiple in range(2, len(HARMONIC_NAMES) + 1)
     }
-    orders = features.orders.tolist()
     further = [
-        one for one in sorted(multiples) if least < one <= most and not is_among(orders, one)
+        one for one in sorted(multiples) if lowest < one <= most and not is_among(orders, one)
     ]
     if not further:
-        return data, []
-    wider = replace(
-        data, features=measure(campaign, features.records, sorted([*orders, *further]), rules)
-    )
+        return []
+    everything = measure(campaign, features.records, sorted([*orders, *further]), rules)
+    wider = replace(data, features=everything)
     residuals = wider.objective(()).residuals(base.values)
-    strong = _strong_lines(wider.features, residuals, rules)
-    harmonics = [order for order in further if is_among(strong, order)]
-    if not harmonics:
-        return data, []
-    seen = measure(campaign, features.records, sorted([*orders, *harmonics]), rules)
-    return replace(data, features=seen), harmonics
+    strong = _strong_lines(everything, residuals, rules)
+    return [order for order in further if is_among(strong, order)]
 
 
 def _check_steady(data: Data) -> None:
