@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,7 @@ from pymoo_hdte.discrepancy.drive.evidence import Data, flanks_held, training_da
 from pymoo_hdte.discrepancy.drive.features import (
     Features,
     measure,
+    shown_order,
     unexpected_lines,
     unexpected_orders,
 )
@@ -28,10 +29,11 @@ from pymoo_hdte.discrepancy.drive.steady_states import PREDICTION
 from pymoo_hdte.discrepancy.engine.candidate import Candidate
 from pymoo_hdte.discrepancy.engine.fitting import Fit, fit
 from pymoo_hdte.discrepancy.engine.rules import RULES, Rules
-from pymoo_hdte.discrepancy.engine.verdict import Verdict, judge
+from pymoo_hdte.discrepancy.engine.verdict import EXPLAINED, Verdict, judge
 from pymoo_hdte.drive import SpeedLoop, harmonic_balance
 from pymoo_hdte.drive.solve.free_angle import torus_of
 from pymoo_hdte.effects.effect import effect_named
+from pymoo_hdte.effects.unknowns import HARMONIC_NAMES, is_among
 from pymoo_hdte.one_thread import ONE_THREAD
 
 
@@ -123,9 +125,44 @@ def examine_drive(campaign: Campaign, rules: Rules = RULES) -> DriveFinding:
     elif rattles:
         data = rattling.with_clearance(data)
     _check_steady(data)
-    data, listed, verdict = rattling.judged(data, _candidates)
+    base = fit(data)
+    if harmonics := _harmonics(data, base):
+        orders = sorted([*data.features.orders.tolist(), *harmonics])
+        wider = replace(data, features=measure(campaign, data.features.records, orders, rules))
+        judged = rattling.judged(wider, fit(wider, start=base.values), _candidates)
+    if not harmonics or judged[-1].status not in EXPLAINED:
+        # Where no fit follows the harmonics, as in a record that then has no steady state, the
+        # lower orders may still be explained.
+        judged, harmonics = rattling.judged(data, base, _candidates), []
+    data, listed, verdict = judged
     data, verdict = _judged_again(verdict, data, listed)
-    return DriveFinding(campaign, data, verdict, tuple(unexpected), rows)
+    return DriveFinding(campaign, data, verdict, (*unexpected, *harmonics), rows)
+
+
+def _harmonics(data: Data, base: Fit) -> list[float]:
+    """Return the harmonics of strong lines that are strong, too, above the orders looked at.
+
+    Those of a line belong to its effect, and what they leave out of a fit ends in other values, as
+    in the gains of sensors. Each record is asked for what its rows show.
+    """
+    campaign, features, rules = data.campaign, data.features, data.rules
+    orders, lowest = features.orders.tolist(), highest_order(campaign, rules)
+    most = max(shown_order(record, rules) for record in features.records)
+    multiples = {
+        round(multiple * order, 9)
+        for order in _strong_lines(features, base.residuals, rules)
+        for multiple in range(2, len(HARMONIC_NAMES) + 1)
+    }
+    further = [
+        one for one in sorted(multiples) if lowest < one <= most and not is_among(orders, one)
+    ]
+    if not further:
+        return []
+    everything = measure(campaign, features.records, sorted([*orders, *further]), rules)
+    wider = replace(data, features=everything)
+    residuals = wider.objective(()).residuals(base.values)
+    strong = _strong_lines(everything, residuals, rules)
+    return [order for order in further if is_among(strong, order)]
 
 
 def _check_steady(data: Data) -> None:
@@ -175,8 +212,10 @@ def _judged_again(verdict: Verdict, data: Data, listed: list[Candidate]) -> tupl
 
 def _candidates(data: Data, base: Fit) -> list[Candidate]:
     features = data.features
-    clear = _strong_lines(features, base, data.rules)
-    seen = clear[: data.rules.most_order_lines]
+    clear = _strong_lines(features, base.residuals, data.rules)
+    # Above the highest order there are harmonics only.
+    highest = highest_order(data.campaign, data.rules)
+    seen = [order for order in clear if order <= highest][: data.rules.most_order_lines]
     believed, orders = data.campaign.believed, features.orders.tolist()
     sizes = port_sizes(believed, orders, seen, scales_of(data, base), clear)
     return drive_candidates(sizes, believed.effects)
@@ -184,13 +223,8 @@ def _candidates(data: Data, base: Fit) -> list[Candidate]:
 
 def highest_order(campaign: Campaign, rules: Rules) -> float:
     """Return the order up to which lines of a campaign are analysed, cycles per input turn."""
-    shown = [_shown_order(record, rules) for record in campaign.running]
+    shown = [shown_order(record, rules) for record in campaign.running]
     return float(min(rules.highest_order, *shown))
-
-
-def _shown_order(record: RunningRecord, rules: Rules) -> float:
-    """Return the order up to which the rows of a record show lines."""
-    return rules.nyquist_share * (np.pi * record.sample_rate / abs(record.input_speed))
 
 
 def _error_lines(campaign: Campaign, rules: Rules) -> list[float]:
@@ -201,7 +235,7 @@ def _error_lines(campaign: Campaign, rules: Rules) -> list[float]:
     amplitude zero need not be resolved, and lines above `Rules.highest_order` are not analysed.
     """
     believed = campaign.believed
-    coarsest = min(campaign.running, key=lambda record: _shown_order(record, rules))
+    coarsest = min(campaign.running, key=lambda record: shown_order(record, rules))
     shortest = min(campaign.running, key=_travel)
     apart = rules.line_separation
     least = 2.0 * np.pi * apart / max(_travel(shortest), 2.0 * np.pi * believed.ratio)
@@ -209,7 +243,7 @@ def _error_lines(campaign: Campaign, rules: Rules) -> list[float]:
     for order, amplitude in zip(believed.error_orders, believed.error_amplitudes, strict=True):
         if amplitude == 0.0:
             continue
-        if order > (shown := _shown_order(coarsest, rules)):
+        if order > (shown := shown_order(coarsest, rules)):
             rate = coarsest.sample_rate * order / shown
             allowed = (
                 f"at most {shown:.4g}, {rules.nyquist_share:g} of the Nyquist order of "
@@ -246,13 +280,13 @@ def _apart(wanted: list[float], campaign: Campaign, kept: list[float], rules: Ru
     return sorted(kept)
 
 
-def _strong_lines(features: Features, base: Fit, rules: Rules) -> list[float]:
+def _strong_lines(features: Features, residuals: NDArray[np.float64], rules: Rules) -> list[float]:
     """Return the orders at which the residual of the base exceeds the noise in any channel.
 
     The strongest first. If there are several speeds, a line seen at one speed only is a frequency
     and no order.
     """
-    misfit: NDArray[np.float64] = (base.residuals[: features.values.size] ** 2).reshape(
+    misfit: NDArray[np.float64] = (residuals[: features.values.size] ** 2).reshape(
         features.values.shape
     )
     by_line = np.array([misfit[:, features.places(channel)].sum(axis=2) for channel in range(4)])

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from pymoo_hdte.discrepancy.drive.analysis import DriveFinding, highest_order
+from pymoo_hdte.discrepancy.drive.stated_sensors import sensor_caveats
 from pymoo_hdte.discrepancy.engine.verdict import EXPLAINED
 from pymoo_hdte.effects.unknowns import harmonics_among
 
@@ -26,7 +27,8 @@ def campaign_limits(finding: DriveFinding) -> list[str]:
     """
     of_records = _zeroed(finding) + _standing_out(finding) + _unproven(finding)
     of_conditions = _unvaried(finding) + _unseen(finding)
-    return of_records + of_conditions + _like_a_gain(finding) + _too_high(finding)
+    of_values = _far_sensors(finding) + _too_high(finding)
+    return of_records + of_conditions + _like_a_gain(finding) + of_values
 
 
 def _zeroed(finding: DriveFinding) -> list[str]:
@@ -133,6 +135,14 @@ def _like_a_gain(finding: DriveFinding) -> list[str]:
     ]
 
 
+def _far_sensors(finding: DriveFinding) -> list[str]:
+    """Return which sensors are far from what is stated of them, if the verdict explains records."""
+    verdict = finding.verdict
+    # Gains of a base that explains nothing say nothing of the sensors.
+    explains = verdict.status in (*EXPLAINED, "adequate")
+    return sensor_caveats(verdict.accepted, verdict.rules) if explains else []
+
+
 def _unseen(finding: DriveFinding) -> list[str]:
     orders = finding.data.features.orders
     highest = highest_order(finding.campaign, finding.data.rules)
@@ -163,8 +173,8 @@ def _too_high(finding: DriveFinding) -> list[str]:
     values = ", which may shift the values of the effect" if verdict.status in EXPLAINED else ""
     # Unexpected lines are searched strictly below the highest order.
     return [
-        f"Order {2.0 * order:.4g}, the second harmonic of order {order:.4g}, is not looked at: "
-        f"lines are searched below order {highest:.3g}. What is left may be that harmonic{values}."
+        f"Order {2.0 * order:.4g}, the second harmonic of order {order:.4g}, is not fitted: it "
+        f"lies above order {highest:.3g}. What is left may be that harmonic{values}."
         for order in sorted(orders)
         if 2.0 * order >= highest and harmonics_among(seen, order, 2) == 1
     ]

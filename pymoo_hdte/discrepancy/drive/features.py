@@ -3,14 +3,15 @@
 A record's features are the means of transmission error and input torque, then real and imaginary
 parts of the order lines of every channel. Their covariance is that of the sensors (both encoders
 share the input's noise) plus that of the repeatability: the static error changes a little from one
-record to the next, which reaches all channels through the response of the drive.
+record to the next, which reaches all channels through the response of the drive. A line that lies
+too near the Nyquist order of a record, or above it, is zero there in measurement and prediction.
 """
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,6 +41,8 @@ class Features:
     values : ndarray, shape (r, n_features)
     covariance : ndarray, shape (r, n_features, n_features)
         Of the sensors' noise only.
+    shown : ndarray of bool, shape (r, m), optional
+        Which lines each record shows; by default all.
     """
 
     records: tuple[RunningRecord, ...]
@@ -47,6 +50,7 @@ class Features:
     orders: NDArray[np.float64]
     values: NDArray[np.float64]
     covariance: NDArray[np.float64]
+    shown: NDArray[np.bool_] | None = None
 
     def rows(self, rows: NDArray[np.int_]) -> Features:
         """Return the features of some of the records."""
@@ -56,11 +60,15 @@ class Features:
             self.orders,
             self.values[rows],
             self.covariance[rows],
+            None if self.shown is None else self.shown[rows],
         )
 
     def of_prediction(self, prediction: Prediction) -> NDArray[np.float64]:
         """Return predicted features, shape (v, r, n_features)."""
-        return stack(prediction.mean, prediction.phasors)
+        phasors = prediction.phasors
+        if self.shown is not None:
+            phasors = np.where(self.shown[:, None], phasors, 0.0)
+        return stack(prediction.mean, phasors)
 
     def places(self, channel: int) -> NDArray[np.int_]:
         """Return the indices (m, 2) of a channel's real and imaginary parts among the features."""
@@ -77,17 +85,25 @@ def stack(mean: NDArray[np.float64], phasors: NDArray[np.complex128]) -> NDArray
 
 
 def measure(
-    campaign: Campaign, records: Sequence[RunningRecord], orders: Sequence[float]
+    campaign: Campaign,
+    records: Sequence[RunningRecord],
+    orders: Sequence[float],
+    rules: Rules = RULES,
 ) -> Features:
-    """Return the features of records at these orders.
+    """Return the features of records at these orders, of each record at those that it shows.
 
     Raises
     ------
     InvalidInput
-        For orders that a record cannot resolve or that lie beyond its Nyquist order.
+        For orders that a record cannot tell apart.
     """
     ratio, rig = campaign.believed.ratio, campaign.rig
-    lines = [order_lines(record, rig, ratio, orders) for record in records]
+    asked = np.array(orders)
+    shown = np.array([asked <= shown_order(record, rules) for record in records])
+    lines = [
+        _at_all_orders(order_lines(record, rig, ratio, asked[of_record]), asked, of_record)
+        for record, of_record in zip(records, shown, strict=True)
+    ]
     conditions = Conditions(
         input_speed=np.array([line.slope[3] for line in lines]),
         output_torque=np.array([line.mean[2] for line in lines]),
@@ -103,7 +119,40 @@ def measure(
     covariance = np.array([_sensor_covariance(line, rig, stiffness) for line in lines])
     # The load is taken from the measured output torque: its error is one of the input torque, too.
     covariance[:, 1, 1] += [_load_variance(record) / ratio**2 for record in records]
-    return Features(tuple(records), conditions, np.array(orders), values, covariance)
+    return Features(
+        tuple(records), conditions, asked, values, covariance, None if shown.all() else shown
+    )
+
+
+def _at_all_orders(
+    lines: OrderLines, orders: NDArray[np.float64], shown: NDArray[np.bool_]
+) -> OrderLines:
+    """Return lines of a record with those that it does not show, which are zero.
+
+    These have the mean variance of the others, as a covariance has to have one.
+    """
+    if shown.all():
+        return lines
+    m = len(orders)
+    known = np.concatenate([[True], shown])
+    places = np.flatnonzero(np.concatenate([known, shown]))
+    variances = np.diagonal(lines.covariance, axis1=1, axis2=2)[:, 1:].mean(axis=1)
+    covariance = variances[:, None, None] * np.eye(1 + 2 * m)
+    covariance[:, places[:, None], places] = lines.covariance
+    phasors = np.zeros((len(CHANNELS), m), dtype=complex)
+    phasors[:, shown] = lines.phasors
+    bends, fading = (
+        np.zeros((len(courses), 1 + m), dtype=complex) for courses in (lines.bends, lines.fading)
+    )
+    bends[:, known], fading[:, known] = lines.bends, lines.fading
+    return replace(
+        lines, orders=orders, phasors=phasors, covariance=covariance, bends=bends, fading=fading
+    )
+
+
+def shown_order(record: RunningRecord, rules: Rules) -> float:
+    """Return the order up to which the rows of a record show lines, cycles per input turn."""
+    return rules.nyquist_share * (np.pi * record.sample_rate / abs(record.input_speed))
 
 
 def _middle(record: RunningRecord) -> float:

@@ -87,6 +87,7 @@ class Grid:
             orders=features.orders,
             values=np.zeros((len(grid), features.values.shape[1])),
             covariance=features.covariance[nearest],
+            shown=None if features.shown is None else features.shown[nearest],
         )
         sweep = _sweep(_SWEEP_SHARE * largest, finding.campaign.rig.torsion_angle_noise)
         data = replace(finding.data, features=planned, torsion=(sweep,) if largest else ())

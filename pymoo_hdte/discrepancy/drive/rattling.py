@@ -33,7 +33,7 @@ An order half-way between two lines shows in both.
 
 
 def judged(
-    data: Data, candidates_of: Callable[[Data, Fit], list[Candidate]]
+    data: Data, base: Fit, candidates_of: Callable[[Data, Fit], list[Candidate]]
 ) -> tuple[Data, list[Candidate], Verdict]:
     """Return the verdict on some data, with the data and the candidates that it is of.
 
@@ -45,10 +45,11 @@ def judged(
     Parameters
     ----------
     data : Data
+    base : Fit
+        Of these data, without effects.
     candidates_of : callable
         From data and the fit of their base to the effects that may be missing.
     """
-    base = fit(data)
     candidates = candidates_of(data, base)
     leading = leading_sweep_effect(data, base, candidates)
     loaded = data if leading is None else data.loaded

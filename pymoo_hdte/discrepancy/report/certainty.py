@@ -4,20 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
-
 from pymoo_hdte.discrepancy.drive.analysis import DriveFinding
 from pymoo_hdte.discrepancy.drive.evidence import PARTS
 from pymoo_hdte.discrepancy.drive.parameters import labels_by_order, words_of
-from pymoo_hdte.discrepancy.engine.fitting import Fit
 from pymoo_hdte.discrepancy.engine.hypothesis import (
     Hypothesis,
     adequate,
     explains,
     unexplained,
 )
-from pymoo_hdte.discrepancy.engine.membership import from_stated
-from pymoo_hdte.discrepancy.engine.rules import Rules
 from pymoo_hdte.discrepancy.engine.verdict import Verdict
 from pymoo_hdte.discrepancy.mechanism.analysis import MechanismFinding
 from pymoo_hdte.effects.sentence_blanks import in_words, listed
@@ -155,23 +150,7 @@ def _evidence(finding: DriveFinding, chosen: Hypothesis, share: str) -> list[str
     if bounded:
         names = ", ".join(bounded)
         words.append(f"At the bound of its range, and therefore uncertain: {names}.")
-    if far := _far_from_stated(chosen.fit, verdict.rules):
-        words.append(f"A sensor is far from what is stated of it, and values with it: {far}.")
     return [_probably(verdict), *words]
-
-
-def _far_from_stated(fitted: Fit, rules: Rules) -> str:
-    """Return the errors of sensors that contradict their stated limits, with both; SI."""
-    far = np.flatnonzero(from_stated(fitted) ** 2 >= rules.contradicting_chi_square)
-    known = [(fitted.parameters[place], float(fitted.values[place])) for place in far]
-    return listed(
-        [
-            f"{words_of(one.name, ())} {number(value, 2)} ({number(one.prior, 2)} stated)"
-            for one, value in known
-            # That of the sweep is no sensor's.
-            if one.name != "locked_stiffness"
-        ]
-    )
 
 
 def _probably(verdict: Verdict) -> str:

@@ -16,6 +16,7 @@ from pymoo_hdte.discrepancy.drive.misfit.map import Location
 from pymoo_hdte.discrepancy.drive.misfit.relevance import relevance
 from pymoo_hdte.discrepancy.drive.next_test import Proposal
 from pymoo_hdte.discrepancy.drive.parameters import base_unit, labels_by_order
+from pymoo_hdte.discrepancy.drive.stated_sensors import scale_error, shares_scale
 from pymoo_hdte.discrepancy.engine.candidate import Candidate, labels_apart
 from pymoo_hdte.discrepancy.engine.fitting import Fit
 from pymoo_hdte.discrepancy.engine.hypothesis import (
@@ -206,6 +207,8 @@ def _parameters(
 
     No value is told more closely than to a relative ``accuracy``, however little noise there is.
 
+    Torques, and what is found from them, are known no closer than the scale of their sensors.
+
     For a base parameter out of tolerance, its fitted value.
 
     The phase is that of amplitude cos(order theta_in + phase), in the direction of the part fitted.
@@ -213,16 +216,18 @@ def _parameters(
     found: dict[str, Any] = {}
     if candidate.frees is not None:
         rows = [[one.name for one in fitted.parameters].index(candidate.frees)]
-    values = expected_values(fitted, rules)
+    values, scale = expected_values(fitted, rules), scale_error(fitted, rules)
     for row in rows:
         one = fitted.parameters[row]
+        shared = scale if shares_scale(_unit(candidate, one.line or one.name)) else 0.0
         if one.begins_line:
             pair = np.array([row, row + 1])
             own = (accuracy * np.hypot(*values[pair]) / _DEVIATIONS) ** 2 * np.eye(2)
+            own += (shared / _DEVIATIONS) ** 2 * np.outer(values[pair], values[pair])
             covariance = fitted.covariance[np.ix_(pair, pair)] + own
             found |= _line(one.line, candidate, values[pair], covariance)
         elif not one.line:
-            own = float(accuracy * values[row] / _DEVIATIONS) ** 2
+            own = float(np.hypot(accuracy, shared) * values[row] / _DEVIATIONS) ** 2
             variance = fitted.covariance[row, row] + own
             # A time or a torsion of a law is above zero, however little the data say of it.
             least = 0.0 if one.lower > 0.0 else -np.inf
@@ -259,10 +264,11 @@ def quantity(value: float, variance: float, unit: str, least: float = -np.inf) -
 
 def base_parameters(fitted: Fit, rules: Rules) -> dict[str, Any]:
     """Return the base values of a fit with units, intervals and whether they ended at a bound."""
-    found = {}
+    found, scale = {}, scale_error(fitted, rules)
     for row, parameter in enumerate(fitted.parameters[: fitted.n_base]):
-        unit = base_unit(parameter.name)
-        entry = quantity(fitted.values[row], fitted.covariance[row, row], unit)
+        value, unit = fitted.values[row], base_unit(parameter.name)
+        shared = scale * value / _DEVIATIONS if shares_scale(unit) else 0.0
+        entry = quantity(value, fitted.covariance[row, row] + shared**2, unit)
         entry["interval95"] = _within_bounds(parameter, entry["interval95"], rules)
         found[parameter.name] = entry | {"at_bound": parameter.name in fitted.at_bounds}
     return found

@@ -16,6 +16,7 @@ from pymoo_hdte.discrepancy.engine.verdict import Verdict
 
 ORDERS = [1.0, 2.0, 2.02, 3.0, 4.0]
 FREEDOM = 2000
+UNFITTED = SimpleNamespace(parameters=(), values=np.empty(0), chi_square=float(FREEDOM))
 
 
 @pytest.fixture(scope="module")
@@ -32,13 +33,13 @@ def said(campaign, fitted=None, orders=ORDERS, chosen=None, status="named", **of
     features = measure(campaign, fitted or campaign.train, orders)
     data = Data(campaign, features, (), campaign.torsion, **of_data)
     return campaign_limits(
-        DriveFinding(campaign, data, Verdict(status, None, chosen, (), (), FREEDOM), ())
+        DriveFinding(campaign, data, Verdict(status, UNFITTED, chosen, (), (), FREEDOM), ())
     )
 
 
 def periodic(misfit, *orders):
     """Effects of some orders that leave ``misfit`` times the variance of the noise."""
-    fit = SimpleNamespace(chi_square=misfit * FREEDOM)
+    fit = SimpleNamespace(**{**vars(UNFITTED), "chi_square": misfit * FREEDOM})
     candidates = [SimpleNamespace(name="torque_ripple", order=one) for one in orders]
     return SimpleNamespace(fit=fit, candidates=candidates)
 
@@ -163,7 +164,7 @@ def test_a_harmonic_that_is_not_looked_at_is_told_where_misfit_is_left(campaign,
     above, below = 0.501 * highest, 0.499 * highest
     (sentence,) = said(campaign, chosen=periodic(1.2, above, None, above, below))
     assert f"Order {2.0 * above:.4g}, the second harmonic of order {above:.4g}, is not" in sentence
-    assert f"below order {highest:.3g}." in sentence
+    assert f"above order {highest:.3g}." in sentence
     assert "the values of the effect" in sentence
     monkeypatch.setattr(Data, "excess", lambda data, fitted: alike(data))
     (sentence,) = said(campaign, chosen=periodic(1.2, above), status="unlisted")

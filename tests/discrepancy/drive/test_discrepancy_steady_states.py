@@ -177,7 +177,7 @@ def test_records_that_rattle_count_unless_a_clearance_explains_all_others(
         return of_all if len(some.features.records) == len(LOADED_OR_NOT) else of_loaded
 
     monkeypatch.setattr(rattling, "judge", judge)
-    found, _, verdict = rattling.judged(swept, lambda some, base: library(some))
+    found, _, verdict = rattling.judged(swept, fit(swept), lambda some, base: library(some))
     assert len(found.features.records) == kept
     assert verdict is (of_all if kept == len(LOADED_OR_NOT) else of_loaded)
 
@@ -187,7 +187,7 @@ def test_data_have_the_noise_that_they_were_judged_with(monkeypatch, swept):
     reaction = fit(swept, [law], steps=0)
     renewed = replace(swept, reference_effects=reaction.effects)
     monkeypatch.setattr(rattling, "judge", lambda *_: answer("kinematic_reaction", renewed=renewed))
-    found, _, _ = rattling.judged(swept, lambda some, base: library(some))
+    found, _, _ = rattling.judged(swept, fit(swept), lambda some, base: library(some))
     assert found.reference_effects == reaction.effects
 
 
@@ -198,7 +198,7 @@ def test_records_that_rattle_do_not_count_where_sweeps_speak_for_a_clearance(
     data = known_data(LOADED_OR_NOT)
     monkeypatch.setattr(rattling, "leading_sweep_effect", lambda *_: name)
     monkeypatch.setattr(rattling, "judge", lambda *_: SOFT)
-    found, _, _ = rattling.judged(data, lambda some, base: [])
+    found, _, _ = rattling.judged(data, fit(data), lambda some, base: [])
     assert len(found.features.records) == kept
 
 
