@@ -85,7 +85,7 @@ class RowRules(RuleSet):
         "share of the rows",
         "Most rows of a record in which a channel may be at the end of its range, or nearly; "
         "they are left out, and with more of them the record is.",
-        "Normal distribution: where noise alone takes a tenth of the rows to the end of the range, "
+        f"{BY_HAND}: where noise alone takes a tenth of the rows to the end of the range, "
         "half of all are there or beside; the mean of the others is then too low by a fifth of a "
         "deviation of the noise.",
         at_most=1.0,
