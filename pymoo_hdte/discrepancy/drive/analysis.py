@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +23,7 @@ from pymoo_hdte.discrepancy.drive.features import (
     unexpected_orders,
 )
 from pymoo_hdte.discrepancy.drive.prediction import coefficients_of
+from pymoo_hdte.discrepancy.drive.proof import prove
 from pymoo_hdte.discrepancy.drive.sizes import port_sizes, scales_of
 from pymoo_hdte.discrepancy.drive.steady_states import PREDICTION
 from pymoo_hdte.discrepancy.engine.candidate import Candidate
@@ -125,7 +126,11 @@ def examine_drive(campaign: Campaign, rules: Rules = RULES) -> DriveFinding:
     _check_steady(data)
     data, listed, verdict = rattling.judged(data, _candidates)
     data, verdict = _judged_again(verdict, data, listed)
-    return DriveFinding(campaign, data, verdict, tuple(unexpected), rows)
+    finding = DriveFinding(campaign, data, verdict, tuple(unexpected), rows)
+    if verdict.accepted is verdict.base or (proof := prove(finding)) is None:
+        return finding
+    names = [name.replace("_", " ") for name in proof.worse]
+    return replace(finding, verdict=verdict.proven(worse=names, condemned=proof.condemns))
 
 
 def _check_steady(data: Data) -> None:
