@@ -90,7 +90,7 @@ class Candidate:
 
     @property
     def says(self) -> tuple[str, str]:
-        """Name and port: of a parameter out of tolerance, those of the effect that says the same."""
+        """Name and port; of a value out of tolerance, those of the effect that says the same."""
         if self.covered_by:
             return self.covered_by, self.covered_at
         return self.name, self.port
