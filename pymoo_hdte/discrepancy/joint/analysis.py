@@ -106,7 +106,7 @@ def examine_joint(
     if verdict.status == "named" and slows:
         # The delay of one encoder behind the other explains as much.
         verdict = replace(verdict, status="class")
-    verdict = without_unproved_lines(verdict, gaps)
+    verdict = without_unproved_lines(verdict, torsion.accepted, gaps)
     told = replace(torsion, verdict=verdict)
     if told.accepted is not torsion.accepted:
         gaps = torsion_gaps(told)

@@ -168,7 +168,7 @@ def voted(finding: MechanismFinding, gaps: Sequence[MeasuredGap]) -> Verdict:
     return verdict.proven(Vote(*sums.tolist()), grown(gaps))
 
 
-def without_unproved_lines(verdict: Verdict, gaps: Sequence[MeasuredGap]) -> Verdict:
+def without_unproved_lines(verdict: Verdict, fitted: Fit, gaps: Sequence[MeasuredGap]) -> Verdict:
     """Return a verdict on a torsion in which no set has an order that its fit or its proof denies.
 
     A line whose amplitude ended at a bound, or one that leaves the held-out torsion as it was,
@@ -177,13 +177,16 @@ def without_unproved_lines(verdict: Verdict, gaps: Sequence[MeasuredGap]) -> Ver
     Parameters
     ----------
     verdict : Verdict
+        After the vote of its held-out records.
+    fitted : Fit
+        What was accepted before it.
     gaps : sequence of MeasuredGap
-        Of its held-out records.
+        Of that fit, on these records.
     """
     shrinks = not gaps or sum(one.after**2 - one.before**2 for one in gaps) < 0.0
     denied = {
         candidate.label
-        for candidate, bounded in bounded_unknowns(verdict.accepted)
+        for candidate, bounded in bounded_unknowns(fitted)
         if candidate.order is not None and (bounded or not shrinks)
     }
     if not denied or verdict.chosen is None:

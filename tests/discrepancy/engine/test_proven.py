@@ -98,7 +98,7 @@ def test_an_order_at_its_bound_or_without_proof_is_not_named(order, side, after,
     chosen, other = line(order, side), line(2.0, 0.0)
     found = Verdict("partial", FIT, chosen, (other,), (), 100)
     gap = SimpleNamespace(before=1.0, after=after)
-    found = without_unproved_lines(found, [gap])
+    found = without_unproved_lines(found, chosen.fit, [gap])
     assert (found.chosen is chosen) == named
     assert (found.status == "partial") == named
     assert chosen not in found.alternatives
