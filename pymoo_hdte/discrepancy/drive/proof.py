@@ -186,7 +186,9 @@ def prove(finding: DriveFinding) -> Proof | None:
     return Proof(
         records=tuple(record.name for record in data.features.records),
         channels=gaps,
-        overall=Gap(*overall.tolist(), 1.0, DEVIATIONS, data.rules, overall_chance),
+        overall=Gap(
+            float(overall[0]), float(overall[1]), 1.0, DEVIATIONS, data.rules, overall_chance
+        ),
         by_record=tuple(
             _gap(
                 data,
