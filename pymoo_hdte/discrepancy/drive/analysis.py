@@ -24,6 +24,7 @@ from pymoo_hdte.discrepancy.drive.features import (
     unexpected_orders,
 )
 from pymoo_hdte.discrepancy.drive.prediction import coefficients_of
+from pymoo_hdte.discrepancy.drive.proof import prove
 from pymoo_hdte.discrepancy.drive.sizes import port_sizes, scales_of
 from pymoo_hdte.discrepancy.drive.steady_states import PREDICTION
 from pymoo_hdte.discrepancy.engine.candidate import Candidate
@@ -136,7 +137,11 @@ def examine_drive(campaign: Campaign, rules: Rules = RULES) -> DriveFinding:
         judged, harmonics = rattling.judged(data, base, _candidates), []
     data, listed, verdict = judged
     data, verdict = _judged_again(verdict, data, listed)
-    return DriveFinding(campaign, data, verdict, (*unexpected, *harmonics), rows)
+    finding = DriveFinding(campaign, data, verdict, (*unexpected, *harmonics), rows)
+    if verdict.accepted is verdict.base or (proof := prove(finding)) is None:
+        return finding
+    names = [name.replace("_", " ") for name in proof.worse]
+    return replace(finding, verdict=verdict.proven(worse=names, condemned=proof.condemns))
 
 
 def _harmonics(data: Data, base: Fit) -> list[float]:

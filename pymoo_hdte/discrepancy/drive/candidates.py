@@ -17,8 +17,8 @@ from pymoo_hdte.effects.unknowns import Parameter
 
 _ACTING_AT = {"input_damping": "input", "output_damping": "output"}
 """Ports at which base parameters are friction, as a law there is."""
-_COVERED = {"load_inertia": "load_inertia", "damping": "damping_reference"}
-"""Base parameters that an effect in the library covers, and the effect."""
+_COVERED = {"load_inertia": ("load_inertia", "output"), "damping": ("damping_reference", "mesh")}
+"""Base parameters that an effect in the library covers, and name and port of the effect."""
 _ONCE = (
     {"coulomb_friction", "presliding_friction"},
     {"nonlinear_drag", "shear_thinning_drag"},
@@ -76,7 +76,7 @@ def out_of_tolerance(
             name,
             words_of(name, error_orders),
             _ACTING_AT.get(name, ""),
-            _COVERED.get(name, ""),
+            _COVERED.get(name, ("", "")),
         )
         for name in at_bounds
         if (name in MECHANICAL or name.startswith("error_amplitude_") or name in known)

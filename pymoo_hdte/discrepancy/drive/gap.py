@@ -5,9 +5,28 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from pymoo_hdte.discrepancy.engine.rules import RULES
+from pymoo_hdte.discrepancy.engine.rules import RULES, Rules
 
 DEVIATIONS = "standard deviations of the noise"
+
+
+def grows(before: float, after: float, floor: float, chance: float, rules: Rules = RULES) -> bool:
+    """Tell whether a root mean square error on held-out records grew, and not by their noise.
+
+    One within the noise is not said to grow, as it cannot be said to shrink.
+
+    Parameters
+    ----------
+    before, after : float
+    floor : float
+        What the best model leaves of it.
+    chance : float
+        Standard deviation of ``after**2 - before**2`` by the noise of the records.
+    rules : Rules
+    """
+    beyond = after > (1.0 + rules.least_gap_share) * floor
+    larger = after - before > rules.worse_share * floor
+    return beyond and larger and after**2 - before**2 > rules.certain_deviations * chance
 
 
 @dataclass(frozen=True)
@@ -20,27 +39,23 @@ class Gap:
         Of the fitted base, and of the model with the named effects.
     noise_floor : float
     unit : str
-    least_share : float
-        Least excess of a gap over the noise floor, as a share of it, for a shrinkage to be stated.
-    worse_share : float
-        Least growth of a gap, as a share of the noise floor, for it to be called worse.
+    rules : Rules
+        Thresholds by which it shrinks or grows.
+    chance : float
+        Standard deviation of the difference of their squares by the noise.
     """
 
     before: float
     after: float
     noise_floor: float
     unit: str
-    least_share: float = RULES.least_gap_share
-    worse_share: float = RULES.worse_share
+    rules: Rules = RULES
+    chance: float = 0.0
 
     @property
     def worse(self) -> bool:
-        """Whether the correction made it larger by more than rounds to the same.
-
-        A gap within the noise is not called worse, as it cannot be said to shrink.
-        """
-        beyond = self.after > (1.0 + self.least_share) * self.noise_floor
-        return beyond and self.after - self.before > self.worse_share * self.noise_floor
+        """Whether the correction made it larger: see `grows`."""
+        return grows(self.before, self.after, self.noise_floor, self.chance, self.rules)
 
     @property
     def reduction(self) -> float:
@@ -51,7 +66,7 @@ class Gap:
     def shrinkage(self) -> float | None:
         """1 - (after - floor) / (before - floor), or None where there was no gap to shrink."""
         excess = self.before - self.noise_floor
-        if excess <= self.least_share * self.noise_floor:
+        if excess <= self.rules.least_gap_share * self.noise_floor:
             return None
         return 1.0 - (self.after - self.noise_floor) / excess
 

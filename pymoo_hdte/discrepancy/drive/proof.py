@@ -7,7 +7,7 @@ their squares add up to a `Gap`.
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,15 +15,16 @@ from numpy.typing import NDArray
 from pymoo_hdte.discrepancy.campaign.line_fit import CHANNELS
 from pymoo_hdte.discrepancy.campaign.records import RunningRecord
 from pymoo_hdte.discrepancy.campaign.rows.settling import unsettled_rows
-from pymoo_hdte.discrepancy.drive.analysis import DriveFinding
 from pymoo_hdte.discrepancy.drive.evidence import Data
 from pymoo_hdte.discrepancy.drive.features import MEANS
 from pymoo_hdte.discrepancy.drive.gap import DEVIATIONS, Gap
 from pymoo_hdte.discrepancy.engine.fitting import Fit
-from pymoo_hdte.discrepancy.engine.rules import Rules
 from pymoo_hdte.drive import OrderSpectrum
 from pymoo_hdte.units import ARCSEC, UNITS
 from pymoo_hdte.validation import ValidationMetrics, validation_metrics
+
+if TYPE_CHECKING:
+    from pymoo_hdte.discrepancy.drive.analysis import DriveFinding
 
 _OVERLAY_TURNS = 2.0
 _OVERLAY_POINTS = 400
@@ -111,6 +112,11 @@ class Proof:
         records = zip(self.records, self.by_record, strict=True)
         return tuple(name for name, gap in (*gaps.items(), *records) if gap.worse)
 
+    @property
+    def condemns(self) -> bool:
+        """Whether the correction made the leading channel, or all of them together, worse."""
+        return self.channels[self.leading].worse or self.overall.worse
+
     def as_dict(self) -> dict[str, Any]:
         """Return the entry in the verdict as plain values, the transmission error first."""
         metrics = None
@@ -152,14 +158,25 @@ def prove(finding: DriveFinding) -> Proof | None:
     difference = predicted - data.features.values
     white = data.whiten(difference).reshape(len(fits), len(data.features.records), -1)
     overall = np.sqrt(np.mean(white**2, axis=(1, 2)))
+    change = difference[1] - difference[0]
+    misfit = finding.verdict.accepted.misfit
     # Contributions of each mean and line to the squares (2, r, channel, 1 + m), and of the noise.
     squares = np.stack([_squares(data, difference**2, channel) for channel in range(3)], axis=2)
     noise = np.diagonal(data.covariance, axis1=1, axis2=2)
     floor = np.stack([_squares(data, noise, channel) for channel in range(3)], axis=1)
+    chance = np.stack([_chance(data, change, misfit, channel) for channel in range(3)], axis=1)
     gaps = {
-        name: _gap(data, squares[:, :, place].sum(axis=2), floor[:, place].sum(axis=1), name)
+        name: _gap(
+            data,
+            squares[:, :, place].sum(axis=2),
+            floor[:, place].sum(axis=1),
+            chance[:, place],
+            name,
+        )
         for place, name in enumerate(SHOWN_IN)
     }
+    moved = (white[1] - white[0]).ravel()
+    overall_chance = 2.0 * float(np.linalg.norm(moved)) * misfit**0.5 / moved.size
     error, error_floor = squares[:, :, 0], floor[:, 0]
     leading = max(gaps, key=lambda name: _height(gaps[name]))
     beside = "input_torque" if leading == "transmission_error" else leading
@@ -169,14 +186,22 @@ def prove(finding: DriveFinding) -> Proof | None:
     return Proof(
         records=tuple(record.name for record in data.features.records),
         channels=gaps,
-        overall=Gap(float(overall[0]), float(overall[1]), 1.0, DEVIATIONS, *_shares(data.rules)),
+        overall=Gap(
+            float(overall[0]), float(overall[1]), 1.0, DEVIATIONS, data.rules, overall_chance
+        ),
         by_record=tuple(
-            _gap(data, error[:, [k]].sum(axis=2), error_floor[[k]].sum(axis=1), CHANNELS[0])
+            _gap(
+                data,
+                error[:, [k]].sum(axis=2),
+                error_floor[[k]].sum(axis=1),
+                chance[[k], 0],
+                CHANNELS[0],
+            )
             for k in range(error.shape[1])
         ),
         orders=np.array([0.0, *data.features.orders]),
         by_order=tuple(
-            _gap(data, error[:, :, k], error_floor[:, k], CHANNELS[0])
+            _gap(data, error[:, :, k], error_floor[:, k], np.zeros(1), CHANNELS[0])
             for k in range(error.shape[2])
         ),
         dte=dte,
@@ -204,16 +229,29 @@ def _squares(data: Data, squares: Values, channel: int) -> Values:
     return np.concatenate([mean, lines], axis=-1)
 
 
-def _gap(data: Data, squares: Values, noise: Values, channel: str) -> Gap:
-    """Return the gap from mean squares (2, r) and those of the noise (r,)."""
+def _chance(data: Data, change: Values, misfit: float, channel: int) -> Values:
+    """Return the standard deviation of the growth of mean squares (r,) by the noise, SI.
+
+    Of a prediction that changes by features (r, f), where noise has a variance of ``misfit`` times
+    the stated one: noise alone makes the error of one prediction larger than that of the other.
+    """
+    weighted = np.zeros_like(change)
+    lines = data.features.places(channel).ravel()
+    weighted[:, lines] = change[:, lines] / 2.0
+    if channel in MEANS:
+        mean = MEANS.index(channel)
+        weighted[:, mean] = change[:, mean]
+    variance = np.einsum("rf,rfg,rg->r", weighted, data.covariance, weighted)
+    return np.asarray(2.0 * np.sqrt(misfit * variance))
+
+
+def _gap(data: Data, squares: Values, noise: Values, chance: Values, channel: str) -> Gap:
+    """Return the gap from mean squares (2, r), those of the noise (r,), and `_chance` (r,)."""
     unit, size = SHOWN_IN[channel]
     before, after = np.sqrt(squares.mean(axis=1)) / size
     floor = float(np.sqrt(noise.mean()) / size)
-    return Gap(float(before), float(after), floor, unit, *_shares(data.rules))
-
-
-def _shares(rules: Rules) -> tuple[float, float]:
-    return rules.least_gap_share, rules.worse_share
+    by_chance = float(np.linalg.norm(chance)) / squares.shape[1] / size**2
+    return Gap(float(before), float(after), floor, unit, data.rules, by_chance)
 
 
 def _height(gap: Gap) -> float:

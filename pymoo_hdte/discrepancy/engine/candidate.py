@@ -48,8 +48,8 @@ class Candidate:
         Base parameter that it frees of its tolerance.
     acts_at : str
         Port at which that parameter makes a torque, if it is at a port.
-    covered_by : str
-        Name of the effect that says the same as that parameter alone out of tolerance, if any.
+    covered_by, covered_at : str
+        Name and port of the effect that says the same as that parameter out of tolerance, if any.
     form : str
         In a word, where the library holds several forms of one effect.
     remembers : bool
@@ -74,6 +74,7 @@ class Candidate:
     frees: str | None = None
     acts_at: str = ""
     covered_by: str = ""
+    covered_at: str = ""
     form: str = ""
     remembers: bool = False
     instead_of: tuple[str, ...] = ()
@@ -86,6 +87,13 @@ class Candidate:
         order = "" if self.order is None else f"@{self.order:.4g}"
         form = f"/{self.form}" if self.form else ""
         return f"{self.name}{form}:{self.port}{order}"
+
+    @property
+    def says(self) -> tuple[str, str]:
+        """Name and port; of a value out of tolerance, those of the effect that says the same."""
+        if self.covered_by:
+            return self.covered_by, self.covered_at
+        return self.name, self.port
 
     @property
     def places(self) -> frozenset[Place]:
@@ -216,8 +224,18 @@ def candidate_of(
     )
 
 
-def out_of_tolerance(name: str, words: str, acts_at: str = "", covered_by: str = "") -> Candidate:
-    """Return the candidate that frees a base parameter, called ``words``, of its tolerance."""
+def out_of_tolerance(
+    name: str, words: str, acts_at: str = "", covered_by: tuple[str, str] = ("", "")
+) -> Candidate:
+    """Return the candidate that frees a base parameter, called ``words``, of its tolerance.
+
+    Parameters
+    ----------
+    name, words, acts_at : str
+        See `Candidate`.
+    covered_by : (str, str)
+        Name and port of the effect that says the same.
+    """
     return Candidate(
         "parameter",
         name,
@@ -228,7 +246,8 @@ def out_of_tolerance(name: str, words: str, acts_at: str = "", covered_by: str =
         exact=True,
         frees=name,
         acts_at=acts_at,
-        covered_by=covered_by,
+        covered_by=covered_by[0],
+        covered_at=covered_by[1],
     )
 
 

@@ -155,10 +155,7 @@ def stands_out(search: Search, chosen: Hypothesis, together: Sequence[Hypothesis
     others = (
         one
         for one in search.of_size(len(chosen.members))
-        if one.names != chosen.names
-        and one not in together
-        and not contains(one, chosen)
-        and not label_of(one.candidates) > label_of(chosen.candidates)
+        if not one.names >= chosen.names and one not in together and not contains(one, chosen)
     )
     enough = chosen.explained >= rules.partial_share and gains_enough(chosen, search.base, rules)
     least = rules.form_ratio * left_beyond_noise(search, chosen)

@@ -33,7 +33,7 @@ def doubts_of(search: Search, chosen: Hypothesis, vote: Vote | None) -> list[str
         if bounded:
             found.append(f"{', '.join(bounded)} of {candidate.label} ended at a bound")
         elif candidate in unsure:
-            found.append(f"the interval of {candidate.label} contains zero")
+            found += holds_zero([candidate])
     if any(one.frees in fitted.at_bounds for one in chosen.candidates):
         found.append("a base parameter ended at ten times or a tenth of what is believed")
     for name in _contradicted_in_any_form(search, chosen):
@@ -136,14 +136,32 @@ def _contradicted(fitted: Fit, rules: Rules) -> list[str]:
     ]
 
 
-def uncertain(fitted: Fit, rules: Rules) -> list[Candidate]:
-    """Return the candidates of a fit whose strength may be nothing."""
+def uncertain(
+    fitted: Fit, rules: Rules, covariance: NDArray[np.float64] | None = None
+) -> list[Candidate]:
+    """Return the candidates of a fit whose strength may be nothing.
+
+    By its own covariance, or by another one that reports state, shape (n_parameters, n_parameters).
+    """
     return [
-        one for one, place in fitted.places if not strength_is_certain(fitted, one, place, rules)
+        one
+        for one, place in fitted.places
+        if not strength_is_certain(fitted, one, place, rules, covariance)
     ]
 
 
-def strength_is_certain(fitted: Fit, candidate: Candidate, place: slice, rules: Rules) -> bool:
+def holds_zero(candidates: Sequence[Candidate]) -> list[str]:
+    """Say that the intervals of candidates contain zero."""
+    return [f"the interval of {one.label} contains zero" for one in candidates]
+
+
+def strength_is_certain(
+    fitted: Fit,
+    candidate: Candidate,
+    place: slice,
+    rules: Rules,
+    covariance: NDArray[np.float64] | None = None,
+) -> bool:
     """Tell whether the strength of an effect differs from nothing, by the noise of the records.
 
     Strengths are the unknowns that may be zero, lines with both their parts; one of them is enough:
@@ -152,11 +170,12 @@ def strength_is_certain(fitted: Fit, candidate: Candidate, place: slice, rules: 
     if not candidate.parameters:
         return True
     values = expected_values(fitted, rules)
-    if varies(candidate, values[place], fitted.covariance[place, place], rules):
+    covariance = fitted.covariance if covariance is None else covariance
+    if varies(candidate, values[place], covariance[place, place], rules):
         return True
     for row, parameter in enumerate(candidate.parameters, place.start):
         if parameter.lower <= 0.0 and not parameter.line:
-            deviation = np.sqrt(fitted.covariance[row, row])
+            deviation = np.sqrt(covariance[row, row])
             if abs(values[row]) > rules.certain_deviations * deviation:
                 return True
     return all(parameter.lower > 0.0 for parameter in candidate.parameters)

@@ -89,13 +89,17 @@ class Vote:
     def denies(self, rules: Rules, misfit: float) -> bool:
         """Tell whether the change removes nothing of their error, or less than a true one would.
 
+        Of a change that is too small to be seen, whether their error grows by more than chance.
+
         By chance a true one removes two standard deviations less, in units of what a fit's
         residuals are beside their noise (``misfit``), and in another form of its law not all of it:
         what stands for something else may remove next to nothing. A prediction that diverges, so
         that its change has no size, is denied where it diverges with the change.
         """
-        least = 0.0
-        if np.isfinite(self.change):
-            by_chance = self.change - (rules.vote_change * self.change * misfit) ** 0.5
-            least = max(min(by_chance, rules.vote_share * self.change), 0.0)
-        return self.before - self.after <= least
+        removed = self.before - self.after
+        if not np.isfinite(self.change):
+            return removed <= 0.0
+        by_chance = self.change - (rules.vote_change * self.change * misfit) ** 0.5
+        if not self.counts(rules):
+            return removed < min(by_chance, 0.0)
+        return removed <= max(min(by_chance, rules.vote_share * self.change), 0.0)

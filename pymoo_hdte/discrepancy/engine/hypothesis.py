@@ -83,8 +83,8 @@ class Hypothesis:
 
     @cached_property
     def names(self) -> frozenset[tuple[str, str]]:
-        """Name and port of each."""
-        return frozenset((candidate.name, candidate.port) for candidate in self.candidates)
+        """Name and port of each; a value out of tolerance and the effect it stands for are one."""
+        return frozenset(candidate.says for candidate in self.candidates)
 
 
 def label_of(effects: Sequence[Candidate]) -> frozenset[str]:

@@ -45,15 +45,20 @@ def of_names(
     float or None
         None for a status that names nothing.
     """
-    experience = {
+    experience = experience_of(rules).get(status)
+    if experience is None:
+        return None
+    return experience * _share((chosen, *equivalent), found, degrees_of_freedom)
+
+
+def experience_of(rules: Rules) -> dict[str, float]:
+    """Return the share of verdicts that were right, for each status that names something."""
+    return {
         "named": rules.named_right,
         "parameter": rules.named_right,
         "class": rules.class_right,
         "partial": rules.partial_right,
-    }.get(status)
-    if experience is None:
-        return None
-    return experience * _share((chosen, *equivalent), found, degrees_of_freedom)
+    }
 
 
 def likelier(

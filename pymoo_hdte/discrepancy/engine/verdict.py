@@ -28,9 +28,11 @@ from pymoo_hdte.discrepancy.engine.equivalents import Answer, answer_of, chosen_
 from pymoo_hdte.discrepancy.engine.excess import Vote
 from pymoo_hdte.discrepancy.engine.fitting import Evidence, Fit, fit
 from pymoo_hdte.discrepancy.engine.hypothesis import Hypothesis, down_to_noise
+from pymoo_hdte.discrepancy.engine.membership import beyond_stated
 from pymoo_hdte.discrepancy.engine.rules import RULES, Rules
 from pymoo_hdte.discrepancy.engine.screening import screen
 from pymoo_hdte.discrepancy.engine.search import Search
+from pymoo_hdte.effects.sentence_blanks import listed
 
 STATUSES = ("adequate", "named", "class", "parameter", "unlisted", "partial")
 EXPLAINED = ("named", "class", "parameter", "partial")
@@ -109,14 +111,44 @@ class Verdict:
         chosen = self.chosen
         return chosen is not None and chosen.explained >= self.rules.explained_part_share
 
-    def after_vote(self, vote: Vote) -> Verdict:
-        """Return it with the vote of held-out records: ``unlisted`` where they contradict it."""
-        if not vote.counts(self.rules):
-            return replace(self, shown_in_held_out=False)
-        if not vote.denies(self.rules, self.accepted.misfit):
+    def proven(
+        self, vote: Vote | None = None, worse: Sequence[str] = (), condemned: bool = False
+    ) -> Verdict:
+        """Return it as the held-out records leave it; every verdict with such records ends here.
+
+        Parameters
+        ----------
+        vote : Vote, optional
+            Theirs on the named effects, where it has not been heard yet.
+        worse : sequence of str
+            Whose prediction error grows with the named effects: see `grows`.
+        condemned : bool
+            Whether it grows where it matters most.
+
+        Returns
+        -------
+        Verdict
+            ``unlisted`` where they contradict it, and no better than ``partial`` where any error
+            of theirs grows.
+        """
+        if condemned or (vote and vote.denies(self.rules, self.accepted.misfit)):
+            doubts = (*self.doubts, NOT_PROVEN)
+            return replace(self, status="unlisted", equivalent=(), doubts=doubts, probability=None)
+        shown = self.shown_in_held_out and (vote is None or vote.counts(self.rules))
+        verdict = replace(self, shown_in_held_out=shown)
+        if not worse:
+            return verdict
+        return verdict.doubted([f"the error on records kept out of the fit grows: {listed(worse)}"])
+
+    def doubted(self, doubts: Sequence[str]) -> Verdict:
+        """Return it with further doubts, with which no status is unqualified."""
+        if not doubts:
             return self
-        doubts = (*self.doubts, NOT_PROVEN)
-        return replace(self, status="unlisted", equivalent=(), doubts=doubts, probability=None)
+        status, sure = self.status, self.probability
+        if status in ("named", "parameter"):
+            status, shares = "partial", probability.experience_of(self.rules)
+            sure = sure and sure * shares["partial"] / shares[self.status]
+        return replace(self, status=status, doubts=(*self.doubts, *doubts), probability=sure)
 
 
 def judge(
@@ -135,6 +167,8 @@ def judge(
     degrees_of_freedom = len(base.residuals) - len(base.values)
     candidates = [*candidates, *data.out_of_tolerance(base.at_bounds)]
     quiet = down_to_noise(base, degrees_of_freedom, rules) and not data.evident
+    # A sensor far from what is stated of it may have taken what is missing.
+    quiet = quiet and not beyond_stated(base, rules).any()
     # Screening is slow, and known sets need none unless the base itself may be adequate.
     searched = [one for one in candidates if not one.instead_of]
     screened = screen(data, base, searched) if quiet or not known else []
@@ -210,7 +244,7 @@ def _verdict(search: Search, answer: Answer) -> Verdict:
     equivalent = list(told)
     vote = data.held_out_vote(search.base, chosen.fit)
     shown = vote is None or vote.counts(rules)
-    doubts = doubts_of(search, chosen, vote if shown else None) + other_forms(search, chosen)
+    doubts = doubts_of(search, chosen, vote) + other_forms(search, chosen)
     if in_part:
         left = left_by(chosen.fit.chi_square / degrees_of_freedom)
         doubts += [left] if left not in doubts else []

@@ -8,7 +8,12 @@ from dataclasses import dataclass, replace
 
 from pymoo_hdte.discrepancy.engine.rules import RULES, Rules
 from pymoo_hdte.discrepancy.joint.halves import Joint, rigid_half, torsion_half
-from pymoo_hdte.discrepancy.joint.held_out import stiffness_of, torsion_gaps, voted
+from pymoo_hdte.discrepancy.joint.held_out import (
+    stiffness_of,
+    torsion_gaps,
+    voted,
+    without_unproved_lines,
+)
 from pymoo_hdte.discrepancy.joint.torsion import examine_torsion, lines_of
 from pymoo_hdte.discrepancy.mechanism.analysis import MechanismFinding, examine_mechanism
 from pymoo_hdte.discrepancy.mechanism.held_out import Progress, laws_of
@@ -101,6 +106,7 @@ def examine_joint(
     if verdict.status == "named" and slows:
         # The delay of one encoder behind the other explains as much.
         verdict = replace(verdict, status="class")
+    verdict = without_unproved_lines(verdict, torsion.accepted, gaps)
     told = replace(torsion, verdict=verdict)
     if told.accepted is not torsion.accepted:
         gaps = torsion_gaps(told)

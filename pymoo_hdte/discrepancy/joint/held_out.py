@@ -10,11 +10,12 @@ from numpy.typing import NDArray
 
 from pymoo_hdte.discrepancy.engine.excess import Vote
 from pymoo_hdte.discrepancy.engine.fitting import Fit
+from pymoo_hdte.discrepancy.engine.hypothesis import bounded_unknowns, label_of
 from pymoo_hdte.discrepancy.engine.verdict import Verdict
 from pymoo_hdte.discrepancy.mechanism.analysis import MechanismFinding
 from pymoo_hdte.discrepancy.mechanism.evidence import MeasuredData, measured_data
 from pymoo_hdte.discrepancy.mechanism.held_out import laws_of
-from pymoo_hdte.discrepancy.mechanism.proof import MeasuredGap
+from pymoo_hdte.discrepancy.mechanism.proof import MeasuredGap, chance_of, grown
 from pymoo_hdte.mechanism import Port
 from pymoo_hdte.mechanism.port_motion import law_force, torsion_noise
 
@@ -37,6 +38,8 @@ def torsion_gaps(finding: MechanismFinding) -> tuple[MeasuredGap, ...]:
         From `examine_torsion`.
     """
     (gear,) = (port for port in finding.mechanism.ports if port.followed)
+    # As the gaps are: with the fitted stiffness, of which the stated one may be a multiple.
+    left = float(finding.remainder[0]) / stiffness_of(finding.accepted, gear)
     found = []
     for record in finding.records:
         if record.role != "held_out":
@@ -51,6 +54,8 @@ def torsion_gaps(finding: MechanismFinding) -> tuple[MeasuredGap, ...]:
             _about(predicted_torsion(data, one)[rows], measured)
             for one in (finding.verdict.base, finding.accepted)
         )
+        noise = torsion_noise(gear, record)
+        expected = float(np.hypot(left, noise))
         found.append(
             MeasuredGap(
                 record.name,
@@ -58,16 +63,25 @@ def torsion_gaps(finding: MechanismFinding) -> tuple[MeasuredGap, ...]:
                 KIND,
                 _size(measured - before),
                 _size(measured - after),
-                torsion_noise(gear, record),
+                noise,
                 "rad",
                 balance.time[rows],
                 measured,
                 before,
                 after,
-                finding.data.rules.least_gap_share,
+                expected,
+                chance_of(
+                    expected, _size(after - before), _independent(finding, balance.time[rows])
+                ),
+                finding.data.rules,
             )
         )
     return tuple(found)
+
+
+def _independent(finding: MechanismFinding, time: Values) -> float:
+    """Return how many independent values a band up to the cutoff has in some time."""
+    return finding.cutoff * 2.0 * float(time[-1] - time[0])
 
 
 def _about(predicted: Values, measured: Values) -> Values:
@@ -146,12 +160,45 @@ def voted(finding: MechanismFinding, gaps: Sequence[MeasuredGap]) -> Verdict:
     verdict = finding.verdict
     if verdict.accepted is verdict.base or not gaps:
         return verdict
-    (gear,) = (port for port in finding.mechanism.ports if port.followed)
-    # As the gaps are: with the fitted stiffness, of which the stated one may be a multiple.
-    expected = (float(finding.remainder[0]) / stiffness_of(finding.accepted, gear)) ** 2
     sums = np.zeros(3)
     for gap in gaps:
-        count = finding.cutoff * 2.0 * float(gap.time[-1] - gap.time[0])
         change = float(np.mean((gap.predicted_after - gap.predicted_before) ** 2))
-        sums += count * np.array([gap.before**2, gap.after**2, change])
-    return verdict.after_vote(Vote(*(sums / (expected + gaps[0].noise_floor ** 2)).tolist()))
+        powers = np.array([gap.before**2, gap.after**2, change])
+        sums += _independent(finding, gap.time) * powers / gap.expected**2
+    return verdict.proven(Vote(*sums.tolist()), grown(gaps))
+
+
+def without_unproved_lines(verdict: Verdict, fitted: Fit, gaps: Sequence[MeasuredGap]) -> Verdict:
+    """Return a verdict on a torsion in which no set has an order that its fit or its proof denies.
+
+    A line whose amplitude ended at a bound, or one that leaves the held-out torsion as it was,
+    stands for something else: its order would send a reader to a part that does not err.
+
+    Parameters
+    ----------
+    verdict : Verdict
+        After the vote of its held-out records.
+    fitted : Fit
+        What was accepted before it.
+    gaps : sequence of MeasuredGap
+        Of that fit, on these records.
+    """
+    shrinks = not gaps or sum(one.after**2 - one.before**2 for one in gaps) < 0.0
+    denied = {
+        candidate.label
+        for candidate, bounded in bounded_unknowns(fitted)
+        if candidate.order is not None and (bounded or not shrinks)
+    }
+    if not denied or verdict.chosen is None:
+        return verdict
+    sets = verdict.chosen, *verdict.alternatives
+    others = [one for one in sets if not denied & label_of(one.candidates)]
+    return replace(
+        verdict,
+        status="unlisted",
+        chosen=others[0] if others else None,
+        alternatives=tuple(others[1:]),
+        equivalent=(),
+        doubts=(),
+        probability=None,
+    )

@@ -37,6 +37,7 @@ from pymoo_hdte.discrepancy.mechanism.preconditions import (
     fine_enough,
     usual_cutoff,
 )
+from pymoo_hdte.discrepancy.mechanism.proof import grown, prove_measured
 from pymoo_hdte.discrepancy.mechanism.rest import (
     fitted_values,
     root_mean_square,
@@ -187,7 +188,10 @@ def examine_mechanism(
     fits = verdict.base, verdict.accepted
     simulated = simulate_held_out(mechanism, records, data, fits, known, progress)
     verdict = voted(verdict, simulated)
-    return MechanismFinding(mechanism, records, cutoff, data, verdict, ripples, simulated)
+    finding = MechanismFinding(mechanism, records, cutoff, data, verdict, ripples, simulated)
+    if verdict.accepted is verdict.base:
+        return finding
+    return replace(finding, verdict=verdict.proven(worse=grown(prove_measured(finding))))
 
 
 def _beyond(

@@ -219,7 +219,7 @@ def voted(verdict: Verdict, simulated: Sequence[SimulatedRecord]) -> Verdict:
     """
     if verdict.accepted is verdict.base or not simulated:
         return verdict
-    return verdict.after_vote(_vote(simulated))
+    return verdict.proven(_vote(simulated))
 
 
 def _vote(simulated: Sequence[SimulatedRecord]) -> Vote:

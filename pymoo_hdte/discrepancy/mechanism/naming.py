@@ -9,7 +9,7 @@ from itertools import combinations
 import numpy as np
 
 from pymoo_hdte.discrepancy.engine.candidate import Candidate
-from pymoo_hdte.discrepancy.engine.doubts import doubts_of
+from pymoo_hdte.discrepancy.engine.doubts import doubts_of, holds_zero, uncertain
 from pymoo_hdte.discrepancy.engine.fitting import Fit, fit
 from pymoo_hdte.discrepancy.engine.hypothesis import (
     Hypothesis,
@@ -23,6 +23,7 @@ from pymoo_hdte.discrepancy.engine.hypothesis import (
 from pymoo_hdte.discrepancy.engine.search import Search
 from pymoo_hdte.discrepancy.engine.verdict import Verdict, judge
 from pymoo_hdte.discrepancy.mechanism.evidence import MeasuredData
+from pymoo_hdte.discrepancy.mechanism.intervals import Spread
 from pymoo_hdte.discrepancy.mechanism.rest import share_removed
 from pymoo_hdte.mechanism.believed import SMALLEST_SHARE
 
@@ -67,9 +68,13 @@ def judged(
     # The best effects define the noise, so that they fit down to it in any case.
     among = best is not None and label_of(chosen.candidates) <= label_of(best.candidates)
     own_noise = added or among
-    if own_noise and verdict.status == "named" and removed < rules.explained_share:
-        return replace(verdict, status="partial", doubts=(*verdict.doubts, _too_little(removed)))
-    return verdict
+    little = own_noise and verdict.status == "named" and removed < rules.explained_share
+    # What a real machine leaves is coloured, and the intervals that are printed are wider by that.
+    stated = Spread(data, chosen.fit)
+    scale = stated.reach / rules.certain_deviations
+    unsure = uncertain(chosen.fit, rules, stated.covariance * np.outer(scale, scale))
+    doubts = [one for one in holds_zero(unsure) if one not in verdict.doubts]
+    return verdict.doubted([_too_little(removed)] * little + doubts)
 
 
 def _compared(

@@ -6,15 +6,16 @@ balances show its error at each moment.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pymoo_hdte.discrepancy.drive.gap import grows
 from pymoo_hdte.discrepancy.engine.doubts import NOT_PROVEN
-from pymoo_hdte.discrepancy.engine.rules import RULES
-from pymoo_hdte.discrepancy.mechanism.analysis import MechanismFinding, root_mean_square
+from pymoo_hdte.discrepancy.engine.rules import RULES, Rules
 from pymoo_hdte.discrepancy.mechanism.evidence import measured_data
 from pymoo_hdte.discrepancy.mechanism.held_out import (
     Extent,
@@ -22,9 +23,13 @@ from pymoo_hdte.discrepancy.mechanism.held_out import (
     laws_of,
     simulate_held_out,
 )
+from pymoo_hdte.discrepancy.mechanism.rest import root_mean_square
 from pymoo_hdte.effects.sentence_blanks import in_words
 from pymoo_hdte.mechanism import Record
 from pymoo_hdte.mechanism.quantity_units import unit_of
+
+if TYPE_CHECKING:
+    from pymoo_hdte.discrepancy.mechanism.analysis import MechanismFinding
 
 Values = NDArray[np.float64]
 
@@ -52,8 +57,13 @@ class MeasuredGap:
         s and ``unit``; zero for a balance.
     predicted_before, predicted_after : ndarray, shape (n,)
         Predictions of the models; minus their residual for a balance.
-    least_share : float
-        Least excess of a gap over the noise floor, as a share of it, for a shrinkage to be stated.
+    expected : float
+        What the revised model leaves to be expected of it, by what it leaves of the training
+        records, in ``unit``.
+    chance : float
+        Standard deviation of the difference of the squares of the gaps, if only that is left.
+    rules : Rules
+        Thresholds by which it shrinks or grows.
     extent : Extent or None
         How much of the record was simulated; None for a balance.
     """
@@ -69,16 +79,23 @@ class MeasuredGap:
     measured: Values
     predicted_before: Values
     predicted_after: Values
-    least_share: float = RULES.least_gap_share
+    expected: float
+    chance: float
+    rules: Rules = RULES
     extent: Extent | None = None
 
     @property
     def shrinkage(self) -> float | None:
         """1 - (after - floor) / (before - floor), or None where there was no gap to shrink."""
         excess = self.before - self.noise_floor
-        if not excess > self.least_share * self.noise_floor:
+        if not excess > self.rules.least_gap_share * self.noise_floor:
             return None
         return min(1.0 - (self.after - self.noise_floor) / excess, 1.0)
+
+    @property
+    def worse(self) -> bool:
+        """Whether the correction made it larger: see `grows`. One that diverges is not said to."""
+        return grows(self.before, self.after, self.expected, self.chance, self.rules)
 
     @property
     def determination(self) -> tuple[float, float] | None:
@@ -147,6 +164,7 @@ def prove_measured(finding: MechanismFinding, whole: bool = False) -> tuple[Meas
 
 def _simulated(finding: MechanismFinding, one: SimulatedRecord) -> list[MeasuredGap]:
     after = one.before if finding.accepted is finding.verdict.base else one.after
+    values = one.extent.windows * one.independent
     return [
         MeasuredGap(
             one.record,
@@ -160,7 +178,9 @@ def _simulated(finding: MechanismFinding, one: SimulatedRecord) -> list[Measured
             measured,
             one.before[name],
             after[name],
-            finding.data.rules.least_gap_share,
+            expected := (one.expected[name] + one.noise[name] ** 2) ** 0.5,
+            chance_of(expected, _size(after[name] - one.before[name]), values),
+            finding.data.rules,
             one.extent,
         )
         for name, measured in one.measured.items()
@@ -171,11 +191,15 @@ def _balanced(finding: MechanismFinding, record: Record) -> list[MeasuredGap]:
     data = measured_data(finding.mechanism, [record], finding.cutoff, finding.data.known)
     n_base = len(data.base)
     (balance,) = data.spectra
-    residual = []
-    for one in (finding.verdict.base, finding.accepted):
-        whitened = data.residuals(one.values[:n_base], laws_of(one.effects))
-        residual.append((root_mean_square(data, whitened), data.coefficients(whitened)[0]))
+    whitened = [
+        data.residuals(one.values[:n_base], laws_of(one.effects))
+        for one in (finding.verdict.base, finding.accepted)
+    ]
+    residual = [(root_mean_square(data, one), data.coefficients(one)[0]) for one in whitened]
     floor = root_mean_square(data, np.ones(len(data.frequency)))
+    change = root_mean_square(data, whitened[1] - whitened[0])
+    counts = [len(rows) for rows in data.rows_of_parts()]
+    expected = np.maximum(finding.remainder, floor)
     return [
         MeasuredGap(
             record.name,
@@ -189,10 +213,25 @@ def _balanced(finding: MechanismFinding, record: Record) -> list[MeasuredGap]:
             np.zeros(len(balance.time)),
             -balance.in_time(residual[0][1][place]),
             -balance.in_time(residual[1][1][place]),
-            finding.data.rules.least_gap_share,
+            float(expected[place]),
+            chance_of(float(expected[place]), float(change[place]), counts[place]),
+            finding.data.rules,
         )
         for place, name in enumerate(data.names)
     ]
+
+
+def chance_of(expected: float, change: float, values: float) -> float:
+    """Return the standard deviation of the growth of a mean square error by what is expected of it.
+
+    Parameters
+    ----------
+    expected, change : float
+        Root mean squares of the error to be expected, and of the change of the prediction.
+    values : float
+        Number of independent values.
+    """
+    return 2.0 * expected * change / max(values, 1.0) ** 0.5
 
 
 def rests_told(finding: MechanismFinding) -> list[str]:
@@ -219,6 +258,11 @@ def not_proven(finding: MechanismFinding) -> list[str]:
         f"{in_words(chosen.label)} would explain the records that were fitted, but "
         f"{NOT_PROVEN}: {', '.join(sizes)} (root mean square, SI)."
     ]
+
+
+def grown(gaps: Sequence[MeasuredGap]) -> list[str]:
+    """Return in words the gaps that the correction made worse."""
+    return [f"{one.quantity} by {one.kind} in {one.record}" for one in gaps if one.worse]
 
 
 def _size(difference: Values) -> float:

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from pymoo_hdte.discrepancy.drive.gap import Gap
 from pymoo_hdte.discrepancy.drive.misfit.relevance import Relevance, largest_change, relevance
 from pymoo_hdte.discrepancy.drive.proof import Proof
+from pymoo_hdte.discrepancy.engine.rules import RULES
 from pymoo_hdte.discrepancy.engine.verdict import Verdict
 from pymoo_hdte.discrepancy.report.document import sentence
 from pymoo_hdte.discrepancy.report.gap_words import gap_sentence
@@ -108,7 +109,7 @@ def test_without_an_effect_or_a_record_nothing_is_claimed():
 
 @given(st.floats(0.0, 1e3), st.floats(0.0, 1e3), st.floats(1e-3, 1e3))
 def test_worse_is_larger_by_more_than_the_rule_says(before, after, floor):
-    gap = Gap(before, after, floor, "arcsec", least_share=0.1, worse_share=0.05)
+    gap = Gap(before, after, floor, "arcsec", RULES)
     assert gap.worse == (after - before > 0.05 * floor and after > 1.1 * floor)
     assert not (gap.worse and gap.shrinkage is not None and gap.shrinkage > 0.0)
 
