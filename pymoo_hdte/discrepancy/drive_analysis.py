@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from pymoo_hdte.discrepancy.campaign.campaign import Campaign
-from pymoo_hdte.discrepancy.drive.analysis import DriveFinding
+from pymoo_hdte.discrepancy.drive.finding import DriveFinding
 from pymoo_hdte.discrepancy.drive.misfit.location import Location, locate
 from pymoo_hdte.discrepancy.drive.next_test import Proposal, next_experiment
 from pymoo_hdte.discrepancy.drive.proof import Proof, prove

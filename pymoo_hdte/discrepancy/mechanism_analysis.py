@@ -8,8 +8,8 @@ from typing import Any
 
 from pymoo_hdte.discrepancy.engine.verdict import Verdict
 from pymoo_hdte.discrepancy.joint.analysis import JointFinding, revised_joint
-from pymoo_hdte.discrepancy.mechanism.analysis import MechanismFinding
 from pymoo_hdte.discrepancy.mechanism.files import MeasuredMechanism
+from pymoo_hdte.discrepancy.mechanism.finding import MechanismFinding
 from pymoo_hdte.discrepancy.mechanism.location import MechanismLocation, locate_in_mechanism
 from pymoo_hdte.discrepancy.mechanism.models import MechanismModel
 from pymoo_hdte.discrepancy.mechanism.next_tests import NextTest, next_test

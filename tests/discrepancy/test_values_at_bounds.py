@@ -13,8 +13,8 @@ from pymoo_hdte.discrepancy.drive.proof import prove
 from pymoo_hdte.discrepancy.drive.revision import drive_model
 from pymoo_hdte.discrepancy.engine.fitting import fit
 from pymoo_hdte.discrepancy.engine.verdict import Verdict
-from pymoo_hdte.discrepancy.mechanism.analysis import MechanismFinding
 from pymoo_hdte.discrepancy.mechanism.evidence import measured_data
+from pymoo_hdte.discrepancy.mechanism.finding import MechanismFinding
 from pymoo_hdte.discrepancy.mechanism.held_out import simulate_held_out
 from pymoo_hdte.discrepancy.mechanism.next_tests import next_test
 from pymoo_hdte.discrepancy.mechanism.proof import prove_measured

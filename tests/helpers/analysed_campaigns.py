@@ -7,10 +7,10 @@ from virtual_rig_cases import BELIEVED, RIG, effect, true_rig
 
 from experiments.studies.virtual_rig.rig import run_campaign
 from experiments.studies.virtual_rig.runs import Condition
-from pymoo_hdte.discrepancy.drive.analysis import DriveFinding
 from pymoo_hdte.discrepancy.drive.candidates import drive_candidates
 from pymoo_hdte.discrepancy.drive.evidence import Data, start_parameters
 from pymoo_hdte.discrepancy.drive.features import measure
+from pymoo_hdte.discrepancy.drive.finding import DriveFinding
 from pymoo_hdte.discrepancy.drive.sizes import port_sizes
 from pymoo_hdte.discrepancy.engine.fitting import fit
 from pymoo_hdte.discrepancy.engine.hypothesis import Hypothesis

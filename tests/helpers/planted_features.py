@@ -7,10 +7,10 @@ from types import SimpleNamespace
 import numpy as np
 from virtual_rig_cases import BELIEVED, PHASES, RIG
 
-from pymoo_hdte.discrepancy.drive.analysis import DriveFinding
 from pymoo_hdte.discrepancy.drive.candidates import drive_candidates
 from pymoo_hdte.discrepancy.drive.evidence import Data
 from pymoo_hdte.discrepancy.drive.features import Features
+from pymoo_hdte.discrepancy.drive.finding import DriveFinding
 from pymoo_hdte.discrepancy.drive.parameters import base_parameters
 from pymoo_hdte.discrepancy.drive.prediction import Conditions, coefficients_of
 from pymoo_hdte.discrepancy.drive.sizes import Scales, port_sizes

@@ -20,9 +20,10 @@ from experiments.studies.blind.cases import Case
 from experiments.studies.blind.codes import ERROR, NAMES, PORTS, STATUSES, code, code_of_set
 from experiments.studies.blind.truth import may_be_named, one_name, to_be_named
 from pymoo_hdte.discrepancy import Campaign
-from pymoo_hdte.discrepancy.drive.analysis import DriveFinding, examine_drive
+from pymoo_hdte.discrepancy.drive.analysis import examine_drive
 from pymoo_hdte.discrepancy.drive.evidence import training_data
 from pymoo_hdte.discrepancy.drive.features import Features, measure
+from pymoo_hdte.discrepancy.drive.finding import DriveFinding
 from pymoo_hdte.discrepancy.drive.misfit.location import locate
 from pymoo_hdte.discrepancy.drive.misfit.map import Flags
 from pymoo_hdte.discrepancy.drive.next_test import next_experiment

@@ -20,8 +20,8 @@ from experiments.studies.blind.candidate_terms import terms
 from experiments.studies.blind.torque_balances import Regression, regression
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy.campaign.line_fit import CHANNELS
-from pymoo_hdte.discrepancy.drive.analysis import DriveFinding
 from pymoo_hdte.discrepancy.drive.evidence import Data
+from pymoo_hdte.discrepancy.drive.finding import DriveFinding
 from pymoo_hdte.discrepancy.drive.objective import LOST
 from pymoo_hdte.discrepancy.drive.observations import (
     as_lines,

@@ -14,8 +14,9 @@ from experiments.runner.committed import DATA
 from experiments.runner.result import Column, Picture, Result, Table
 from pymoo_hdte.discrepancy.joint.analysis import JointFinding, examine_joint
 from pymoo_hdte.discrepancy.joint.halves import joint_of, rigid_half
-from pymoo_hdte.discrepancy.mechanism.analysis import MechanismFinding, examine_mechanism
+from pymoo_hdte.discrepancy.mechanism.analysis import examine_mechanism
 from pymoo_hdte.discrepancy.mechanism.files import MeasuredMechanism, read_rig
+from pymoo_hdte.discrepancy.mechanism.finding import MechanismFinding
 from pymoo_hdte.discrepancy.mechanism.next_tests import next_test
 from pymoo_hdte.discrepancy.mechanism.proof import MeasuredGap, prove_measured
 from pymoo_hdte.discrepancy.report.mechanism import extent_sentence, proof_sentence

@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from experiments.runner.result import Column, Table
 from experiments.runner.result import Finding as Agreement
 from experiments.studies.measured.rigs import Study, coloured_rest
-from pymoo_hdte.discrepancy.mechanism.analysis import MechanismFinding, examine_mechanism
+from pymoo_hdte.discrepancy.mechanism.analysis import examine_mechanism
+from pymoo_hdte.discrepancy.mechanism.finding import MechanismFinding
 from pymoo_hdte.discrepancy.mechanism.held_out import fitted_mechanism
 from pymoo_hdte.discrepancy.report.tables import STATUSES
 from pymoo_hdte.effects.friction import NonlinearDrag

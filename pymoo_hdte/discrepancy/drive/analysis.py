@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +12,6 @@ from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy.campaign.campaign import Campaign
 from pymoo_hdte.discrepancy.campaign.records import RunningRecord
 from pymoo_hdte.discrepancy.campaign.rows.examination import examined_rows
-from pymoo_hdte.discrepancy.campaign.rows.findings import RowFindings
 from pymoo_hdte.discrepancy.drive import rattling
 from pymoo_hdte.discrepancy.drive.candidates import drive_candidates
 from pymoo_hdte.discrepancy.drive.evidence import Data, flanks_held, training_data
@@ -23,6 +22,7 @@ from pymoo_hdte.discrepancy.drive.features import (
     unexpected_lines,
     unexpected_orders,
 )
+from pymoo_hdte.discrepancy.drive.finding import DriveFinding
 from pymoo_hdte.discrepancy.drive.prediction import coefficients_of
 from pymoo_hdte.discrepancy.drive.proof import prove
 from pymoo_hdte.discrepancy.drive.sizes import port_sizes, scales_of
@@ -36,35 +36,6 @@ from pymoo_hdte.drive.solve.free_angle import torus_of
 from pymoo_hdte.effects.effect import effect_named
 from pymoo_hdte.effects.unknowns import HARMONIC_NAMES, is_among
 from pymoo_hdte.one_thread import ONE_THREAD
-
-
-@dataclass(frozen=True, eq=False)
-class DriveFinding:
-    """A campaign and the result of its analysis.
-
-    Attributes
-    ----------
-    campaign : Campaign
-        Without the faulty rows, and with the noise that was found.
-    data : Data
-        Features of the training records.
-    verdict : Verdict
-    unexpected : tuple of float
-        Orders beyond the expected ones with significant lines.
-    rows : RowFindings
-        Faulty rows, and the noise of the records beside the stated one.
-    """
-
-    campaign: Campaign
-    data: Data
-    verdict: Verdict
-    unexpected: tuple[float, ...]
-    rows: RowFindings = field(default_factory=RowFindings)
-
-    @property
-    def held_out(self) -> Data | None:
-        """Features of the held-out records: see `Data.held_out`."""
-        return self.data.held_out
 
 
 def expected_orders(campaign: Campaign, rules: Rules = RULES) -> list[float]:

@@ -6,7 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from pymoo_hdte.discrepancy.drive.analysis import DriveFinding, highest_order
+from pymoo_hdte.discrepancy.drive.analysis import highest_order
+from pymoo_hdte.discrepancy.drive.finding import DriveFinding
 from pymoo_hdte.discrepancy.drive.stated_sensors import sensor_caveats
 from pymoo_hdte.discrepancy.engine.verdict import EXPLAINED
 from pymoo_hdte.effects.unknowns import harmonics_among

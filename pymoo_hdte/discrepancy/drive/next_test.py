@@ -18,8 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pymoo_hdte.discrepancy.campaign.line_fit import CHANNELS
-from pymoo_hdte.discrepancy.drive.analysis import DriveFinding
 from pymoo_hdte.discrepancy.drive.features import MEANS
+from pymoo_hdte.discrepancy.drive.finding import DriveFinding
 from pymoo_hdte.discrepancy.drive.parameters import labels_by_order
 from pymoo_hdte.discrepancy.drive.planned_tests import Grid, Model, separation
 from pymoo_hdte.discrepancy.engine.candidate import labels_apart

@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pymoo_hdte.discrepancy.drive.analysis import DriveFinding
 from pymoo_hdte.discrepancy.drive.evidence import Data, flanks_held
 from pymoo_hdte.discrepancy.drive.features import Features
+from pymoo_hdte.discrepancy.drive.finding import DriveFinding
 from pymoo_hdte.discrepancy.drive.objective import Objective
 from pymoo_hdte.discrepancy.drive.prediction import Conditions
 from pymoo_hdte.discrepancy.drive.rattling import clearances

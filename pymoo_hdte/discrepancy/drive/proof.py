@@ -7,7 +7,7 @@ their squares add up to a `Gap`.
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,14 +17,12 @@ from pymoo_hdte.discrepancy.campaign.records import RunningRecord
 from pymoo_hdte.discrepancy.campaign.rows.settling import unsettled_rows
 from pymoo_hdte.discrepancy.drive.evidence import Data
 from pymoo_hdte.discrepancy.drive.features import MEANS
+from pymoo_hdte.discrepancy.drive.finding import DriveFinding
 from pymoo_hdte.discrepancy.drive.gap import DEVIATIONS, Gap
 from pymoo_hdte.discrepancy.engine.fitting import Fit
 from pymoo_hdte.drive import OrderSpectrum
 from pymoo_hdte.units import ARCSEC, UNITS
 from pymoo_hdte.validation import ValidationMetrics, validation_metrics
-
-if TYPE_CHECKING:
-    from pymoo_hdte.discrepancy.drive.analysis import DriveFinding
 
 _OVERLAY_TURNS = 2.0
 _OVERLAY_POINTS = 400

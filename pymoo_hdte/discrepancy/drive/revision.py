@@ -16,7 +16,7 @@ from pymoo_hdte.discrepancy.campaign.believed import BelievedDrive
 from pymoo_hdte.discrepancy.campaign.believed_model import LEAST
 from pymoo_hdte.discrepancy.campaign.campaign import Campaign
 from pymoo_hdte.discrepancy.campaign.known_values import with_known_values
-from pymoo_hdte.discrepancy.drive.analysis import DriveFinding
+from pymoo_hdte.discrepancy.drive.finding import DriveFinding
 from pymoo_hdte.discrepancy.engine.fitting import Fit
 from pymoo_hdte.drive import (
     DampingReference,

@@ -15,7 +15,8 @@ from pymoo_hdte.discrepancy.joint.held_out import (
     without_unproved_lines,
 )
 from pymoo_hdte.discrepancy.joint.torsion import examine_torsion, lines_of
-from pymoo_hdte.discrepancy.mechanism.analysis import MechanismFinding, examine_mechanism
+from pymoo_hdte.discrepancy.mechanism.analysis import examine_mechanism
+from pymoo_hdte.discrepancy.mechanism.finding import MechanismFinding
 from pymoo_hdte.discrepancy.mechanism.held_out import Progress, laws_of
 from pymoo_hdte.discrepancy.mechanism.models import MechanismModel
 from pymoo_hdte.discrepancy.mechanism.preconditions import check_signals

@@ -12,8 +12,8 @@ from pymoo_hdte.discrepancy.engine.excess import Vote
 from pymoo_hdte.discrepancy.engine.fitting import Fit
 from pymoo_hdte.discrepancy.engine.hypothesis import bounded_unknowns, label_of
 from pymoo_hdte.discrepancy.engine.verdict import Verdict
-from pymoo_hdte.discrepancy.mechanism.analysis import MechanismFinding
 from pymoo_hdte.discrepancy.mechanism.evidence import MeasuredData, measured_data
+from pymoo_hdte.discrepancy.mechanism.finding import MechanismFinding
 from pymoo_hdte.discrepancy.mechanism.held_out import laws_of
 from pymoo_hdte.discrepancy.mechanism.proof import MeasuredGap, chance_of, grown
 from pymoo_hdte.mechanism import Port

@@ -15,11 +15,12 @@ from pymoo_hdte.discrepancy.engine.candidate import Candidate, candidate_of
 from pymoo_hdte.discrepancy.engine.fitting import Fit, fit
 from pymoo_hdte.discrepancy.engine.rules import RULES, Rules
 from pymoo_hdte.discrepancy.joint.halves import Half, Joint
-from pymoo_hdte.discrepancy.mechanism.analysis import MechanismFinding, examined
+from pymoo_hdte.discrepancy.mechanism.analysis import examined
 from pymoo_hdte.discrepancy.mechanism.beyond_band.ripple import Ripple, Ripples, find_ripples
 from pymoo_hdte.discrepancy.mechanism.beyond_band.ripple_size import Part
 from pymoo_hdte.discrepancy.mechanism.candidates import port_sizes
 from pymoo_hdte.discrepancy.mechanism.evidence import MeasuredData, measured_data
+from pymoo_hdte.discrepancy.mechanism.finding import MechanismFinding
 from pymoo_hdte.discrepancy.mechanism.orders import position_orders
 from pymoo_hdte.discrepancy.mechanism.preconditions import check_sampling, check_scale, fine_enough
 from pymoo_hdte.discrepancy.mechanism.rest import (

@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 
 from pymoo_hdte.discrepancy.engine.fitting import fit
 from pymoo_hdte.discrepancy.engine.hypothesis import Hypothesis
-from pymoo_hdte.discrepancy.mechanism.analysis import MechanismFinding
 from pymoo_hdte.discrepancy.mechanism.candidates import turns_back
 from pymoo_hdte.discrepancy.mechanism.evidence import measured_data
+from pymoo_hdte.discrepancy.mechanism.finding import MechanismFinding
 from pymoo_hdte.discrepancy.mechanism.rest import root_mean_square
 from pymoo_hdte.effects.sentence_blanks import in_words
 from pymoo_hdte.mechanism.port_motion import PortMotion, law_force

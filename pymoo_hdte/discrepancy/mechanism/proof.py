@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,7 @@ from pymoo_hdte.discrepancy.drive.gap import grows
 from pymoo_hdte.discrepancy.engine.doubts import NOT_PROVEN
 from pymoo_hdte.discrepancy.engine.rules import RULES, Rules
 from pymoo_hdte.discrepancy.mechanism.evidence import measured_data
+from pymoo_hdte.discrepancy.mechanism.finding import MechanismFinding
 from pymoo_hdte.discrepancy.mechanism.held_out import (
     Extent,
     SimulatedRecord,
@@ -27,9 +28,6 @@ from pymoo_hdte.discrepancy.mechanism.rest import root_mean_square
 from pymoo_hdte.effects.sentence_blanks import in_words
 from pymoo_hdte.mechanism import Record
 from pymoo_hdte.mechanism.quantity_units import unit_of
-
-if TYPE_CHECKING:
-    from pymoo_hdte.discrepancy.mechanism.analysis import MechanismFinding
 
 Values = NDArray[np.float64]
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pymoo_hdte.discrepancy.mechanism.analysis import MechanismFinding
+from pymoo_hdte.discrepancy.mechanism.finding import MechanismFinding
 from pymoo_hdte.discrepancy.mechanism.held_out import laws_of
 from pymoo_hdte.discrepancy.mechanism.models import MechanismModel
 from pymoo_hdte.discrepancy.mechanism.rest import fitted_values

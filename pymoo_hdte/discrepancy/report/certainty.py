@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from pymoo_hdte.discrepancy.drive.analysis import DriveFinding
 from pymoo_hdte.discrepancy.drive.evidence import PARTS
+from pymoo_hdte.discrepancy.drive.finding import DriveFinding
 from pymoo_hdte.discrepancy.drive.parameters import labels_by_order, words_of
 from pymoo_hdte.discrepancy.engine.hypothesis import (
     Hypothesis,
@@ -14,7 +14,7 @@ from pymoo_hdte.discrepancy.engine.hypothesis import (
     unexplained,
 )
 from pymoo_hdte.discrepancy.engine.verdict import Verdict
-from pymoo_hdte.discrepancy.mechanism.analysis import MechanismFinding
+from pymoo_hdte.discrepancy.mechanism.finding import MechanismFinding
 from pymoo_hdte.effects.sentence_blanks import in_words, listed
 from pymoo_hdte.reports.html import number, percent
 

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pymoo_hdte.discrepancy.drive.analysis import DriveFinding
 from pymoo_hdte.discrepancy.drive.evidence import PARTS
+from pymoo_hdte.discrepancy.drive.finding import DriveFinding
 from pymoo_hdte.discrepancy.drive.misfit.map import Location
 from pymoo_hdte.discrepancy.drive.misfit.relevance import relevance
 from pymoo_hdte.discrepancy.drive.next_test import Proposal

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pymoo_hdte.discrepancy.drive.analysis import DriveFinding
+from pymoo_hdte.discrepancy.drive.finding import DriveFinding
 from pymoo_hdte.discrepancy.drive.proof import Proof
 from pymoo_hdte.reports.html import number, percent
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from pymoo_hdte.discrepancy.joint.analysis import JointFinding, revised_joint
-from pymoo_hdte.discrepancy.mechanism.analysis import MechanismFinding
+from pymoo_hdte.discrepancy.mechanism.finding import MechanismFinding
 from pymoo_hdte.discrepancy.mechanism.models import model_text
 from pymoo_hdte.discrepancy.mechanism.next_tests import NextTest
 from pymoo_hdte.discrepancy.mechanism.proof import MeasuredGap

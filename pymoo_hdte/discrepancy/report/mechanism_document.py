@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from pymoo_hdte.discrepancy.engine.hypothesis import Hypothesis, label_of
-from pymoo_hdte.discrepancy.mechanism.analysis import MechanismFinding
 from pymoo_hdte.discrepancy.mechanism.candidates import turns_back
+from pymoo_hdte.discrepancy.mechanism.finding import MechanismFinding
 from pymoo_hdte.discrepancy.mechanism.location import locate_in_mechanism
 from pymoo_hdte.discrepancy.mechanism.next_tests import NextTest
 from pymoo_hdte.discrepancy.mechanism.proof import MeasuredGap, not_proven, rests_told

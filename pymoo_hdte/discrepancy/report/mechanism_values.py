@@ -8,7 +8,7 @@ import numpy as np
 
 from pymoo_hdte.discrepancy.engine.candidate import Candidate
 from pymoo_hdte.discrepancy.engine.fitting import Fit
-from pymoo_hdte.discrepancy.mechanism.analysis import MechanismFinding
+from pymoo_hdte.discrepancy.mechanism.finding import MechanismFinding
 from pymoo_hdte.discrepancy.mechanism.intervals import Spread
 from pymoo_hdte.effects.effect import effect_named
 from pymoo_hdte.effects.unknowns import line_with_variance

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from pymoo_hdte.discrepancy.campaign.campaign import Campaign
-from pymoo_hdte.discrepancy.drive.analysis import DriveFinding
+from pymoo_hdte.discrepancy.drive.finding import DriveFinding
 from pymoo_hdte.discrepancy.drive.gap import Gap
 from pymoo_hdte.discrepancy.drive.parameters import labels_by_order, name_by_order, words_of
 from pymoo_hdte.discrepancy.drive.proof import Proof

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from quick_campaigns import quick_campaign
 
-from pymoo_hdte.discrepancy.drive.analysis import DriveFinding
 from pymoo_hdte.discrepancy.drive.coverage import campaign_limits
 from pymoo_hdte.discrepancy.drive.evidence import Data
 from pymoo_hdte.discrepancy.drive.features import measure
+from pymoo_hdte.discrepancy.drive.finding import DriveFinding
 from pymoo_hdte.discrepancy.engine.verdict import Verdict
 
 ORDERS = [1.0, 2.0, 2.02, 3.0, 4.0]

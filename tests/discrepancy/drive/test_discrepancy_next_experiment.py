@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from planted_features import analysed, known_data, listed, measured
 
-from pymoo_hdte.discrepancy.drive.analysis import DriveFinding
+from pymoo_hdte.discrepancy.drive.finding import DriveFinding
 from pymoo_hdte.discrepancy.drive.misfit.location import locate
 from pymoo_hdte.discrepancy.drive.next_test import nearest_rivals, next_experiment
 from pymoo_hdte.discrepancy.drive.planned_tests import Grid, Model, separation

@@ -18,9 +18,9 @@ from scipy.optimize import lsq_linear
 from scipy.stats import chi2
 
 from pymoo_hdte.discrepancy.campaign.line_fit import CHANNELS
-from pymoo_hdte.discrepancy.drive.analysis import DriveFinding
 from pymoo_hdte.discrepancy.drive.evidence import Data
 from pymoo_hdte.discrepancy.drive.features import MEANS
+from pymoo_hdte.discrepancy.drive.finding import DriveFinding
 from pymoo_hdte.discrepancy.drive.misfit.map import (
     Flags,
     Location,
