@@ -1,6 +1,6 @@
 """From records of a mechanism to a verdict: missing effects, and the unexplained residual.
 
-The rules are those of `discrepancy.engine.verdict`. Because no model of a real machine fits down to
+The rules are those of `discrepancy._selection.verdict`. Because no model of a real machine fits down to
 the noise of its sensors, they are applied relative to the unexplained residual: see `rest`. A
 verdict therefore names effects that are significant beyond this residual, and states it.
 """
