@@ -5,12 +5,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+from scipy.stats import norm
+
 from pymoo_hdte.discrepancy._selection.rules import RULES, Rules
 
 DEVIATIONS = "standard deviations of the noise"
 
 
-def grows(before: float, after: float, floor: float, chance: float, rules: Rules = RULES) -> bool:
+def grows(
+    before: float, after: float, floor: float, chance: float, among: int = 1, rules: Rules = RULES
+) -> bool:
     """Tell whether a root mean square error on held-out records grew, and not by their noise.
 
     One within the noise is not said to grow, as it cannot be said to shrink.
@@ -22,11 +26,15 @@ def grows(before: float, after: float, floor: float, chance: float, rules: Rules
         What the best model leaves of it.
     chance : float
         Standard deviation of ``after**2 - before**2`` by the noise of the records.
+    among : int
+        Number of errors that are asked: the chance that noise makes any of them grow is that of
+        one (Bonferroni).
     rules : Rules
     """
     beyond = after > (1.0 + rules.least_gap_share) * floor
     larger = after - before > rules.worse_share * floor
-    return beyond and larger and after**2 - before**2 > rules.certain_deviations * chance
+    deviations = float(norm.isf(norm.sf(rules.certain_deviations) / among))
+    return beyond and larger and after**2 - before**2 > deviations * chance
 
 
 @dataclass(frozen=True)
@@ -43,6 +51,8 @@ class Gap:
         Thresholds by which it shrinks or grows.
     chance : float
         Standard deviation of the difference of their squares by the noise.
+    among : int
+        See `grows`.
     """
 
     before: float
@@ -51,11 +61,13 @@ class Gap:
     unit: str
     rules: Rules = RULES
     chance: float = 0.0
+    among: int = 1
 
     @property
     def worse(self) -> bool:
         """Whether the correction made it larger: see `grows`."""
-        return grows(self.before, self.after, self.noise_floor, self.chance, self.rules)
+        sizes = self.before, self.after, self.noise_floor, self.chance
+        return grows(*sizes, self.among, self.rules)
 
     @property
     def reduction(self) -> float:

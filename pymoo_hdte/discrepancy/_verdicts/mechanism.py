@@ -1,8 +1,9 @@
 """From records of a mechanism to a verdict: missing effects, and the unexplained residual.
 
-The rules are those of `discrepancy._selection.verdict`. Because no model of a real machine fits down to
-the noise of its sensors, they are applied relative to the unexplained residual: see `rest`. A
-verdict therefore names effects that are significant beyond this residual, and states it.
+The rules are those of `_selection.verdict`. Because no model of a real machine fits down to the
+noise of its sensors, they are applied relative to the unexplained residual: see
+`_evidence.force_balances.unexplained`. A verdict therefore names effects that are significant
+beyond this residual, and states it.
 """
 
 from __future__ import annotations

@@ -6,7 +6,7 @@ their squares add up to a `Gap`.
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -177,6 +177,11 @@ def prove(finding: DriveFinding) -> Proof | None:
     overall_chance = 2.0 * float(np.linalg.norm(moved)) * misfit**0.5 / moved.size
     error, error_floor = squares[:, :, 0], floor[:, 0]
     leading = max(gaps, key=lambda name: _height(gaps[name]))
+    # What decides is asked first; one of the others grows by chance the more easily.
+    others = len(gaps) - 1 + len(data.features.records)
+    gaps = {
+        name: replace(gap, among=2 if name == leading else others) for name, gap in gaps.items()
+    }
     beside = "input_torque" if leading == "transmission_error" else leading
     place = CHANNELS.index(leading)
     worst = int(np.argmax(squares[0, :, place].sum(axis=1) / floor[:, place].sum(axis=1)))
@@ -185,15 +190,18 @@ def prove(finding: DriveFinding) -> Proof | None:
         records=tuple(record.name for record in data.features.records),
         channels=gaps,
         overall=Gap(
-            float(overall[0]), float(overall[1]), 1.0, DEVIATIONS, data.rules, overall_chance
+            float(overall[0]), float(overall[1]), 1.0, DEVIATIONS, data.rules, overall_chance, 2
         ),
         by_record=tuple(
-            _gap(
-                data,
-                error[:, [k]].sum(axis=2),
-                error_floor[[k]].sum(axis=1),
-                chance[[k], 0],
-                CHANNELS[0],
+            replace(
+                _gap(
+                    data,
+                    error[:, [k]].sum(axis=2),
+                    error_floor[[k]].sum(axis=1),
+                    chance[[k], 0],
+                    CHANNELS[0],
+                ),
+                among=others,
             )
             for k in range(error.shape[1])
         ),

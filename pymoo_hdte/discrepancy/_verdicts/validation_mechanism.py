@@ -90,10 +90,9 @@ class MeasuredGap:
             return None
         return min(1.0 - (self.after - self.noise_floor) / excess, 1.0)
 
-    @property
-    def worse(self) -> bool:
-        """Whether the correction made it larger: see `grows`. One that diverges is not said to."""
-        return grows(self.before, self.after, self.expected, self.chance, self.rules)
+    def worse(self, among: int) -> bool:
+        """Tell whether the correction made it larger: see `grows`. One that diverges does not."""
+        return grows(self.before, self.after, self.expected, self.chance, among, self.rules)
 
     @property
     def determination(self) -> tuple[float, float] | None:
@@ -260,7 +259,8 @@ def not_proven(finding: MechanismFinding) -> list[str]:
 
 def grown(gaps: Sequence[MeasuredGap]) -> list[str]:
     """Return in words the gaps that the correction made worse."""
-    return [f"{one.quantity} by {one.kind} in {one.record}" for one in gaps if one.worse]
+    worse = [one for one in gaps if one.worse(among=len(gaps))]
+    return [f"{one.quantity} by {one.kind} in {one.record}" for one in worse]
 
 
 def _size(difference: Values) -> float:

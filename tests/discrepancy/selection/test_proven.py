@@ -69,6 +69,14 @@ def test_a_growth_within_the_noise_of_the_metric_is_none():
     assert not grows(0.2, 0.62, 0.592, 0.0)
 
 
+def test_noise_makes_one_of_several_errors_grow_as_seldom_as_one(rng):
+    """Of nine errors one grew by 2.1 deviations, and a right name went."""
+    rises = rng.standard_normal((4_000, 9))
+    after = np.sqrt(4.0 + 0.1 * rises)
+    together = [any(grows(2.0, one, 1.0, 0.1, among=9) for one in row) for row in after]
+    assert np.mean(together) < 0.04
+
+
 def test_a_value_out_of_tolerance_and_its_effect_are_one_answer():
     base = [SimpleNamespace(name=name, start=1.0) for name in ("load_inertia", "stiffness")]
     inertia, stiffness = out_of_tolerance(base, ["load_inertia", "stiffness"], (), together=True)

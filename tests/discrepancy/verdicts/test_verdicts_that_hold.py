@@ -93,6 +93,8 @@ ROWS = {
     ),
     "nothing-all-values-off": Row("parameter", tuple(f"parameter:{name}" for name in OFF)),
     "stiffness-off": Row("parameter", ("parameter:stiffness",)),
+    # The output torque alone seems to grow, by 2.1 deviations of its noise.
+    "rig-05": Row("named", ("soft_windup:mesh",)),
     "rig-11": Row("named", (COULOMB, WAVES), {(COULOMB, "level"): 0.0599}),
     "amplitude-off": Row("parameter", ("parameter:error_amplitude_1",)),
 }
