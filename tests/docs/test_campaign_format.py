@@ -19,7 +19,7 @@ from pymoo_hdte._io.layout import COUNTS
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy import read_campaign, write_campaign
 from pymoo_hdte.discrepancy._records.believed import SENSOR_PLACES
-from pymoo_hdte.discrepancy._records.campaign_format import COLUMNS, LAYOUT
+from pymoo_hdte.discrepancy._records.campaign_keys import COLUMNS, LAYOUT
 from pymoo_hdte.units import DEGREE, UNITS
 
 PAGE = (DOCS / "campaign_format.md").read_text(encoding="utf-8")
