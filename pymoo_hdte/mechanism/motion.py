@@ -95,7 +95,7 @@ def highest_frequency(
     Raises
     ------
     InvalidInput
-        If it does so at no frequency.
+        If it does so at no frequency, or not at the lowest ones.
     """
     # Second differences, because the spectrum of a position falls too steeply for a window.
     difference = np.diff(position, 2)
@@ -107,15 +107,25 @@ def highest_frequency(
     strongest = int(np.argmax(power[1:] / frequency[1:] ** 4))
     # The lowest frequencies contain the leakage of the window even for white noise.
     if not (np.all(stands_out[:_FEWEST]) or (strongest >= _FEWEST and stands_out[strongest])):
-        ratio = float(np.min(power[1:] / np.maximum(noise[1:], 1e-300)))
-        raise InvalidInput(
-            "power of a position over that of its noise",
-            ratio,
-            f"more than {_STANDS_OUT:g} at low frequencies, or nothing is known of its motion",
-        )
+        raise _no_cutoff(frequency[1:], power[1:] / np.maximum(noise[1:], 1e-300))
     quiet = np.flatnonzero(~stands_out[strongest:])
     last = strongest + quiet[0] if quiet.size else len(stands_out)
     return float(min(frequency[last], highest_share(step, share)))
+
+
+def _no_cutoff(frequency: Values, ratio: Values) -> InvalidInput:
+    """Return the reason why no cutoff is found, with where a motion shows if it does anywhere."""
+    shown = frequency[_FEWEST:][ratio[_FEWEST:] > _STANDS_OUT]
+    if not shown.size:
+        allowed = f"more than {_STANDS_OUT:g} at some frequency, or nothing is known of its motion"
+        return InvalidInput(
+            "power of a position over that of its noise", float(np.max(ratio)), allowed
+        )
+    allowed = (
+        f"one that is stated, in Hz: below {frequency[_FEWEST]:.2g} Hz the position is not above "
+        f"its noise; it is between {shown[0]:.2g} and {shown[-1]:.2g} Hz"
+    )
+    return InvalidInput("cutoff", None, allowed)
 
 
 def highest_share(step: float, share: float = _HIGHEST_SHARE) -> float:

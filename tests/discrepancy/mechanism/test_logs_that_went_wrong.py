@@ -1,0 +1,52 @@
+"""Real logs of which a verdict was once lost or wrong: each ends with an answer or a reason.
+
+What their machines have is known by least squares or from their authors; what may still be named
+beside it is no fault.
+"""
+
+import pytest
+from places import SHARED
+
+from pymoo_hdte.checks import InvalidInput
+from pymoo_hdte.discrepancy import analyse, read_rig
+
+LOGS = SHARED / "cases" / "real"
+UNQUALIFIED = ("named", "parameter")
+
+pytestmark = pytest.mark.nightly
+
+
+def analysed(name):
+    folder = LOGS / name
+    if not folder.is_dir():
+        pytest.skip(f"needs {folder}, which is no part of the project")
+    return analyse(read_rig(folder))
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        *("damper_vote", "delayed_torque", "inertia_zero", "kinova5_missing_is_certain"),
+        *("one_way_push", "rests_and_breakaway", "vote_kills_gravity"),
+        *(f"rest_hides_coulomb/rest_{seconds}s" for seconds in (0, 10, 20)),
+    ],
+)
+def test_a_log_ends_with_an_answer(name, tmp_path):
+    analysis = analysed(name)
+    document = analysis.report(tmp_path / "report")
+    assert document["status"] == analysis.verdict.status
+    assert (tmp_path / "report" / "verdict.json").is_file()
+
+
+def test_a_refused_log_says_what_helps():
+    with pytest.raises(InvalidInput, match=r"cutoff .*stated, in Hz"):
+        analysed("pendulum_30Hz_refused")
+
+
+def test_effects_that_make_the_held_out_motion_worse_are_not_named():
+    assert analysed("named_though_gap_grows").verdict.status not in UNQUALIFIED
+
+
+def test_an_order_beyond_the_band_at_its_bound_is_named_nowhere(tmp_path):
+    analysed("lara8_order_3131").report(tmp_path / "report")
+    assert "3131" not in (tmp_path / "report" / "verdict.json").read_text()
