@@ -18,10 +18,10 @@ from experiments.runner.report import check_page, write_report
 from experiments.runner.setting import Setting
 from experiments.runner.store import save
 from experiments.runner.workers import WorkerLost, WrongWorker, make_executor
+from pymoo_hdte._interrupts import INTERRUPTED, orderly
+from pymoo_hdte._reports.in_use import in_use
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.cli.command import OneLineParser
-from pymoo_hdte.interrupts import INTERRUPTED, orderly
-from pymoo_hdte.reports.in_use import in_use
 from pymoo_hdte.surrogate.threads import usable_cores
 
 FAILED = 1

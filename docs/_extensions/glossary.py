@@ -7,7 +7,7 @@ from typing import Any
 
 from sphinx.application import Sphinx
 
-from pymoo_hdte.reports.glossary import GLOSSARY
+from pymoo_hdte._reports.glossary import GLOSSARY
 
 _HEAD = """# Glossary
 

@@ -168,7 +168,7 @@ print(f"{analysis.verdict.status}: {analysis.revised_model().effects[-1]}")
 # %%
 # What is no law at a port, such as an inertia or an error of a sensor, is a subclass of
 # ``pymoo_hdte.drive.DriveEffect``, registered as the ``change`` of an ``Effect``: see the files in
-# ``pymoo_hdte/drive/effects``.
+# ``pymoo_hdte/drive/_effects``.
 #
 # A port
 # ------

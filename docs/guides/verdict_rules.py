@@ -4,7 +4,7 @@ Mathematics: the rules of a verdict
 
 ``pymoo-hdte discrepancy`` says of a model and of measurements whether something is missing, and
 what. This page says by which rules, and shows the statistics behind them. All thresholds stand in
-`pymoo_hdte.discrepancy.engine.rules.Rules`, from which this page reads them.
+`pymoo_hdte.discrepancy._selection.rules.Rules`, from which this page reads them.
 """
 
 from dataclasses import replace
@@ -16,10 +16,10 @@ from scipy.integrate import quad
 from scipy.stats import chi2, ncx2
 
 from pymoo_hdte.discrepancy import MeasuredMechanism, analyse
-from pymoo_hdte.discrepancy.engine.fitting import Fit
-from pymoo_hdte.discrepancy.engine.hypothesis import adequate
-from pymoo_hdte.discrepancy.engine.rules import RULES
-from pymoo_hdte.discrepancy.engine.verdict import STATUSES
+from pymoo_hdte.discrepancy._selection.fitting import Fit
+from pymoo_hdte.discrepancy._selection.hypothesis import adequate
+from pymoo_hdte.discrepancy._selection.rules import RULES
+from pymoo_hdte.discrepancy._selection.verdict import STATUSES
 from pymoo_hdte.effects.unknowns import Parameter
 from pymoo_hdte.mechanism import BelievedValue, Input, Mechanism, Port, Record
 
@@ -293,7 +293,7 @@ for one in sorted([verdict.chosen, *verdict.alternatives], key=lambda one: one.b
 # %%
 # Of another machine than a drive, no model meets the noise of its sensors. There all of this
 # is measured in units of the *rest*, which is what up to three effects leave, and four rules are
-# added (``pymoo_hdte.discrepancy.mechanism.naming``): a named effect removes at least half of the
+# added: a named effect removes at least half of the
 # power of the misfit beyond the noise of the sensors; of models that leave about as much, the one
 # with the fewest unknowns is named; a law that merely contains the named one is no other
 # explanation; and what is among the effects that define the rest, down to which these fit in any

@@ -12,8 +12,8 @@ from typing import Any
 
 from experiments.runner.provenance import environment, report_fingerprint
 from experiments.runner.result import Column, Finding, Picture, Result, Table, significant
-from pymoo_hdte.io.text_table import csv_text
-from pymoo_hdte.io.whole_file import write_whole
+from pymoo_hdte._io.text_table import csv_text
+from pymoo_hdte._io.whole_file import write_whole
 
 RESULT = "result.json"
 TIMES = "times"

@@ -20,14 +20,14 @@ from experiments.studies.virtual_rig.hidden_forms import draw_effect
 from experiments.studies.virtual_rig.rig import draw_rig, run_campaign
 from pymoo_hdte.algorithms.crowding import least_crowded
 from pymoo_hdte.algorithms.spread import most_spread
-from pymoo_hdte.discrepancy.drive.analysis import examine_drive
+from pymoo_hdte.discrepancy._verdicts.drive import examine_drive
 from pymoo_hdte.drive import harmonic_balance, preset, simulate_drive
 from pymoo_hdte.problems import Design, Mean, RobustDTE, Std
-from pymoo_hdte.problems.simulator.inputs import Inputs
-from pymoo_hdte.problems.simulator.problem import SimulatorProblem
-from pymoo_hdte.surrogate.sparse.adaptive import AdaptiveFit, fit_adaptively
-from pymoo_hdte.surrogate.sparse.moments import SparseMoments
-from pymoo_hdte.surrogate.sparse.polynomial import SparsePolynomial
+from pymoo_hdte.problems._simulator.inputs import Inputs
+from pymoo_hdte.problems._simulator.problem import SimulatorProblem
+from pymoo_hdte.surrogate._sparse.adaptive import AdaptiveFit, fit_adaptively
+from pymoo_hdte.surrogate._sparse.moments import SparseMoments
+from pymoo_hdte.surrogate._sparse.polynomial import SparsePolynomial
 from pymoo_hdte.surrogate.threads import usable_cores
 
 N_POINTS = 1000

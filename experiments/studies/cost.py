@@ -25,8 +25,8 @@ from experiments.runner.registry import Context
 from experiments.runner.result import OF_MODELS, Column, Finding, Result, Table, significant
 from experiments.runner.texts import paragraphs
 from experiments.studies.timing import best_time, integration_time
+from pymoo_hdte._one_thread import ONE_THREAD
 from pymoo_hdte.drive import PRESETS, DriveModel, harmonic_balance
-from pymoo_hdte.one_thread import ONE_THREAD
 from pymoo_hdte.problems import RobustDTEDirect
 from pymoo_hdte.problems.drive_response import PAPERS_ORDER
 from pymoo_hdte.surrogate import latin_hypercube

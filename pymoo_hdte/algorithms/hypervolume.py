@@ -11,8 +11,8 @@ import numpy as np
 from moocore import hv_contributions
 from numpy.typing import NDArray
 
+from pymoo_hdte._compilation import COMPILES, compiled
 from pymoo_hdte.algorithms.spread import most_spread, unlinked
-from pymoo_hdte.compilation import COMPILES, compiled
 
 _REFERENCE = 1.1
 """Reference point with three objectives, in every range of the set, counted from its least value.

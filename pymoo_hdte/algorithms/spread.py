@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from pymoo_hdte.compilation import COMPILES, compiled
+from pymoo_hdte._compilation import COMPILES, compiled
 
 
 def most_spread(F: NDArray[np.float64], size: int) -> NDArray[np.int_]:

@@ -6,7 +6,7 @@ import os
 import sys
 
 try:
-    from pymoo_hdte.interrupts import ended_quietly
+    from pymoo_hdte._interrupts import ended_quietly
 except KeyboardInterrupt:
     os._exit(130)
 

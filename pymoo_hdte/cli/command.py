@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, NamedTuple, NoReturn
 
 from pymoo_hdte import __version__
-from pymoo_hdte.reports.folder import PAGE_FILE
+from pymoo_hdte._reports.folder import PAGE_FILE
 
 MISTAKE = 2
 """Exit code for input that the user can correct, as argparse has it."""

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from pymoo_hdte import __version__
+from pymoo_hdte._interrupts import INTERRUPTED
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.cli.command import MISTAKE, OneLineParser
 from pymoo_hdte.cli.discrepancy import DISCREPANCY
@@ -16,7 +17,6 @@ from pymoo_hdte.cli.identify import IDENTIFY
 from pymoo_hdte.cli.optimise import OPTIMISE
 from pymoo_hdte.cli.plan import PLAN
 from pymoo_hdte.cli.simulate import SIMULATE
-from pymoo_hdte.interrupts import INTERRUPTED
 
 COMMANDS = (OPTIMISE, SIMULATE, IDENTIFY, PLAN, DISCREPANCY)
 """In the order of the help."""

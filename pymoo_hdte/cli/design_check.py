@@ -15,7 +15,7 @@ from pymoo_hdte.drive import PARAMETERS
 from pymoo_hdte.problems import RobustDTEDirect
 from pymoo_hdte.problems.operating_conditions import duty_cycle_dte_where_found
 from pymoo_hdte.surrogate import TruncatedNormal, UniformBand
-from pymoo_hdte.surrogate.sparse.measures import Distribution
+from pymoo_hdte.surrogate._sparse.measures import Distribution
 
 SETS, DRIVES = 8, 256
 """Independent sets of quasi-random drives, and drives in each: the sets tell the error."""

@@ -8,10 +8,10 @@ from contextlib import closing
 from pathlib import Path
 from typing import Any
 
+from pymoo_hdte._reports.folder import PAGE_FILE
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.cli.command import Command, Outcome, Say
 from pymoo_hdte.cli.own_effects import OPTION, own_effects, told_by_line
-from pymoo_hdte.reports.folder import PAGE_FILE
 
 ModelFiles = tuple[Path | None, Path | None]
 """Files of a model and its data sheet."""
@@ -55,7 +55,7 @@ def _add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _run(options: argparse.Namespace, say: Say) -> Outcome:
-    from pymoo_hdte.discrepancy.report.folder import FOLDER
+    from pymoo_hdte.discrepancy._report.folder import FOLDER
     from pymoo_hdte.effects import register, registered
 
     believed = options.believed, options.sheet
@@ -93,8 +93,8 @@ def _analysed(options: argparse.Namespace, believed: ModelFiles, say: Say) -> di
 def _measured(folder: Path, data: Path | None, progress: Callable[[int, int], None]) -> Any:
     """Read a campaign of a drive, or a rig of any other mechanism."""
     from pymoo_hdte.discrepancy import read_campaign, read_rig
-    from pymoo_hdte.discrepancy.campaign.format import CAMPAIGN_FILE
-    from pymoo_hdte.discrepancy.mechanism.files import RIG_FILE
+    from pymoo_hdte.discrepancy._records.campaign_format import CAMPAIGN_FILE
+    from pymoo_hdte.discrepancy._records.rig_files import RIG_FILE
 
     if folder.name == CAMPAIGN_FILE and folder.is_file():
         folder = folder.parent

@@ -55,8 +55,8 @@ def read_drive(options: argparse.Namespace) -> tuple[DriveModel, tuple[str, ...]
 
 def _of_the_held_member(named: str, sheet: DataSheet) -> tuple[str, ...]:
     """Say which member is taken for held, and the ratio that follows, if the file does not."""
+    from pymoo_hdte._io.toml import read_toml
     from pymoo_hdte.drive.datasheet import MEMBERS
-    from pymoo_hdte.io.toml import read_toml
 
     if named == BUILT_IN_SHEET or read_toml(Path(named)).table("teeth").has("held"):
         return ()

@@ -10,6 +10,9 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
+from pymoo_hdte._reports.figures import AFTER, BEFORE, GREY, data_uri
+from pymoo_hdte._reports.folder import ReportFolder
+from pymoo_hdte._reports.html import digits, number, page
 from pymoo_hdte.cli.command import heading
 from pymoo_hdte.cli.identification import LOOPS, Identification, Parameter
 from pymoo_hdte.drive import DataSheet
@@ -17,9 +20,6 @@ from pymoo_hdte.drive.datasheet import NOMINAL_FIELDS, unit_of
 from pymoo_hdte.drive.datasheet_file import check_twist
 from pymoo_hdte.drive.toml_text import sheet_toml
 from pymoo_hdte.identification import ErrorStatistics, hysteresis_width, lost_energy
-from pymoo_hdte.reports.figures import AFTER, BEFORE, GREY, data_uri
-from pymoo_hdte.reports.folder import ReportFolder
-from pymoo_hdte.reports.html import digits, number, page
 from pymoo_hdte.units import ARCSEC, UNITS
 
 SHEET_FILE = "identified_sheet.toml"

@@ -10,6 +10,10 @@ from typing import Any
 
 import numpy as np
 
+from pymoo_hdte._io.text_table import csv_text
+from pymoo_hdte._reports.folder import ReportFolder
+from pymoo_hdte._reports.front import Front, design_rows, front_svg
+from pymoo_hdte._reports.html import change, number, page, with_error
 from pymoo_hdte.cli.command import heading
 from pymoo_hdte.cli.design_check import DRIVES, SETS, Check
 from pymoo_hdte.cli.design_study import AGREEMENT, HARDLY_WORTH, DesignStudy, Gain
@@ -17,10 +21,6 @@ from pymoo_hdte.decision import tolerance_band
 from pymoo_hdte.decision.influence import LITTLE
 from pymoo_hdte.drive import DriveModel
 from pymoo_hdte.drive.toml_text import model_toml, sheet_toml
-from pymoo_hdte.io.text_table import csv_text
-from pymoo_hdte.reports.folder import ReportFolder
-from pymoo_hdte.reports.front import Front, design_rows, front_svg
-from pymoo_hdte.reports.html import change, number, page, with_error
 
 FRONT_FILE = "front.csv"
 SHEET_FILE = "optimum_sheet.toml"

@@ -5,12 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from pymoo_hdte._io.toml import toml_text
+from pymoo_hdte._reports.folder import PAGE_FILE, ReportFolder
+from pymoo_hdte._reports.html import page
 from pymoo_hdte.cli.command import heading
-from pymoo_hdte.discrepancy.drive.plan.plan import Plan, chance_words
+from pymoo_hdte.discrepancy._plan.plan import Plan, chance_words
 from pymoo_hdte.effects.sentence_blanks import in_words
-from pymoo_hdte.io.toml import toml_text
-from pymoo_hdte.reports.folder import PAGE_FILE, ReportFolder
-from pymoo_hdte.reports.html import page
 
 PLAN_FILE = "plan.toml"
 FOLDER = ReportFolder("plan.json", (PLAN_FILE,))

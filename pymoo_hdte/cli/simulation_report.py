@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
+from pymoo_hdte._io.text_table import csv_text
+from pymoo_hdte._reports.figures import AFTER, BEFORE, GREY, data_uri
+from pymoo_hdte._reports.folder import ReportFolder
+from pymoo_hdte._reports.html import change, number, page
 from pymoo_hdte.cli.command import heading
 from pymoo_hdte.cli.simulation import FASTEST, Simulation
 from pymoo_hdte.drive.dte_map import neighbouring_resonances
-from pymoo_hdte.io.text_table import csv_text
-from pymoo_hdte.reports.figures import AFTER, BEFORE, GREY, data_uri
-from pymoo_hdte.reports.folder import ReportFolder
-from pymoo_hdte.reports.html import change, number, page
 from pymoo_hdte.units import ARCSEC
 
 TURN_FILE = "transmission_error.csv"

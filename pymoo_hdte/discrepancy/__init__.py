@@ -9,6 +9,6 @@ A campaign is of a harmonic drive (`read_campaign`); any other machine is a mech
 records (`read_rig`, `MeasuredMechanism`).
 """
 
-from pymoo_hdte.lazy import lazy_names
+from pymoo_hdte._lazy import lazy_names
 
 __getattr__, __dir__, __all__ = lazy_names(__name__, __file__)

@@ -3,21 +3,35 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import overload
+from functools import cached_property
+from pathlib import Path
+from typing import Any, overload
 
+from pymoo_hdte._one_thread import ONE_THREAD
 from pymoo_hdte.checks import InvalidInput
-from pymoo_hdte.discrepancy.campaign.campaign import Campaign
-from pymoo_hdte.discrepancy.drive.analysis import examine_drive
-from pymoo_hdte.discrepancy.drive_analysis import DriveAnalysis
-from pymoo_hdte.discrepancy.engine.rules import RULES, Rules
-from pymoo_hdte.discrepancy.joint.analysis import examine_joint
-from pymoo_hdte.discrepancy.joint.halves import joint_of
-from pymoo_hdte.discrepancy.mechanism.analysis import examine_mechanism
-from pymoo_hdte.discrepancy.mechanism.files import MeasuredMechanism
-from pymoo_hdte.discrepancy.mechanism.held_out import Progress
-from pymoo_hdte.discrepancy.mechanism_analysis import JointAnalysis, MechanismAnalysis
+from pymoo_hdte.discrepancy._answers.next_test_drive import Proposal, next_experiment
+from pymoo_hdte.discrepancy._answers.next_test_mechanism import NextTest, next_test
+from pymoo_hdte.discrepancy._answers.revision_drive import revised_model
+from pymoo_hdte.discrepancy._answers.revision_mechanism import revised_mechanism
+from pymoo_hdte.discrepancy._answers.where.balances import MechanismLocation, locate_in_mechanism
+from pymoo_hdte.discrepancy._answers.where.location import Location, locate
+from pymoo_hdte.discrepancy._evidence.force_balances.joint_halves import joint_of
+from pymoo_hdte.discrepancy._records.campaign import Campaign
+from pymoo_hdte.discrepancy._records.rig_files import MeasuredMechanism
+from pymoo_hdte.discrepancy._records.rig_model import MechanismModel
+from pymoo_hdte.discrepancy._report.folder import check_report_folder
+from pymoo_hdte.discrepancy._selection.rules import RULES, Rules
+from pymoo_hdte.discrepancy._selection.verdict import Verdict
+from pymoo_hdte.discrepancy._verdicts.drive import examine_drive
+from pymoo_hdte.discrepancy._verdicts.drive_finding import DriveFinding
+from pymoo_hdte.discrepancy._verdicts.held_out import Progress
+from pymoo_hdte.discrepancy._verdicts.joint import JointFinding, examine_joint, revised_joint
+from pymoo_hdte.discrepancy._verdicts.mechanism import examine_mechanism
+from pymoo_hdte.discrepancy._verdicts.mechanism_finding import MechanismFinding
+from pymoo_hdte.discrepancy._verdicts.validation_drive import Proof, prove
+from pymoo_hdte.discrepancy._verdicts.validation_mechanism import MeasuredGap, prove_measured
+from pymoo_hdte.drive import DriveModel
 from pymoo_hdte.effects.effect import Effect, register
-from pymoo_hdte.one_thread import ONE_THREAD
 
 
 @overload
@@ -95,3 +109,224 @@ def analyse(
     return MechanismAnalysis(
         measured, examine_mechanism(measured.mechanism, *believed, rules, progress)
     )
+
+
+class DriveAnalysis:
+    """The analysis of a campaign of a harmonic drive; made by `analyse`.
+
+    Each result is computed when it is first used.
+
+    Attributes
+    ----------
+    finding : DriveFinding
+        Campaign, features of its records and verdict.
+
+    Examples
+    --------
+    >>> analysis = analyse(read_campaign("campaign"))  # doctest: +SKIP
+    >>> analysis.verdict.status, analysis.locate().sentence  # doctest: +SKIP
+    >>> analysis.report("report")  # doctest: +SKIP
+    """
+
+    def __init__(self, finding: DriveFinding) -> None:
+        self.finding = finding
+
+    @property
+    def campaign(self) -> Campaign:
+        """The campaign with the believed model."""
+        return self.finding.campaign
+
+    @property
+    def verdict(self) -> Verdict:
+        """What is missing: ``status``, the ``chosen`` effects, and ``alternatives``."""
+        return self.finding.verdict
+
+    def locate(self) -> Location:
+        """Return where the believed model is wrong: by record, channel and order, and in words."""
+        return self._location
+
+    def prove(self) -> Proof | None:
+        """Return the gap on the held-out records before and after; None without such records."""
+        return self._proof
+
+    def next_experiment(self) -> Proposal:
+        """Return the test that best resolves what is still uncertain."""
+        return self._proposal
+
+    def revised_model(self) -> DriveModel:
+        """Return the drive with fitted values and named effects, e.g. for `RobustDTE`.
+
+        Raises
+        ------
+        InvalidInput
+            If no drive model can hold it: its ratio is not one of whole tooth numbers.
+        """
+        return revised_model(self.finding)
+
+    @ONE_THREAD
+    def report(self, out: str | Path) -> dict[str, Any]:
+        """Write ``report.html``, ``verdict.json`` and the revised model; return the verdict.
+
+        Parameters
+        ----------
+        out : str or Path
+            A folder that is new, empty, or an earlier report, which is replaced.
+
+        Returns
+        -------
+        dict
+            What ``verdict.json`` holds.
+
+        Raises
+        ------
+        InvalidInput
+            If the folder holds anything else.
+        OSError
+            If it cannot be written.
+        """
+        # Plotting and optimisation are slow to import, and only a report needs them.
+        from pymoo_hdte.discrepancy._report.write import write_report
+        from pymoo_hdte.discrepancy._robust_optimum import optimum_shift
+
+        check_report_folder(out)
+        found = self.locate(), self.prove(), self.next_experiment()
+        return write_report(self.finding, *found, optimum_shift, out)
+
+    @cached_property
+    @ONE_THREAD
+    def _location(self) -> Location:
+        return locate(self.finding)
+
+    @cached_property
+    @ONE_THREAD
+    def _proof(self) -> Proof | None:
+        return prove(self.finding)
+
+    @cached_property
+    @ONE_THREAD
+    def _proposal(self) -> Proposal:
+        return next_experiment(self.finding)
+
+
+class MechanismAnalysis:
+    """The analysis of the records of a mechanism; made by `analyse`.
+
+    Each result is computed when it is first used.
+
+    Attributes
+    ----------
+    measured : MeasuredMechanism
+        The mechanism as it is believed, and its records.
+    finding : MechanismFinding
+        Force balances of the records, verdict, and unexplained residual.
+
+    Examples
+    --------
+    >>> analysis = analyse(read_rig("my_rig"))  # doctest: +SKIP
+    >>> analysis.verdict.status, analysis.report("report")  # doctest: +SKIP
+    """
+
+    def __init__(self, measured: MeasuredMechanism, finding: MechanismFinding) -> None:
+        self.measured, self.finding = measured, finding
+
+    @property
+    def verdict(self) -> Verdict:
+        """What is missing: ``status``, the ``chosen`` effects, and ``alternatives``."""
+        return self.finding.verdict
+
+    def locate(self) -> MechanismLocation:
+        """Return in which force balance the believed model is wrong, and by how much."""
+        return locate_in_mechanism(self.finding)
+
+    def prove(self) -> tuple[MeasuredGap, ...]:
+        """Return the gaps on the held-out records before and after; none without such records."""
+        return self._gaps
+
+    def next_experiment(self) -> NextTest:
+        """Return the repetition of a record that best resolves what is still uncertain."""
+        return self._test
+
+    def revised_model(self) -> MechanismModel:
+        """Return the mechanism with fitted values, and the effects that it has."""
+        return revised_mechanism(self.measured.title, self.finding)
+
+    @ONE_THREAD
+    def report(self, out: str | Path) -> dict[str, Any]:
+        """Write ``report.html``, ``verdict.json`` and the revised model; return the verdict.
+
+        Parameters
+        ----------
+        out : str or Path
+            A folder that is new, empty, or an earlier report, which is replaced.
+
+        Returns
+        -------
+        dict
+            What ``verdict.json`` holds.
+
+        Raises
+        ------
+        InvalidInput
+            If the folder holds anything else.
+        OSError
+            If it cannot be written.
+        """
+        # Plotting is slow to import, and only a report needs it.
+        from pymoo_hdte.discrepancy._report.mechanism import write_mechanism_report
+
+        check_report_folder(out)
+        found = self.prove(), self.next_experiment()
+        return write_mechanism_report(
+            self.measured.title, self.finding, *found, out, joint=self._beside
+        )
+
+    @property
+    def _beside(self) -> JointFinding | None:
+        """What a report tells besides."""
+        return None
+
+    @cached_property
+    @ONE_THREAD
+    def _gaps(self) -> tuple[MeasuredGap, ...]:
+        return prove_measured(self.finding)
+
+    @cached_property
+    @ONE_THREAD
+    def _test(self) -> NextTest:
+        return next_test(self.finding)
+
+
+class JointAnalysis(MechanismAnalysis):
+    """The analysis of a joint with two encoders; made by `analyse`.
+
+    Its verdict, location, proof and next experiment are those of the balance of torques.
+
+    Attributes
+    ----------
+    measured : MeasuredMechanism
+        The joint as it is believed, and its records.
+    joint : JointFinding
+        With the verdict on the torsion beside that on the torques, and the ``status`` of both.
+
+    Examples
+    --------
+    >>> analysis = analyse(read_rig("my_two_encoder_joint"))  # doctest: +SKIP
+    >>> analysis.torsion.status  # doctest: +SKIP
+    """
+
+    def __init__(self, measured: MeasuredMechanism, joint: JointFinding) -> None:
+        super().__init__(measured, joint.torque)
+        self.joint = joint
+
+    @property
+    def torsion(self) -> Verdict:
+        """What is missing in the torsion."""
+        return self.joint.torsion.verdict
+
+    def revised_model(self) -> MechanismModel:
+        """Return the joint with fitted values, and the effects that it has."""
+        return revised_joint(self.measured.title, self.joint)
+
+    @property
+    def _beside(self) -> JointFinding:
+        return self.joint

@@ -1,8 +1,6 @@
 """The machine: data sheet, static error, equations of motion, steady state, time integration."""
 
-from pymoo_hdte.drive.datasheet import DataSheet
-from pymoo_hdte.drive.datasheet_file import hs_20_100, load_datasheet
-from pymoo_hdte.drive.effects import (
+from pymoo_hdte.drive._effects import (
     CoupledInertia,
     DampingReference,
     DriveEffect,
@@ -15,18 +13,20 @@ from pymoo_hdte.drive.effects import (
     NewZero,
     ThermalDrift,
 )
+from pymoo_hdte.drive._solve.coefficients import Coefficients
+from pymoo_hdte.drive._solve.free_angle import harmonic_balance
+from pymoo_hdte.drive._solve.hill import hill_steady_state, transfer_function
+from pymoo_hdte.drive._solve.order_spectrum import OrderSpectrum
+from pymoo_hdte.drive._solve.quasi_static import mean_torsion, quasi_static_torsion
+from pymoo_hdte.drive._solve.stability import UnstableDrive, floquet_multipliers
+from pymoo_hdte.drive._solve.steady_motion import SpeedLoop, SteadyMotion
+from pymoo_hdte.drive.datasheet import DataSheet
+from pymoo_hdte.drive.datasheet_file import hs_20_100, load_datasheet
 from pymoo_hdte.drive.kinematic_error import KinematicError
 from pymoo_hdte.drive.measurement import low_pass, measured_dte
 from pymoo_hdte.drive.model import PRESETS, DriveModel, load_model, preset
 from pymoo_hdte.drive.parameters import PARAMETER_UNITS, PARAMETERS
 from pymoo_hdte.drive.simulation import Run, simulate_drive
-from pymoo_hdte.drive.solve.coefficients import Coefficients
-from pymoo_hdte.drive.solve.free_angle import harmonic_balance
-from pymoo_hdte.drive.solve.hill import hill_steady_state, transfer_function
-from pymoo_hdte.drive.solve.order_spectrum import OrderSpectrum
-from pymoo_hdte.drive.solve.quasi_static import mean_torsion, quasi_static_torsion
-from pymoo_hdte.drive.solve.stability import UnstableDrive, floquet_multipliers
-from pymoo_hdte.drive.solve.steady_motion import SpeedLoop, SteadyMotion
 from pymoo_hdte.drive.static_error import StaticErrorSample, class_amplitudes, sample_static_error
 
 __all__ = [

@@ -7,6 +7,8 @@ from importlib.resources import as_file, files
 from pathlib import Path
 from typing import Any
 
+from pymoo_hdte._io.fields import Fields
+from pymoo_hdte._io.toml import toml_with_lines
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.drive.datasheet import (
     LARGEST_TWIST,
@@ -19,8 +21,6 @@ from pymoo_hdte.drive.datasheet import (
     Nominal,
 )
 from pymoo_hdte.effects.quantities import with_unit
-from pymoo_hdte.io.fields import Fields
-from pymoo_hdte.io.toml import toml_with_lines
 
 Arrangement = tuple[str, str | None]
 _PLACES = {

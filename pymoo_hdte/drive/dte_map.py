@@ -10,8 +10,8 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from pymoo_hdte.drive._solve.stability import state_matrix
 from pymoo_hdte.drive.model import DriveModel
-from pymoo_hdte.drive.solve.stability import state_matrix
 from pymoo_hdte.units import REVOLUTION_PER_MINUTE
 
 _PROMINENCE = 0.02

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pymoo_hdte.checks import InvalidInput, finite_array, one_of, real_number
-from pymoo_hdte.drive.solve.order_spectrum import OrderSpectrum, sine_phasor
+from pymoo_hdte.drive._solve.order_spectrum import OrderSpectrum, sine_phasor
 
 _READINGS = {"peak_to_peak": 1.0, "semi_amplitude": 2.0}
 

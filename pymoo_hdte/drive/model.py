@@ -11,16 +11,16 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pymoo_hdte._io.archive import FileFormat
+from pymoo_hdte._io.toml import read_toml
 from pymoo_hdte.checks import InvalidInput, one_of
+from pymoo_hdte.drive._solve.coefficients import Coefficients
+from pymoo_hdte.drive._solve.hill import found_steady_states, hill_steady_state
+from pymoo_hdte.drive._solve.order_spectrum import OrderSpectrum
 from pymoo_hdte.drive.datasheet import NOMINAL_FIELDS, DataSheet
 from pymoo_hdte.drive.datasheet_file import hs_20_100
 from pymoo_hdte.drive.model_values import ModelValues, model_tables, parts_of, values_of
 from pymoo_hdte.drive.parameters import PARAMETERS, checked
-from pymoo_hdte.drive.solve.coefficients import Coefficients
-from pymoo_hdte.drive.solve.hill import found_steady_states, hill_steady_state
-from pymoo_hdte.drive.solve.order_spectrum import OrderSpectrum
-from pymoo_hdte.io.archive import FileFormat
-from pymoo_hdte.io.toml import read_toml
 from pymoo_hdte.units import ARCSEC
 
 FORMAT = FileFormat("pymoo_hdte drive model", version=1, fields=("data_sheet", "model"))
@@ -114,7 +114,7 @@ class DriveModel(ModelValues):
         """Return the steady-state theta_d of n designs, rad, as an order spectrum.
 
         Parameters as in `coefficients`; the methods are those of
-        `pymoo_hdte.drive.solve.hill`.
+        `pymoo_hdte.drive._solve.hill`.
 
         Raises
         ------

@@ -5,18 +5,18 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass
 from typing import Any
 
+from pymoo_hdte._io.fields import Fields
 from pymoo_hdte.checks import InvalidInput
+from pymoo_hdte.drive._effects import DriveEffect, effect_from_fields
 from pymoo_hdte.drive.datasheet import DataSheet
 from pymoo_hdte.drive.datasheet_file import (
     EARLIER_ARRANGEMENT,
     datasheet_from_fields,
     sheet_table,
 )
-from pymoo_hdte.drive.effects import DriveEffect, effect_from_fields
 from pymoo_hdte.drive.kinematic_error import KinematicError
 from pymoo_hdte.effects.effect import place_of
 from pymoo_hdte.effects.quantities import with_unit
-from pymoo_hdte.io.fields import Fields
 from pymoo_hdte.units import ARCSEC
 
 

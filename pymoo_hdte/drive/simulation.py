@@ -11,9 +11,9 @@ import scipy
 from numpy.typing import ArrayLike, NDArray
 
 from pymoo_hdte.checks import InvalidInput, finite_array, one_of, real_number
+from pymoo_hdte.drive._solve.time_domain import StartUp, equations_of_motion, memories
 from pymoo_hdte.drive.model import DriveModel
 from pymoo_hdte.drive.parameters import PARAMETERS
-from pymoo_hdte.drive.solve.time_domain import StartUp, equations_of_motion, memories
 from pymoo_hdte.units import ARCSEC
 
 METHODS = ("LSODA", "DOP853", "Radau", "RK45", "BDF")

@@ -11,8 +11,8 @@ import scipy
 from numpy.typing import NDArray
 
 from pymoo_hdte.checks import InvalidInput, one_of, whole_number
+from pymoo_hdte.drive._solve.order_spectrum import OrderSpectrum
 from pymoo_hdte.drive.datasheet import ERROR_CLASSES, DataSheet
-from pymoo_hdte.drive.solve.order_spectrum import OrderSpectrum
 from pymoo_hdte.units import ARCSEC
 
 TRUNCATION = 3.0

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+from pymoo_hdte._io.toml import toml_text
 from pymoo_hdte.drive.datasheet import DataSheet
 from pymoo_hdte.drive.datasheet_file import sheet_table
 from pymoo_hdte.drive.model import DriveModel
 from pymoo_hdte.drive.model_values import model_tables
-from pymoo_hdte.io.toml import toml_text
 
 
 def model_toml(model: DriveModel) -> str:

@@ -15,13 +15,13 @@ from contextlib import contextmanager
 from dataclasses import MISSING, dataclass, field, fields
 from typing import Any, Protocol
 
+from pymoo_hdte._io.fields import Fields
 from pymoo_hdte.checks import InvalidInput, one_of, real_number
 from pymoo_hdte.effects.guess import Guess, Sizes, check_response
 from pymoo_hdte.effects.law import PORTS
 from pymoo_hdte.effects.quantities import si_unit, with_unit
 from pymoo_hdte.effects.sentence_blanks import check_sentence
 from pymoo_hdte.effects.unknowns import number_of
-from pymoo_hdte.io.fields import Fields
 
 Place = tuple[str, str, float | None]
 """Name, port and order of an effect."""

@@ -8,8 +8,8 @@ from typing import ClassVar
 
 import numpy as np
 
+from pymoo_hdte._compilation import compiled
 from pymoo_hdte.checks import real_number
-from pymoo_hdte.compilation import compiled
 from pymoo_hdte.effects.bouc_wen import bouc_wen
 from pymoo_hdte.effects.effect import Effect, register
 from pymoo_hdte.effects.guess import Guess, Sizes

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pymoo_hdte.io.fields import UNITS
+from pymoo_hdte._io.fields import UNITS
 
 
 def si_unit(quantity: str) -> str:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pymoo_hdte.compilation import compiled
+from pymoo_hdte._compilation import compiled
 from pymoo_hdte.effects.law import Values
 
 Rise = tuple[Values, Values, int, float, float]

@@ -25,12 +25,12 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from pymoo_hdte._io.text_columns import TextTable
+from pymoo_hdte._io.text_table import LARGEST, read_text_table
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.identification.damping import NoLoadRun
 from pymoo_hdte.identification.prototypes import RunKey
 from pymoo_hdte.identification.torsion import TorsionLoop
-from pymoo_hdte.io.text_columns import TextTable
-from pymoo_hdte.io.text_table import LARGEST, read_text_table
 from pymoo_hdte.units import ARCSEC, REVOLUTION_PER_MINUTE
 
 MICROMETRES = "_um"

@@ -3,7 +3,6 @@
 from typing import Any
 
 # The import registers the effects of a drive; some of them are laws, or readings, elsewhere too.
-from pymoo_hdte.drive import effects as _of_drives  # noqa: F401
 from pymoo_hdte.effects.effect import Effect, known_effects
 from pymoo_hdte.effects.law import Behaviour
 

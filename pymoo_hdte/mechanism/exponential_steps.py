@@ -14,7 +14,7 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
-from pymoo_hdte.compilation import compiled
+from pymoo_hdte._compilation import compiled
 from pymoo_hdte.mechanism.acting_forces import Command, PortForce
 
 Values = NDArray[np.float64]

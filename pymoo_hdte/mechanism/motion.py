@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 from scipy.signal import butter, savgol_filter, sosfiltfilt, welch
 
+from pymoo_hdte._io.even_steps import STEP_SPREAD
 from pymoo_hdte.checks import InvalidInput
-from pymoo_hdte.io.even_steps import STEP_SPREAD
 
 Values = NDArray[np.float64]
 

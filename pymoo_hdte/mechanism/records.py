@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import make_interp_spline
 
+from pymoo_hdte._io.even_steps import STEP_SPREAD
 from pymoo_hdte.checks import InvalidInput, finite_array, one_of, real_number, whole_number
-from pymoo_hdte.io.even_steps import STEP_SPREAD
 from pymoo_hdte.mechanism.motion import noise_of, timing_noise
 
 ROLES = ("train", "held_out")
@@ -94,7 +94,7 @@ class Record:
                 f"step {worst} of the time of record {name}",
                 float(steps[worst]),
                 f"{step:g} s within {100.0 * STEP_SPREAD:g} %, as the mean of the record; "
-                "pymoo_hdte.io.even_steps brings signals to even steps",
+                "pymoo_hdte._io.even_steps brings signals to even steps",
             )
         for what, given in (("channels", channels), ("noise", {} if noise is None else noise)):
             if not isinstance(given, Mapping):

@@ -14,8 +14,8 @@ import numpy as np
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.parallel.counts import Counts
 from pymoo_hdte.parallel.kept_designs import KeptDesigns, Output, Row
-from pymoo_hdte.problems.simulator.children import NOT_A_NUMBER, TOO_LONG, Failure
-from pymoo_hdte.problems.simulator.runs import SimulatorFailed
+from pymoo_hdte.problems._simulator.children import NOT_A_NUMBER, TOO_LONG, Failure
+from pymoo_hdte.problems._simulator.runs import SimulatorFailed
 
 
 @dataclass

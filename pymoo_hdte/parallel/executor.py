@@ -11,7 +11,7 @@ from pymoo_hdte.parallel.counts import Counts
 from pymoo_hdte.parallel.evaluations import Evaluations
 from pymoo_hdte.parallel.kept_designs import Output
 from pymoo_hdte.parallel.virtual import VirtualWorkers
-from pymoo_hdte.problems.simulator.workers import Workers
+from pymoo_hdte.problems._simulator.workers import Workers
 
 
 class ExecutorParallelization:

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from pymoo_hdte.checks import InvalidInput
-from pymoo_hdte.problems.simulator.children import Failure
-from pymoo_hdte.problems.simulator.identity import identity
-from pymoo_hdte.problems.simulator.run_file import RunFile
+from pymoo_hdte.problems._simulator.children import Failure
+from pymoo_hdte.problems._simulator.identity import identity
+from pymoo_hdte.problems._simulator.run_file import RunFile
 
 Output = dict[str, Any]
 Row = tuple[float, ...]

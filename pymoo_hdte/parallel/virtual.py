@@ -7,8 +7,8 @@ from collections.abc import Callable, Hashable
 from typing import Any
 
 from pymoo_hdte.checks import InvalidInput, real_number, whole_number
-from pymoo_hdte.problems.simulator.children import over_the_limit
-from pymoo_hdte.problems.simulator.workers import failure_of
+from pymoo_hdte.problems._simulator.children import over_the_limit
+from pymoo_hdte.problems._simulator.workers import failure_of
 
 
 class VirtualWorkers:

@@ -1,5 +1,18 @@
 """Robust design problems for pymoo."""
 
+from pymoo_hdte.problems._simulator.existing import Robust
+from pymoo_hdte.problems._simulator.inputs import Design
+from pymoo_hdte.problems._simulator.problem import SimulatorProblem
+from pymoo_hdte.problems._simulator.robust_problem import robust_problem
+from pymoo_hdte.problems._simulator.runs import SimulatorFailed
+from pymoo_hdte.problems._simulator.sampled_statistics import CVaR, FailureProbability, Quantile
+from pymoo_hdte.problems._simulator.statistics import (
+    Mean,
+    MeanPlusStd,
+    RobustConstraint,
+    Std,
+    WorstCase,
+)
 from pymoo_hdte.problems.catalogue import robust_benchmarks
 from pymoo_hdte.problems.family import robust_dte_family
 from pymoo_hdte.problems.operating_conditions import (
@@ -12,19 +25,6 @@ from pymoo_hdte.problems.robust_dte import RobustDTE
 from pymoo_hdte.problems.robust_dte_direct import RobustDTEDirect
 from pymoo_hdte.problems.robust_dte_grades import RobustDTEGrades
 from pymoo_hdte.problems.robust_dte_tolerance import RobustDTETolerance
-from pymoo_hdte.problems.simulator.existing import Robust
-from pymoo_hdte.problems.simulator.inputs import Design
-from pymoo_hdte.problems.simulator.problem import SimulatorProblem
-from pymoo_hdte.problems.simulator.robust_problem import robust_problem
-from pymoo_hdte.problems.simulator.runs import SimulatorFailed
-from pymoo_hdte.problems.simulator.sampled_statistics import CVaR, FailureProbability, Quantile
-from pymoo_hdte.problems.simulator.statistics import (
-    Mean,
-    MeanPlusStd,
-    RobustConstraint,
-    Std,
-    WorstCase,
-)
 from pymoo_hdte.problems.toy import RobustToy
 from pymoo_hdte.surrogate.trust import UntrustedSurrogate
 

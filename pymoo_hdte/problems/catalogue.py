@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import partial
 
-from pymoo_hdte.problems.closed_form import (
+from pymoo_hdte.problems._closed_form import (
     BeamReliability,
     ClosedFormProblem,
     DebGupta3,

@@ -18,7 +18,7 @@ from pymoo_hdte.problems.operating_conditions import (
     duty_cycle_dte_where_found,
 )
 from pymoo_hdte.surrogate import SobolIndices, TruncatedNormal, UniformBand
-from pymoo_hdte.surrogate.sparse.measures import Distribution, Measure, OrthonormalPolynomials
+from pymoo_hdte.surrogate._sparse.measures import Distribution, Measure, OrthonormalPolynomials
 
 Values = NDArray[np.float64]
 

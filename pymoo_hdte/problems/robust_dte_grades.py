@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from pymoo_hdte.checks import InvalidInput, finite_array, real_number
 from pymoo_hdte.drive import PARAMETERS, DataSheet, DriveModel
-from pymoo_hdte.drive.solve.hill import hill_steady_state
+from pymoo_hdte.drive._solve.hill import hill_steady_state
 from pymoo_hdte.problems.drive_response import (
     DESIGN_VARIABLES,
     OBJECTIVES,

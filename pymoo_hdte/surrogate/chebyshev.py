@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pymoo_hdte._io.archive import FileFormat
 from pymoo_hdte.checks import InvalidInput, finite_array, real_number, whole_number
-from pymoo_hdte.io.archive import FileFormat
 from pymoo_hdte.surrogate.box import LARGEST, Box
 from pymoo_hdte.surrogate.tensor import TensorPolynomial, chebyshev_nodes, coefficients_from_nodes
 
@@ -207,7 +207,7 @@ def write_surrogate(
     Raises
     ------
     InvalidInput
-        If they are too large for a file (`pymoo_hdte.io.archive`).
+        If they are too large for a file (`pymoo_hdte._io.archive`).
     OSError
         If the file cannot be written.
     """

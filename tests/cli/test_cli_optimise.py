@@ -11,6 +11,7 @@ import pytest
 from kept_results import put_files
 from quick_campaigns import BOX, SETTINGS, study_and_report
 
+from pymoo_hdte._reports.html import with_error
 from pymoo_hdte.cli import command_line as cli
 from pymoo_hdte.cli import optimum_report
 from pymoo_hdte.cli.design_check import Check, check_designs
@@ -19,7 +20,6 @@ from pymoo_hdte.decision import PREFERENCES, WeightedUtopia
 from pymoo_hdte.drive import hs_20_100, load_datasheet, load_model, preset
 from pymoo_hdte.drive.toml_text import model_toml, sheet_toml
 from pymoo_hdte.problems import RobustDTEDirect, load_conditions
-from pymoo_hdte.reports.html import with_error
 
 CASES = Path(__file__).parents[3] / "shared" / "cases"
 QUICK = ("--box", str(BOX), "--designs", "60")

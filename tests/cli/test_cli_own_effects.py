@@ -10,7 +10,7 @@ from places import DOCS
 from pymoo_hdte.cli import command_line as cli
 from pymoo_hdte.cli.own_effects import own_effects
 from pymoo_hdte.discrepancy import MeasuredMechanism, analyse, read_rig
-from pymoo_hdte.discrepancy.mechanism.models import model_text
+from pymoo_hdte.discrepancy._records.rig_model import model_text
 from pymoo_hdte.effects import known_effects, registered
 
 EXAMPLE = DOCS / "examples" / "eyring_drag.py"

@@ -8,7 +8,7 @@ import pytest
 from places import DOCS
 
 from pymoo_hdte.cli.command_line import main
-from pymoo_hdte.discrepancy.drive.plan import changes
+from pymoo_hdte.discrepancy._plan import changes
 from pymoo_hdte.drive import hs_20_100, preset
 from pymoo_hdte.drive.toml_text import model_toml, sheet_toml
 

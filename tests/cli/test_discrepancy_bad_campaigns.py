@@ -18,14 +18,14 @@ from quick_campaigns import (
     ripple_campaign,
 )
 
+from pymoo_hdte._reports import folder as reports_folder
+from pymoo_hdte._reports.folder import PAGE_FILE
 from pymoo_hdte.cli import command_line as cli
 from pymoo_hdte.discrepancy import analysis as api
 from pymoo_hdte.discrepancy import read_campaign, write_campaign
-from pymoo_hdte.discrepancy.report import write as report
-from pymoo_hdte.discrepancy.report.folder import FOLDER
+from pymoo_hdte.discrepancy._report import write as report
+from pymoo_hdte.discrepancy._report.folder import FOLDER
 from pymoo_hdte.drive import load_datasheet, load_model, simulate_drive
-from pymoo_hdte.reports import folder as reports_folder
-from pymoo_hdte.reports.folder import PAGE_FILE
 
 ROW = "run_2000rpm_40Nm.csv.gz"
 IDLE = "run_2000rpm_00Nm.csv.gz"

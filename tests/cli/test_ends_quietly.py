@@ -11,10 +11,10 @@ from threading import Thread
 import pytest
 from night import others_at_night
 
+from pymoo_hdte._interrupts import INTERRUPTED, UNREAD, ended_quietly, orderly
+from pymoo_hdte._reports.in_use import in_use
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.cli.command_line import COMMANDS, MISTAKE
-from pymoo_hdte.interrupts import INTERRUPTED, UNREAD, ended_quietly, orderly
-from pymoo_hdte.reports.in_use import in_use
 
 ROOT = Path(__file__).parents[2]
 # Whatever this process inherits: a shell starts programs in the background without Ctrl-C.
@@ -39,7 +39,7 @@ ARGUMENTS = {
 HELD = """
 import sys, time
 from pathlib import Path
-from pymoo_hdte.reports.in_use import in_use
+from pymoo_hdte._reports.in_use import in_use
 with in_use(Path(sys.argv[1]), "folder", Path(sys.argv[1])):
     print("held", flush=True)
     time.sleep(60)
@@ -80,7 +80,7 @@ def test_ctrl_c_during_early_imports(module, tmp_path):
 
 def test_ctrl_c_after_the_folder_is_held_leaves_nothing(tmp_path):
     arguments = ["discrepancy", "none", "--out", "new/out"]
-    module = "pymoo_hdte.discrepancy.campaign.format"
+    module = "pymoo_hdte.discrepancy._records.campaign_format"
     done = interrupted("pymoo_hdte.cli", arguments, module, tmp_path)
     assert (done.returncode, done.stderr.count("\n")) == (INTERRUPTED, 1)
     assert not list(tmp_path.iterdir())

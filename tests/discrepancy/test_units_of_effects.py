@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pymoo_hdte.discrepancy.engine.candidate import candidate_of
-from pymoo_hdte.drive.effects import DriveSizes, LawAtPort
+from pymoo_hdte.discrepancy._selection.candidate import candidate_of
+from pymoo_hdte.drive._effects import DriveSizes, LawAtPort
 from pymoo_hdte.effects import known_effects
 from pymoo_hdte.effects.law import PortState
 from pymoo_hdte.effects.quantities import si_unit

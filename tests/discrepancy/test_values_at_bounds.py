@@ -8,17 +8,17 @@ from analysed_campaigns import ripple_analysis
 from measured_oscillator import nothing, with_held_out
 
 from pymoo_hdte.discrepancy import read_mechanism_model
-from pymoo_hdte.discrepancy.drive.parameters import base_parameters
-from pymoo_hdte.discrepancy.drive.proof import prove
-from pymoo_hdte.discrepancy.drive.revision import drive_model
-from pymoo_hdte.discrepancy.engine.fitting import fit
-from pymoo_hdte.discrepancy.engine.verdict import Verdict
-from pymoo_hdte.discrepancy.mechanism.evidence import measured_data
-from pymoo_hdte.discrepancy.mechanism.finding import MechanismFinding
-from pymoo_hdte.discrepancy.mechanism.held_out import simulate_held_out
-from pymoo_hdte.discrepancy.mechanism.next_tests import next_test
-from pymoo_hdte.discrepancy.mechanism.proof import prove_measured
-from pymoo_hdte.discrepancy.report.mechanism import write_mechanism_report
+from pymoo_hdte.discrepancy._answers.next_test_mechanism import next_test
+from pymoo_hdte.discrepancy._answers.revision_drive import drive_model
+from pymoo_hdte.discrepancy._evidence.force_balances.evidence import measured_data
+from pymoo_hdte.discrepancy._evidence.order_lines.parameters import base_parameters
+from pymoo_hdte.discrepancy._report.mechanism import write_mechanism_report
+from pymoo_hdte.discrepancy._selection.fitting import fit
+from pymoo_hdte.discrepancy._selection.verdict import Verdict
+from pymoo_hdte.discrepancy._verdicts.held_out import simulate_held_out
+from pymoo_hdte.discrepancy._verdicts.mechanism_finding import MechanismFinding
+from pymoo_hdte.discrepancy._verdicts.validation_drive import prove
+from pymoo_hdte.discrepancy._verdicts.validation_mechanism import prove_measured
 from pymoo_hdte.mechanism import BelievedValue, Input, Mechanism, Port
 from pymoo_hdte.mechanism.believed import LARGEST_FACTOR, SMALLEST_SHARE
 

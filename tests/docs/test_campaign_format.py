@@ -13,13 +13,13 @@ import tomli_w
 from places import DOCS
 from small_campaigns import small_campaign
 
+from pymoo_hdte._io.array_files import READERS
+from pymoo_hdte._io.fields import Fields
+from pymoo_hdte._io.layout import COUNTS
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy import read_campaign, write_campaign
-from pymoo_hdte.discrepancy.campaign.believed import SENSOR_PLACES
-from pymoo_hdte.discrepancy.campaign.format import COLUMNS, LAYOUT
-from pymoo_hdte.io.array_files import READERS
-from pymoo_hdte.io.fields import Fields
-from pymoo_hdte.io.layout import COUNTS
+from pymoo_hdte.discrepancy._records.believed import SENSOR_PLACES
+from pymoo_hdte.discrepancy._records.campaign_format import COLUMNS, LAYOUT
 from pymoo_hdte.units import DEGREE, UNITS
 
 PAGE = (DOCS / "campaign_format.md").read_text(encoding="utf-8")

@@ -6,10 +6,10 @@ from itertools import chain
 import pytest
 from places import ROOT
 
-from pymoo_hdte.discrepancy.engine.verdict import STATUSES
-from pymoo_hdte.discrepancy.report import tables
-from pymoo_hdte.reports.glossary import GLOSSARY, terms_of
-from pymoo_hdte.reports.html import page
+from pymoo_hdte._reports.glossary import GLOSSARY, terms_of
+from pymoo_hdte._reports.html import page
+from pymoo_hdte.discrepancy._report import tables
+from pymoo_hdte.discrepancy._selection.verdict import STATUSES
 
 REPORTS = {
     path.name: path.read_text(encoding="utf-8")
@@ -50,7 +50,7 @@ def test_every_report_ends_with_a_glossary():
 @pytest.mark.parametrize("chapter", GLOSSARY)
 def test_a_page_that_says_everything_has_every_term(chapter):
     said = " ".join([*terms_of(chapter), *tables.STATUSES.values()])
-    drawn = page("pymoo_hdte.reports", "glossary.html.j2", chapters=[chapter], body=said)
+    drawn = page("pymoo_hdte._reports", "glossary.html.j2", chapters=[chapter], body=said)
     assert re.findall("<dt>(.*?)</dt>", drawn) == list(terms_of(chapter))
 
 
@@ -67,6 +67,6 @@ def test_a_page_that_says_everything_has_every_term(chapter):
 )
 def test_a_page_has_the_terms_it_uses_and_those_of_their_meanings(text, terms):
     chapters = ["Drives and mechanisms", "Verdicts on a model"]
-    drawn = page("pymoo_hdte.reports", "glossary.html.j2", chapters=chapters, body=text)
+    drawn = page("pymoo_hdte._reports", "glossary.html.j2", chapters=chapters, body=text)
     found = re.findall("<dt>(.*?)</dt>", drawn)
     assert found == terms

@@ -10,7 +10,7 @@ from kept_results import kept
 from PIL import Image
 from places import DOCS, ROOT
 
-from pymoo_hdte.discrepancy.engine.rules import RULES
+from pymoo_hdte.discrepancy._selection.rules import RULES
 from pymoo_hdte.drive import hs_20_100
 from pymoo_hdte.surrogate import TruncatedNormal
 

@@ -17,7 +17,7 @@ from kept_results import kept, put_files
 from places import DOCS
 
 from pymoo_hdte.cli import command_line as cli
-from pymoo_hdte.discrepancy.mechanism.files import read_rig
+from pymoo_hdte.discrepancy._records.rig_files import read_rig
 from pymoo_hdte.mechanism.effects import law_effects
 
 TABLE, JOINT = "own_rig", "own_joint"

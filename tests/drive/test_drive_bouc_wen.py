@@ -10,9 +10,9 @@ from scipy.integrate import solve_ivp
 
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.drive import LawAtPort, harmonic_balance, preset, simulate_drive
-from pymoo_hdte.drive.solve.free_angle import torus_of
-from pymoo_hdte.drive.solve.quasi_static import quasi_static_torsion
-from pymoo_hdte.drive.solve.torus import Torus
+from pymoo_hdte.drive._solve.free_angle import torus_of
+from pymoo_hdte.drive._solve.quasi_static import quasi_static_torsion
+from pymoo_hdte.drive._solve.torus import Torus
 from pymoo_hdte.effects.bouc_wen import BoucWen
 from pymoo_hdte.effects.law import PortState
 from pymoo_hdte.effects.smooth_loop import rise_of

@@ -15,8 +15,8 @@ from experiments.studies.virtual_rig.own_effects import with_effects
 from experiments.studies.virtual_rig.rig import draw_rig, run_campaign
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy import analyse
-from pymoo_hdte.discrepancy.engine.fitting import fit
-from pymoo_hdte.discrepancy.engine.verdict import judge
+from pymoo_hdte.discrepancy._selection.fitting import fit
+from pymoo_hdte.discrepancy._selection.verdict import judge
 from pymoo_hdte.drive import LawAtPort, SpeedLoop, harmonic_balance, preset
 from pymoo_hdte.effects.effect import effect_named
 from pymoo_hdte.effects.friction import SMOOTHING_SPEED, NonlinearDrag

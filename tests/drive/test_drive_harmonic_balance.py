@@ -10,6 +10,7 @@ from law_cases import EFFECTS, LAWS, memoryless
 from night import others_at_night
 from scipy.integrate import solve_ivp
 
+from pymoo_hdte._io.fields import Fields
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.drive import (
     PRESETS,
@@ -20,20 +21,20 @@ from pymoo_hdte.drive import (
     preset,
     simulate_drive,
 )
-from pymoo_hdte.drive.effects import (
+from pymoo_hdte.drive._effects import (
     KinematicErrorLine,
     KinematicReaction,
     LawAtPort,
     effect_from_fields,
 )
-from pymoo_hdte.drive.solve.angle_equations import AngleEquations
-from pymoo_hdte.drive.solve.free_angle import harmonic_balance
-from pymoo_hdte.drive.solve.fundamentals import fundamental_orders, multiples_of
-from pymoo_hdte.drive.solve.linear_systems import factored, multiplication, stacked, unstacked
-from pymoo_hdte.drive.solve.newton import Place
-from pymoo_hdte.drive.solve.recursion import Recollection
-from pymoo_hdte.drive.solve.steady_motion import SpeedLoop
-from pymoo_hdte.drive.solve.torus import Torus
+from pymoo_hdte.drive._solve.angle_equations import AngleEquations
+from pymoo_hdte.drive._solve.free_angle import harmonic_balance
+from pymoo_hdte.drive._solve.fundamentals import fundamental_orders, multiples_of
+from pymoo_hdte.drive._solve.linear_systems import factored, multiplication, stacked, unstacked
+from pymoo_hdte.drive._solve.newton import Place
+from pymoo_hdte.drive._solve.recursion import Recollection
+from pymoo_hdte.drive._solve.steady_motion import SpeedLoop
+from pymoo_hdte.drive._solve.torus import Torus
 from pymoo_hdte.effects.friction import (
     CoulombFriction,
     NonlinearDrag,
@@ -44,7 +45,6 @@ from pymoo_hdte.effects.hysteresis import MaxwellSlip, slip_along
 from pymoo_hdte.effects.law import PortState, periodic_phase
 from pymoo_hdte.effects.ripple import PeriodicTorque
 from pymoo_hdte.effects.stiffness import DeadZone, HardeningStiffness, PeriodicClearance, SoftWindup
-from pymoo_hdte.io.fields import Fields
 from pymoo_hdte.problems import RobustDTE
 from pymoo_hdte.units import ARCSEC
 

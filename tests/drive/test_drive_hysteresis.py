@@ -7,10 +7,10 @@ import pytest
 from scipy.optimize import least_squares
 
 from pymoo_hdte.drive import LawAtPort, SpeedLoop, harmonic_balance, preset
-from pymoo_hdte.drive.solve.angle_equations import AngleEquations
-from pymoo_hdte.drive.solve.free_angle import torus_of
-from pymoo_hdte.drive.solve.linear_systems import stacked, unstacked
-from pymoo_hdte.drive.solve.newton import Place
+from pymoo_hdte.drive._solve.angle_equations import AngleEquations
+from pymoo_hdte.drive._solve.free_angle import torus_of
+from pymoo_hdte.drive._solve.linear_systems import stacked, unstacked
+from pymoo_hdte.drive._solve.newton import Place
 from pymoo_hdte.effects.bouc_wen import BoucWen
 from pymoo_hdte.effects.effect import effect_named
 from pymoo_hdte.effects.hysteresis import MaxwellSlip

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from pymoo_hdte.drive import LawAtPort, harmonic_balance, preset
-from pymoo_hdte.drive.solve import newton
-from pymoo_hdte.drive.solve.free_angle import torus_of
-from pymoo_hdte.drive.solve.linear_systems import Iterated, Linearised, factored
-from pymoo_hdte.drive.solve.recursion import Recollection
-from pymoo_hdte.drive.solve.torus import Torus
+from pymoo_hdte.drive._solve import newton
+from pymoo_hdte.drive._solve.free_angle import torus_of
+from pymoo_hdte.drive._solve.linear_systems import Iterated, Linearised, factored
+from pymoo_hdte.drive._solve.recursion import Recollection
+from pymoo_hdte.drive._solve.torus import Torus
 from pymoo_hdte.effects.bouc_wen import BoucWen
 from pymoo_hdte.effects.friction import CoulombFriction, PeriodicFriction
 

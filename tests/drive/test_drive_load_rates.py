@@ -15,11 +15,11 @@ from pymoo_hdte.drive import (
     preset,
     simulate_drive,
 )
+from pymoo_hdte.drive._effects.base import DriveEffect
+from pymoo_hdte.drive._solve.free_angle import harmonic_balance
+from pymoo_hdte.drive._solve.hill import transfer_function
+from pymoo_hdte.drive._solve.stability import UnstableDrive
 from pymoo_hdte.drive.dte_map import torsional_mode
-from pymoo_hdte.drive.effects.base import DriveEffect
-from pymoo_hdte.drive.solve.free_angle import harmonic_balance
-from pymoo_hdte.drive.solve.hill import transfer_function
-from pymoo_hdte.drive.solve.stability import UnstableDrive
 
 INERTIA, TIME = 0.05, 2e-4
 """kg.m2, and s after which a viscous clutch has brought it to speed."""

@@ -13,8 +13,8 @@ from pymoo_hdte.drive import (
     UnstableDrive,
     preset,
 )
-from pymoo_hdte.drive.effects import LawAtPort
-from pymoo_hdte.drive.solve.free_angle import continued_from_neighbours, harmonic_balance
+from pymoo_hdte.drive._effects import LawAtPort
+from pymoo_hdte.drive._solve.free_angle import continued_from_neighbours, harmonic_balance
 from pymoo_hdte.effects.friction import CoulombFriction
 from pymoo_hdte.effects.stiffness import SoftWindup
 
@@ -83,7 +83,7 @@ def test_lost_designs_start_from_their_neighbours(soft):
 @pytest.mark.parametrize("patience", [1, 2])
 def test_a_lost_design_is_lost_in_any_company(soft, monkeypatch, patience):
     """Whether a design has a steady state does not depend on what is solved beside it."""
-    monkeypatch.setattr("pymoo_hdte.drive.solve.free_angle._PATIENCE", patience)
+    monkeypatch.setattr("pymoo_hdte.drive._solve.free_angle._PATIENCE", patience)
     coefficients = soft.at(280.0, 2.0).coefficients(around(soft, 40))
     together = harmonic_balance(coefficients).converged
     alone = [harmonic_balance(coefficients.rows([row])).converged[0] for row in range(40)]
@@ -108,7 +108,7 @@ def test_the_dte_of_a_drive_uses_them(soft, monkeypatch):
     designs = around(soft, 200)
     few = partial(harmonic_balance, steps=6)
     alone = few(soft.coefficients(designs)).converged
-    monkeypatch.setattr("pymoo_hdte.drive.solve.hill.harmonic_balance", few)
+    monkeypatch.setattr("pymoo_hdte.drive._solve.hill.harmonic_balance", few)
     found = np.isfinite(soft.dte_where_found(designs))
     assert found[alone].all()
     assert found[~alone].any()

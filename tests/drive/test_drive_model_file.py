@@ -27,8 +27,8 @@ from pymoo_hdte.drive import (
     NewZero,
     ThermalDrift,
 )
+from pymoo_hdte.drive._effects import drive_effects
 from pymoo_hdte.drive.datasheet import ERROR_CLASSES, MEMBERS, ErrorSource, Mesh, Nominal
-from pymoo_hdte.drive.effects import drive_effects
 from pymoo_hdte.effects.bouc_wen import BoucWen
 from pymoo_hdte.effects.effect import place_of
 

@@ -14,7 +14,7 @@ from pymoo_hdte.drive import (
     preset,
     quasi_static_torsion,
 )
-from pymoo_hdte.drive.effects import DriveSizes, PreslidingFriction
+from pymoo_hdte.drive._effects import DriveSizes, PreslidingFriction
 from pymoo_hdte.effects.effect import effect_named
 from pymoo_hdte.effects.friction import CoulombFriction
 from pymoo_hdte.effects.guess import Sizes

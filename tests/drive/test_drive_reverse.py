@@ -11,8 +11,8 @@ from scipy.integrate import solve_ivp
 
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.drive import MeshStiffnessVariation, SpeedLoop, harmonic_balance, preset
-from pymoo_hdte.drive.effects import LawAtPort
-from pymoo_hdte.drive.solve.time_domain import StartUp, equations_of_motion
+from pymoo_hdte.drive._effects import LawAtPort
+from pymoo_hdte.drive._solve.time_domain import StartUp, equations_of_motion
 from pymoo_hdte.effects.friction import CoulombFriction, PeriodicFriction
 from pymoo_hdte.effects.law import Periodic
 from pymoo_hdte.units import ARCSEC

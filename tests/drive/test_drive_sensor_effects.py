@@ -5,10 +5,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from pymoo_hdte._io.fields import Fields
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.drive import Eccentricity, NewZero, ThermalDrift, harmonic_balance, preset
-from pymoo_hdte.drive.effects import drive_effects, effect_from_fields
-from pymoo_hdte.io.fields import Fields
+from pymoo_hdte.drive._effects import drive_effects, effect_from_fields
 from pymoo_hdte.units import ARCSEC
 
 EFFECTS = [

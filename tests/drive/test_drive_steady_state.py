@@ -22,7 +22,7 @@ from pymoo_hdte.drive import (
     simulate_drive,
     transfer_function,
 )
-from pymoo_hdte.drive.solve.stability import require_stable
+from pymoo_hdte.drive._solve.stability import require_stable
 from pymoo_hdte.units import ARCSEC
 
 

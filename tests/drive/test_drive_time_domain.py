@@ -7,7 +7,7 @@ from scipy.signal import butter, sosfreqz
 
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.drive import Run, low_pass, measured_dte, preset, simulate_drive
-from pymoo_hdte.drive.solve.time_domain import StartUp, equations_of_motion, smooth_step
+from pymoo_hdte.drive._solve.time_domain import StartUp, equations_of_motion, smooth_step
 
 
 def test_smooth_step_is_monotone_and_flat_at_both_ends():

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from night import others_at_night
 
+from pymoo_hdte._io.fields import Fields
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.drive import (
     DampingReference,
@@ -18,9 +19,8 @@ from pymoo_hdte.drive import (
     quasi_static_torsion,
     simulate_drive,
 )
-from pymoo_hdte.drive.effects import effect_from_fields
+from pymoo_hdte.drive._effects import effect_from_fields
 from pymoo_hdte.effects.stiffness import PeriodicStiffness
-from pymoo_hdte.io.fields import Fields
 from pymoo_hdte.units import ARCSEC
 
 

@@ -7,14 +7,14 @@ from virtual_rig_cases import BELIEVED, RIG, effect, true_rig
 
 from experiments.studies.virtual_rig.rig import run_campaign
 from experiments.studies.virtual_rig.runs import Condition
-from pymoo_hdte.discrepancy.drive.candidates import drive_candidates
-from pymoo_hdte.discrepancy.drive.evidence import Data, start_parameters
-from pymoo_hdte.discrepancy.drive.features import measure
-from pymoo_hdte.discrepancy.drive.finding import DriveFinding
-from pymoo_hdte.discrepancy.drive.sizes import port_sizes
-from pymoo_hdte.discrepancy.engine.fitting import fit
-from pymoo_hdte.discrepancy.engine.hypothesis import Hypothesis
-from pymoo_hdte.discrepancy.engine.verdict import Verdict
+from pymoo_hdte.discrepancy._evidence.order_lines.candidates import drive_candidates
+from pymoo_hdte.discrepancy._evidence.order_lines.evidence import Data, start_parameters
+from pymoo_hdte.discrepancy._evidence.order_lines.features import measure
+from pymoo_hdte.discrepancy._evidence.order_lines.sizes import port_sizes
+from pymoo_hdte.discrepancy._selection.fitting import fit
+from pymoo_hdte.discrepancy._selection.hypothesis import Hypothesis
+from pymoo_hdte.discrepancy._selection.verdict import Verdict
+from pymoo_hdte.discrepancy._verdicts.drive_finding import DriveFinding
 
 ORDERS = [1.0, 2.0, 2.02, 3.0, 4.0, 6.0]
 CONDITIONS = tuple(

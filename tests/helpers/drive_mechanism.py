@@ -8,9 +8,9 @@ import math
 from numpy.typing import ArrayLike
 
 from pymoo_hdte.checks import InvalidInput, finite_array
+from pymoo_hdte.drive._solve.coefficients import Coefficients
 from pymoo_hdte.drive.model import DriveModel
 from pymoo_hdte.drive.parameters import PARAMETERS
-from pymoo_hdte.drive.solve.coefficients import Coefficients
 from pymoo_hdte.mechanism.believed import BelievedValue
 from pymoo_hdte.mechanism.error_line import ErrorLine
 from pymoo_hdte.mechanism.mechanism import Mechanism

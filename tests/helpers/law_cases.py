@@ -1,6 +1,6 @@
 """One effect of every law, which the forward and the reverse tests of the drive share."""
 
-from pymoo_hdte.drive.effects import (
+from pymoo_hdte.drive._effects import (
     KinematicErrorLine,
     KinematicReaction,
     LawAtPort,

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from experiments.studies.blind.candidate_terms import terms
-from pymoo_hdte.discrepancy.drive.torsion_curve import TorsionPoints
+from pymoo_hdte.discrepancy._evidence.order_lines.torsion_curve import TorsionPoints
 from pymoo_hdte.drive import (
     Eccentricity,
     KinematicErrorLine,

@@ -7,18 +7,18 @@ from types import SimpleNamespace
 import numpy as np
 from virtual_rig_cases import BELIEVED, PHASES, RIG
 
-from pymoo_hdte.discrepancy.drive.candidates import drive_candidates
-from pymoo_hdte.discrepancy.drive.evidence import Data
-from pymoo_hdte.discrepancy.drive.features import Features
-from pymoo_hdte.discrepancy.drive.finding import DriveFinding
-from pymoo_hdte.discrepancy.drive.parameters import base_parameters
-from pymoo_hdte.discrepancy.drive.prediction import Conditions, coefficients_of
-from pymoo_hdte.discrepancy.drive.sizes import Scales, port_sizes
-from pymoo_hdte.discrepancy.drive.torsion_curve import TorsionPoints
-from pymoo_hdte.discrepancy.engine.candidate import Layout
-from pymoo_hdte.discrepancy.engine.fitting import fit
-from pymoo_hdte.discrepancy.engine.hypothesis import Hypothesis
-from pymoo_hdte.discrepancy.engine.verdict import Verdict
+from pymoo_hdte.discrepancy._evidence.order_lines.candidates import drive_candidates
+from pymoo_hdte.discrepancy._evidence.order_lines.evidence import Data
+from pymoo_hdte.discrepancy._evidence.order_lines.features import Features
+from pymoo_hdte.discrepancy._evidence.order_lines.parameters import base_parameters
+from pymoo_hdte.discrepancy._evidence.order_lines.prediction import Conditions, coefficients_of
+from pymoo_hdte.discrepancy._evidence.order_lines.sizes import Scales, port_sizes
+from pymoo_hdte.discrepancy._evidence.order_lines.torsion_curve import TorsionPoints
+from pymoo_hdte.discrepancy._selection.candidate import Layout
+from pymoo_hdte.discrepancy._selection.fitting import fit
+from pymoo_hdte.discrepancy._selection.hypothesis import Hypothesis
+from pymoo_hdte.discrepancy._selection.verdict import Verdict
+from pymoo_hdte.discrepancy._verdicts.drive_finding import DriveFinding
 from pymoo_hdte.drive import mean_torsion
 from pymoo_hdte.units import ARCSEC, REVOLUTION_PER_MINUTE
 

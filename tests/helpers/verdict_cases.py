@@ -14,12 +14,13 @@ from virtual_rig_cases import BELIEVED, RIG, true_rig
 
 from experiments.studies.virtual_rig.rig import run_campaign
 from pymoo_hdte.discrepancy import read_campaign
-from pymoo_hdte.discrepancy.campaign.rows.findings import RowFindings
-from pymoo_hdte.discrepancy.drive import analysis, evidence
-from pymoo_hdte.discrepancy.drive.misfit import location
-from pymoo_hdte.discrepancy.engine import fitting, verdict
-from pymoo_hdte.discrepancy.engine.candidate import Candidate
-from pymoo_hdte.discrepancy.engine.search import Search
+from pymoo_hdte.discrepancy._answers.where import location
+from pymoo_hdte.discrepancy._evidence.order_lines import evidence
+from pymoo_hdte.discrepancy._records.cleaning.findings import RowFindings
+from pymoo_hdte.discrepancy._selection import fitting, verdict
+from pymoo_hdte.discrepancy._selection.candidate import Candidate
+from pymoo_hdte.discrepancy._selection.search import Search
+from pymoo_hdte.discrepancy._verdicts import drive as analysis
 
 
 def case_campaign(name):

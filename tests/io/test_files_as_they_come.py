@@ -7,12 +7,12 @@ import zipfile
 import numpy as np
 import pytest
 
+from pymoo_hdte._io import array_files
+from pymoo_hdte._io.encodings import decoded
+from pymoo_hdte._io.fields import Fields
+from pymoo_hdte._io.layout import Channel, TableLayout, layout_from_fields
+from pymoo_hdte._io.tables import read_table
 from pymoo_hdte.checks import InvalidInput
-from pymoo_hdte.io import array_files
-from pymoo_hdte.io.encodings import decoded
-from pymoo_hdte.io.fields import Fields
-from pymoo_hdte.io.layout import Channel, TableLayout, layout_from_fields
-from pymoo_hdte.io.tables import read_table
 from pymoo_hdte.units import FOREIGN, UNITS, suggestion, usual_spelling
 
 TIME = np.arange(400) * 1e-3

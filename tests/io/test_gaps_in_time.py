@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 import tomli_w
 
+from pymoo_hdte._io.layout import Channel, TableLayout
+from pymoo_hdte._io.tables import read_table, read_unbroken_tables
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy import read_rig
-from pymoo_hdte.io.layout import Channel, TableLayout
-from pymoo_hdte.io.tables import read_table, read_unbroken_tables
 
 LAYOUT = TableLayout("csv", {"q": Channel("q", "m")}, Channel("t", "s"), None, 0)
 

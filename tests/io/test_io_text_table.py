@@ -7,9 +7,9 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from pymoo_hdte._io import text_table
+from pymoo_hdte._io.text_table import csv_text, read_text_table, write_columns
 from pymoo_hdte.checks import InvalidInput
-from pymoo_hdte.io import text_table
-from pymoo_hdte.io.text_table import csv_text, read_text_table, write_columns
 
 FILES = settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=50)
 LETTERS = st.characters(exclude_categories=["Cs"], exclude_characters="\0\r")

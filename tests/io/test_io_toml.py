@@ -8,10 +8,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from pymoo_hdte._io.toml import toml_text, toml_with_lines
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.drive import hs_20_100, load_datasheet
 from pymoo_hdte.drive.toml_text import sheet_toml
-from pymoo_hdte.io.toml import toml_text, toml_with_lines
 
 NAMES = st.text(min_size=1, max_size=6)
 PLAIN = st.text() | st.booleans() | st.integers(-(2**63), 2**63 - 1) | st.floats(allow_nan=False)

@@ -10,9 +10,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from places import SHARED
 
+from pymoo_hdte._io import tables
+from pymoo_hdte._io.fields import Fields
 from pymoo_hdte.checks import InvalidInput
-from pymoo_hdte.io import tables
-from pymoo_hdte.io.fields import Fields
 
 EMPS = SHARED / "measured" / "emps" / "DATA_EMPS.mat"
 KINOVA = EMPS.parents[1] / "kinova_gen3_j7"

@@ -14,11 +14,11 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from places import DOCS, STORED
 
+from pymoo_hdte._io.archive import DEEPEST_HEADER, LARGEST_FILE, LARGEST_HEADER, FileFormat
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.drive import DriveModel
-from pymoo_hdte.io.archive import DEEPEST_HEADER, LARGEST_FILE, LARGEST_HEADER, FileFormat
 from pymoo_hdte.problems import SimulatorProblem
-from pymoo_hdte.problems.simulator.stored import FORMAT as PROBLEM
+from pymoo_hdte.problems._simulator.stored import FORMAT as PROBLEM
 from pymoo_hdte.surrogate import ChebyshevSurrogate
 
 KINDS = {

@@ -7,11 +7,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from pymoo_hdte._io.even_steps import even_steps, is_even
+from pymoo_hdte._io.fields import Fields
+from pymoo_hdte._io.parts import Part, part_from_fields
+from pymoo_hdte._io.tables import Channel, TableLayout, read_table
 from pymoo_hdte.checks import InvalidInput
-from pymoo_hdte.io.even_steps import even_steps, is_even
-from pymoo_hdte.io.fields import Fields
-from pymoo_hdte.io.parts import Part, part_from_fields
-from pymoo_hdte.io.tables import Channel, TableLayout, read_table
 from pymoo_hdte.mechanism.motion import noise_of
 
 LAYOUT = TableLayout("plain", {"q": Channel(1, "m")}, Channel(0, "s"), None, 0)

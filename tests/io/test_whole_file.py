@@ -5,7 +5,7 @@ import secrets
 
 import pytest
 
-from pymoo_hdte.io.whole_file import write_whole
+from pymoo_hdte._io.whole_file import write_whole
 
 
 def test_a_link_in_the_place_of_the_temporary_file_is_not_followed(tmp_path, monkeypatch):

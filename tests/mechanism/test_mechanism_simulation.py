@@ -11,7 +11,7 @@ from scipy.linalg import expm
 
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.drive import LawAtPort, harmonic_balance, preset, simulate_drive
-from pymoo_hdte.drive.effects import KinematicReaction
+from pymoo_hdte.drive._effects import KinematicReaction
 from pymoo_hdte.effects import Aperiodic, friction
 from pymoo_hdte.effects.friction import CoulombFriction, PeriodicFriction
 from pymoo_hdte.effects.hysteresis import MaxwellSlip

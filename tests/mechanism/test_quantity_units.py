@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from pymoo_hdte.discrepancy.report.mechanism_values import ripples
+from pymoo_hdte.discrepancy._report.mechanism_values import ripples
 from pymoo_hdte.effects import effect_named
 from pymoo_hdte.mechanism import BelievedValue, Input, Mechanism, Port
 from pymoo_hdte.mechanism.quantity_units import base_unit, unit_of_number

@@ -12,26 +12,26 @@ ROOT = Path(pymoo_hdte.__file__).parent
 EXPERIMENTS = Path(experiments.__file__).parent
 TESTS = Path(__file__).parents[1]
 LOWEST_FIRST = (
-    *("checks", "lazy", "units", "compilation", "one_thread", "interrupts", "io", "effects"),
-    *("reports", "drive.solve", "drive.effects", "drive", "mechanism"),
-    *("surrogate", "surrogate.sparse"),
+    *("checks", "_lazy", "units", "_compilation", "_one_thread", "_interrupts", "_io", "effects"),
+    *("_reports", "drive._solve", "drive._effects", "drive", "mechanism"),
+    *("surrogate", "surrogate._sparse"),
     "validation",
     "identification",
     *(
-        "discrepancy.engine.thresholds",
-        "discrepancy.engine",
-        "discrepancy.campaign",
-        "discrepancy.campaign.rows",
-        "discrepancy.drive.forms",
-        "discrepancy.drive",
-        "discrepancy.drive.misfit",
-        "discrepancy.drive.plan",
-        "discrepancy.mechanism.beyond_band",
-        "discrepancy.mechanism",
-        "discrepancy.joint",
+        "discrepancy._selection",
+        "discrepancy._records",
+        "discrepancy._records.cleaning",
+        "discrepancy._evidence",
+        "discrepancy._evidence.order_lines",
+        "discrepancy._evidence.force_balances.beyond_band",
+        "discrepancy._evidence.force_balances",
+        "discrepancy._verdicts",
+        "discrepancy._answers.where",
+        "discrepancy._answers",
+        "discrepancy._plan",
+        "discrepancy._report",
     ),
-    "discrepancy.report",
-    *("problems.simulator", "problems.closed_form", "problems"),
+    *("problems._simulator", "problems._closed_form", "problems"),
     *("algorithms", "parallel", "decision", "discrepancy", "cli"),
 )
 """Rooms of the package; a folder stands for the modules in it, not for the folders below it.
@@ -104,7 +104,7 @@ def test_no_import_runs_back(package, root, order):
 
 
 @pytest.mark.parametrize(
-    "rooms_of_it", ["discrepancy.engine", "discrepancy.campaign", "discrepancy.drive"]
+    "rooms_of_it", ["discrepancy._selection", "discrepancy._records", "discrepancy._evidence"]
 )
 def test_the_workflow_knows_nothing_of_optimisation(rooms_of_it):
     found = dict(rooms(ROOT, LOWEST_FIRST))[rooms_of_it]
@@ -113,6 +113,6 @@ def test_the_workflow_knows_nothing_of_optimisation(rooms_of_it):
 
 
 def test_the_engine_knows_no_machine():
-    found = dict(rooms(ROOT, LOWEST_FIRST))["discrepancy.engine"]
+    found = dict(rooms(ROOT, LOWEST_FIRST))["discrepancy._selection"]
     names = set().union(*(imported(path, "pymoo_hdte", ROOT) for path in found))
     assert not {name for name in names if name.startswith(("drive", "mechanism"))}

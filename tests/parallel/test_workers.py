@@ -4,8 +4,8 @@ import os
 import signal
 import time
 
-from pymoo_hdte.problems.simulator.children import LOST, Children, parcel
-from pymoo_hdte.problems.simulator.workers import Workers
+from pymoo_hdte.problems._simulator.children import LOST, Children, parcel
+from pymoo_hdte.problems._simulator.workers import Workers
 
 
 def test_a_process_that_was_ended_while_idle_loses_no_evaluation():

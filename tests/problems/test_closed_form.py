@@ -23,7 +23,7 @@ from scipy.optimize import differential_evolution
 
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.problems import Robust, WorstCase, robust_benchmarks, robust_problem
-from pymoo_hdte.problems.closed_form import (
+from pymoo_hdte.problems._closed_form import (
     DebGupta3,
     DebGupta4,
     DebGupta12,
@@ -32,8 +32,8 @@ from pymoo_hdte.problems.closed_form import (
     RobustSrinivas,
     WorstCaseSchaffer,
 )
-from pymoo_hdte.problems.simulator.sampled_statistics import CVaR, FailureProbability, Quantile
-from pymoo_hdte.problems.simulator.statistics import Mean, MeanPlusStd
+from pymoo_hdte.problems._simulator.sampled_statistics import CVaR, FailureProbability, Quantile
+from pymoo_hdte.problems._simulator.statistics import Mean, MeanPlusStd
 from pymoo_hdte.surrogate import ExtrapolationError
 
 NAMES = tuple(robust_benchmarks())

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pymoo_hdte.reports.html import with_error
+from pymoo_hdte._reports.html import with_error
 
 
 @given(st.floats(-1e4, 1e4), st.floats(-9.0, 4.0).map(lambda power: 10.0**power))

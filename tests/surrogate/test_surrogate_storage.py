@@ -6,8 +6,8 @@ import os
 import numpy as np
 import pytest
 
+from pymoo_hdte._io import whole_file
 from pymoo_hdte.checks import InvalidInput
-from pymoo_hdte.io import whole_file
 from pymoo_hdte.surrogate import Box, ChebyshevSurrogate
 
 BOX = Box(("theta_s", "K"), (0.1, 1 / 3), (0.3, 2 / 3))

@@ -1,6 +1,6 @@
 """Steady state and peak-to-peak of the drive at many points at once, compiled.
 
-The equations are those of `pymoo_hdte.drive.solve.hill`, solved family by family as tridiagonal
+The equations are those of `pymoo_hdte.drive._solve.hill`, solved family by family as tridiagonal
 systems; a test holds them against `DriveModel.dte_arcsec`. A search needs some hundred million of
 these values, and is done in minutes instead of hours.
 """
@@ -10,8 +10,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from pymoo_hdte.compilation import compiled
-from pymoo_hdte.drive.solve.coefficients import Coefficients
+from pymoo_hdte._compilation import compiled
+from pymoo_hdte.drive._solve.coefficients import Coefficients
 
 POINTS = 96
 """Grid points in an input turn; a parabola through three of them misses a peak of an order o by

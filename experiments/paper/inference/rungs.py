@@ -21,9 +21,9 @@ from experiments.paper.calibrating.predictions import VARIABLES
 from experiments.paper.inference.closures import CLOSURES, Values
 from experiments.paper.inference.peaks import peak_to_peak, shape_peak_to_peak
 from pymoo_hdte.drive import PARAMETERS, DriveModel, preset
-from pymoo_hdte.drive.solve.coefficients import Coefficients
-from pymoo_hdte.drive.solve.order_spectrum import sine_phasor
-from pymoo_hdte.drive.solve.stability import stable_rows
+from pymoo_hdte.drive._solve.coefficients import Coefficients
+from pymoo_hdte.drive._solve.order_spectrum import sine_phasor
+from pymoo_hdte.drive._solve.stability import stable_rows
 from pymoo_hdte.units import ARCSEC
 
 PERIODIC = ("phase", "phase_2", "phase_2.02")

@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from pymoo_hdte.discrepancy.campaign.believed import BelievedDrive
+from pymoo_hdte.discrepancy._records.believed import BelievedDrive
 from pymoo_hdte.effects.hysteresis import slip_along
 from pymoo_hdte.units import ARCSEC
 

@@ -6,9 +6,9 @@ from collections.abc import Iterable
 
 from experiments.studies.blind.cases import BELIEVED
 from experiments.studies.blind.rig.forms import LISTED, UNLISTED
-from pymoo_hdte.discrepancy.drive.parameters import MECHANICAL
-from pymoo_hdte.discrepancy.engine.verdict import STATUSES as VERDICTS
-from pymoo_hdte.drive.effects import ENCODER_LINE, drive_effects
+from pymoo_hdte.discrepancy._evidence.order_lines.parameters import MECHANICAL
+from pymoo_hdte.discrepancy._selection.verdict import STATUSES as VERDICTS
+from pymoo_hdte.drive._effects import ENCODER_LINE, drive_effects
 
 ERROR = "error"
 """Status of a case in which the workflow raised an exception."""

@@ -13,7 +13,7 @@ from experiments.studies.blind.outcome import Outcome
 from experiments.studies.blind.reliability import reliability
 from experiments.studies.blind.rig.forms import LISTED, UNLISTED
 from experiments.studies.blind.truth import PARAMETER
-from pymoo_hdte.drive.effects import ENCODER_LINE
+from pymoo_hdte.drive._effects import ENCODER_LINE
 
 _TRUTHS = (*LISTED, "none", *UNLISTED)
 _OF_NO_EFFECT = ("adequate", "unlisted", ERROR)

@@ -20,21 +20,24 @@ from experiments.studies.blind.cases import Case
 from experiments.studies.blind.codes import ERROR, NAMES, PORTS, STATUSES, code, code_of_set
 from experiments.studies.blind.truth import may_be_named, one_name, to_be_named
 from pymoo_hdte.discrepancy import Campaign
-from pymoo_hdte.discrepancy.drive.analysis import examine_drive
-from pymoo_hdte.discrepancy.drive.evidence import training_data
-from pymoo_hdte.discrepancy.drive.features import Features, measure
-from pymoo_hdte.discrepancy.drive.finding import DriveFinding
-from pymoo_hdte.discrepancy.drive.misfit.location import locate
-from pymoo_hdte.discrepancy.drive.misfit.map import Flags
-from pymoo_hdte.discrepancy.drive.next_test import next_experiment
-from pymoo_hdte.discrepancy.drive.observations import cell_chi_square, cell_degrees_of_freedom
-from pymoo_hdte.discrepancy.drive.parameters import MECHANICAL
-from pymoo_hdte.discrepancy.drive.proof import Proof, prove
-from pymoo_hdte.discrepancy.engine.candidate import Layout
-from pymoo_hdte.discrepancy.engine.fitting import Fit, fit
-from pymoo_hdte.discrepancy.engine.hypothesis import Hypothesis
-from pymoo_hdte.discrepancy.engine.verdict import Verdict
-from pymoo_hdte.discrepancy.report.document import effects_of
+from pymoo_hdte.discrepancy._answers.next_test_drive import next_experiment
+from pymoo_hdte.discrepancy._answers.where.location import locate
+from pymoo_hdte.discrepancy._answers.where.map import Flags
+from pymoo_hdte.discrepancy._evidence.order_lines.evidence import training_data
+from pymoo_hdte.discrepancy._evidence.order_lines.features import Features, measure
+from pymoo_hdte.discrepancy._evidence.order_lines.observations import (
+    cell_chi_square,
+    cell_degrees_of_freedom,
+)
+from pymoo_hdte.discrepancy._evidence.order_lines.parameters import MECHANICAL
+from pymoo_hdte.discrepancy._report.document import effects_of
+from pymoo_hdte.discrepancy._selection.candidate import Layout
+from pymoo_hdte.discrepancy._selection.fitting import Fit, fit
+from pymoo_hdte.discrepancy._selection.hypothesis import Hypothesis
+from pymoo_hdte.discrepancy._selection.verdict import Verdict
+from pymoo_hdte.discrepancy._verdicts.drive import examine_drive
+from pymoo_hdte.discrepancy._verdicts.drive_finding import DriveFinding
+from pymoo_hdte.discrepancy._verdicts.validation_drive import Proof, prove
 
 PARTS = ("analyse", "locate", "prove", "next_experiment")
 RIVALS = ("largest_residual_rule", "sparse_regression")

@@ -19,17 +19,17 @@ from scipy.stats import chi2
 from experiments.studies.blind.candidate_terms import terms
 from experiments.studies.blind.torque_balances import Regression, regression
 from pymoo_hdte.checks import InvalidInput
-from pymoo_hdte.discrepancy.campaign.line_fit import CHANNELS
-from pymoo_hdte.discrepancy.drive.evidence import Data
-from pymoo_hdte.discrepancy.drive.finding import DriveFinding
-from pymoo_hdte.discrepancy.drive.objective import LOST
-from pymoo_hdte.discrepancy.drive.observations import (
+from pymoo_hdte.discrepancy._evidence.order_lines.evidence import Data
+from pymoo_hdte.discrepancy._evidence.order_lines.objective import LOST
+from pymoo_hdte.discrepancy._evidence.order_lines.observations import (
     as_lines,
     cell_chi_square,
     cell_degrees_of_freedom,
 )
-from pymoo_hdte.discrepancy.drive.parameters import MECHANICAL
-from pymoo_hdte.discrepancy.engine.candidate import Layout
+from pymoo_hdte.discrepancy._evidence.order_lines.parameters import MECHANICAL
+from pymoo_hdte.discrepancy._records.line_fit import CHANNELS
+from pymoo_hdte.discrepancy._selection.candidate import Layout
+from pymoo_hdte.discrepancy._verdicts.drive_finding import DriveFinding
 from pymoo_hdte.effects.unknowns import Parameter
 
 FALSE_ALARMS = 0.01

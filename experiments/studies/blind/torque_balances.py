@@ -22,10 +22,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.studies.blind.candidate_terms import RecordMotion, Term
-from pymoo_hdte.discrepancy.drive.evidence import Data
-from pymoo_hdte.discrepancy.drive.features import stack
-from pymoo_hdte.discrepancy.drive.torsion_curve import TorsionPoints
-from pymoo_hdte.drive.solve.order_spectrum import sine_phasor
+from pymoo_hdte.discrepancy._evidence.order_lines.evidence import Data
+from pymoo_hdte.discrepancy._evidence.order_lines.features import stack
+from pymoo_hdte.discrepancy._evidence.order_lines.torsion_curve import TorsionPoints
+from pymoo_hdte.drive._solve.order_spectrum import sine_phasor
 
 Values = NDArray[np.float64]
 Phasors = NDArray[np.complex128]

@@ -9,8 +9,8 @@ from experiments.runner.result import Finding, Result, Table
 from experiments.studies.measured.report import MeasuredRig, measured_result
 from experiments.studies.measured.rigs import Study, values_table
 from experiments.studies.measured.twins import Twin, twins_finding
-from pymoo_hdte.discrepancy.mechanism.next_tests import next_test
-from pymoo_hdte.discrepancy.report.mechanism_document import limits
+from pymoo_hdte.discrepancy._answers.next_test_mechanism import next_test
+from pymoo_hdte.discrepancy._report.mechanism_document import limits
 from pymoo_hdte.effects.effect import place_of
 
 RIG = MeasuredRig(

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import dct
 
-from pymoo_hdte.discrepancy.mechanism.finding import MechanismFinding
+from pymoo_hdte.discrepancy._verdicts.mechanism_finding import MechanismFinding
 from pymoo_hdte.mechanism import Record
 from pymoo_hdte.mechanism.motion import margin_of, motion_of, smooth
 

@@ -45,9 +45,9 @@ from experiments.studies.measured.real_numbers import (
     torsion_errors,
 )
 from experiments.studies.measured.rigs import MEASURED, Study
-from pymoo_hdte.discrepancy.mechanism.proof import prove_measured
-from pymoo_hdte.discrepancy.report.tables import STATUSES
-from pymoo_hdte.io.text_table import csv_text
+from pymoo_hdte._io.text_table import csv_text
+from pymoo_hdte.discrepancy._report.tables import STATUSES
+from pymoo_hdte.discrepancy._verdicts.validation_mechanism import prove_measured
 
 NAME = "real"
 VERDICTS = (

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from experiments.studies.measured.known_answers import KnownRig
 from experiments.studies.measured.other_tools import terms_of
 from experiments.studies.measured.rigs import Study, fitted_values
-from pymoo_hdte.discrepancy.report.mechanism_values import effects
-from pymoo_hdte.discrepancy.report.torsion import torsion_document
+from pymoo_hdte.discrepancy._report.mechanism_values import effects
+from pymoo_hdte.discrepancy._report.torsion import torsion_document
 from pymoo_hdte.effects.effect import place_of
 from pymoo_hdte.mechanism.motion import SmoothedMotion
 from pymoo_hdte.mechanism.port_motion import law_force

@@ -12,20 +12,20 @@ from numpy.typing import NDArray
 
 from experiments.runner.committed import DATA
 from experiments.runner.result import Column, Picture, Result, Table
-from pymoo_hdte.discrepancy.joint.analysis import JointFinding, examine_joint
-from pymoo_hdte.discrepancy.joint.halves import joint_of, rigid_half
-from pymoo_hdte.discrepancy.mechanism.analysis import examine_mechanism
-from pymoo_hdte.discrepancy.mechanism.files import MeasuredMechanism, read_rig
-from pymoo_hdte.discrepancy.mechanism.finding import MechanismFinding
-from pymoo_hdte.discrepancy.mechanism.next_tests import next_test
-from pymoo_hdte.discrepancy.mechanism.proof import MeasuredGap, prove_measured
-from pymoo_hdte.discrepancy.report.mechanism import extent_sentence, proof_sentence
-from pymoo_hdte.discrepancy.report.mechanism_document import limits, offered, remainder
-from pymoo_hdte.discrepancy.report.mechanism_figures import misfit_over_motion, overlay
-from pymoo_hdte.discrepancy.report.mechanism_values import effects, quantities
-from pymoo_hdte.discrepancy.report.tables import STATUSES
+from pymoo_hdte._reports.html import percent
+from pymoo_hdte.discrepancy._answers.next_test_mechanism import next_test
+from pymoo_hdte.discrepancy._evidence.force_balances.joint_halves import joint_of, rigid_half
+from pymoo_hdte.discrepancy._records.rig_files import MeasuredMechanism, read_rig
+from pymoo_hdte.discrepancy._report.mechanism import extent_sentence, proof_sentence
+from pymoo_hdte.discrepancy._report.mechanism_document import limits, offered, remainder
+from pymoo_hdte.discrepancy._report.mechanism_figures import misfit_over_motion, overlay
+from pymoo_hdte.discrepancy._report.mechanism_values import effects, quantities
+from pymoo_hdte.discrepancy._report.tables import STATUSES
+from pymoo_hdte.discrepancy._verdicts.joint import JointFinding, examine_joint
+from pymoo_hdte.discrepancy._verdicts.mechanism import examine_mechanism
+from pymoo_hdte.discrepancy._verdicts.mechanism_finding import MechanismFinding
+from pymoo_hdte.discrepancy._verdicts.validation_mechanism import MeasuredGap, prove_measured
 from pymoo_hdte.effects.sentence_blanks import in_words
-from pymoo_hdte.reports.html import percent
 
 MEASURED = Path(__file__).resolve().parents[4] / "shared" / "measured"
 """Folder of the measurements, which are not part of the project."""

@@ -24,11 +24,11 @@ from experiments.runner.result import Cell, Column, Result, Table
 from experiments.runner.store import TIMES, write_atomically
 from experiments.runner.texts import paragraphs
 from experiments.studies.measured.rigs import MEASURED
+from pymoo_hdte._io.text_table import csv_text
 from pymoo_hdte.discrepancy import DriveAnalysis, analyse, read_campaign
-from pymoo_hdte.discrepancy.engine.candidate import Candidate
-from pymoo_hdte.discrepancy.report.tables import STATUSES as SHOWN
+from pymoo_hdte.discrepancy._report.tables import STATUSES as SHOWN
+from pymoo_hdte.discrepancy._selection.candidate import Candidate
 from pymoo_hdte.effects.sentence_blanks import in_words
-from pymoo_hdte.io.text_table import csv_text
 
 NAME = "sealed_rigs"
 RIGS = MEASURED.parent / "rig"

@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 from experiments.runner.result import Column, Table
 from experiments.runner.result import Finding as Agreement
 from experiments.studies.measured.rigs import Study, coloured_rest
-from pymoo_hdte.discrepancy.mechanism.analysis import examine_mechanism
-from pymoo_hdte.discrepancy.mechanism.finding import MechanismFinding
-from pymoo_hdte.discrepancy.mechanism.held_out import fitted_mechanism
-from pymoo_hdte.discrepancy.report.tables import STATUSES
+from pymoo_hdte.discrepancy._report.tables import STATUSES
+from pymoo_hdte.discrepancy._verdicts.held_out import fitted_mechanism
+from pymoo_hdte.discrepancy._verdicts.mechanism import examine_mechanism
+from pymoo_hdte.discrepancy._verdicts.mechanism_finding import MechanismFinding
 from pymoo_hdte.effects.friction import NonlinearDrag
 from pymoo_hdte.mechanism import LawAt, Mechanism, Record
 from pymoo_hdte.mechanism.balances import ForceBalance

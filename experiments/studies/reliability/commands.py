@@ -8,11 +8,11 @@ from collections.abc import Callable
 from contextlib import redirect_stderr
 from pathlib import Path
 
+from pymoo_hdte._reports.folder import ReportFolder
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.cli import command_line as cli
 from pymoo_hdte.cli import identification_report, optimum_report, simulation_report
-from pymoo_hdte.discrepancy.report import folder as report_folder
-from pymoo_hdte.reports.folder import ReportFolder
+from pymoo_hdte.discrepancy._report import folder as report_folder
 
 
 class Wrong(Exception):

@@ -92,7 +92,7 @@ def encodings() -> Iterator[bool]:
             path.write_bytes(text.encode(encoding))
             script = (
                 "from pathlib import Path\n"
-                "from pymoo_hdte.io.tables import Channel, TableLayout, read_columns\n"
+                "from pymoo_hdte._io.tables import Channel, TableLayout, read_columns\n"
                 "title = 'Winkel [\\u00b0]'\n"
                 "layout = TableLayout('csv', {'q': Channel(title, 'deg')}, None, 100.0, 0)\n"
                 f"raw = read_columns(Path({str(path)!r}), layout).raw[title]\n"
@@ -179,10 +179,10 @@ def _stating(path: Path, shape: bytes, other: bytes) -> None:
 def _refused(path: Path) -> bool:
     """Tell whether a file is refused by name, in little memory and time."""
     if path.suffix == ".toml":
-        read = f"from pymoo_hdte.io.toml import read_toml; read_toml(Path({str(path)!r}))"
+        read = f"from pymoo_hdte._io.toml import read_toml; read_toml(Path({str(path)!r}))"
     else:
         read = (
-            "from pymoo_hdte.io.tables import Channel, TableLayout, read_table\n"
+            "from pymoo_hdte._io.tables import Channel, TableLayout, read_table\n"
             "layout = TableLayout('csv', {'q': Channel('q', 'm')}, None, 100.0, 0)\n"
             f"read_table(Path({str(path)!r}), layout)"
         )

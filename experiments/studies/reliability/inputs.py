@@ -14,8 +14,8 @@ from experiments.studies.reliability import commands, originals
 from experiments.studies.reliability.commands import Wrong
 from experiments.studies.reliability.mutations import Files
 from pymoo_hdte.discrepancy import read_campaign, write_campaign
-from pymoo_hdte.discrepancy.mechanism.files import read_rig
-from pymoo_hdte.discrepancy.mechanism.models import model_text
+from pymoo_hdte.discrepancy._records.rig_files import read_rig
+from pymoo_hdte.discrepancy._records.rig_model import model_text
 from pymoo_hdte.drive import UnstableDrive, hs_20_100, load_datasheet, load_model
 from pymoo_hdte.identification import (
     error_statistics,

@@ -21,7 +21,7 @@ import numpy as np
 
 from experiments.runner.campaign import Run
 from experiments.runner.store import TIMES
-from pymoo_hdte.io import whole_file
+from pymoo_hdte._io import whole_file
 
 SEED = 20261123
 ROOT = Path(__file__).parents[3]

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from experiments.studies.robust.task import Task
 from pymoo_hdte.problems import Mean, Std
-from pymoo_hdte.problems.simulator.problem import SimulatorProblem
-from pymoo_hdte.surrogate.sparse.adaptive import (
+from pymoo_hdte.problems._simulator.problem import SimulatorProblem
+from pymoo_hdte.surrogate._sparse.adaptive import (
     IN_A_ROW,
     AdaptiveFit,
     fit_adaptively,

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from experiments.studies.robust.functions import BY_NAME, Normal, Uniform
 from pymoo_hdte.problems import Design
-from pymoo_hdte.problems.simulator.inputs import Inputs
+from pymoo_hdte.problems._simulator.inputs import Inputs
 
 Array = NDArray[np.float64]
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from experiments.studies.virtual_rig import listed_forms, unlisted_forms
 from pymoo_hdte.checks import one_of, real_number
-from pymoo_hdte.discrepancy.campaign.believed import BelievedDrive
+from pymoo_hdte.discrepancy._records.believed import BelievedDrive
 
 _Draw = Callable[[BelievedDrive, np.random.Generator, float], listed_forms.Drawn]
 

@@ -18,7 +18,7 @@ from experiments.studies.virtual_rig.laws import (
     static_error,
     static_mesh_torque,
 )
-from pymoo_hdte.compilation import compiled
+from pymoo_hdte._compilation import compiled
 
 N_STATES = 6
 """Deviation of the input angle from its straight line and its rate, transmission error and its

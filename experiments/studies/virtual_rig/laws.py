@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pymoo_hdte.compilation import compiled
+from pymoo_hdte._compilation import compiled
 
 _NONE: NDArray[np.float64] = np.zeros(0)
 

@@ -12,7 +12,7 @@ import math
 import numpy as np
 from scipy.optimize import brentq
 
-from pymoo_hdte.discrepancy.campaign.believed import BelievedDrive
+from pymoo_hdte.discrepancy._records.believed import BelievedDrive
 from pymoo_hdte.units import ARCSEC, REVOLUTION_PER_MINUTE
 
 Drawn = tuple[str, dict[str, float | tuple[float, ...]]]

@@ -8,10 +8,10 @@ from dataclasses import replace
 import numpy as np
 
 from experiments.studies.virtual_rig.rig import TrueRig
-from pymoo_hdte.discrepancy.campaign.campaign import Campaign
-from pymoo_hdte.discrepancy.campaign.records import RunningRecord
-from pymoo_hdte.discrepancy.drive.parameters import base_parameters
-from pymoo_hdte.discrepancy.drive.prediction import Conditions, predict
+from pymoo_hdte.discrepancy._evidence.order_lines.parameters import base_parameters
+from pymoo_hdte.discrepancy._evidence.order_lines.prediction import Conditions, predict
+from pymoo_hdte.discrepancy._records.campaign import Campaign
+from pymoo_hdte.discrepancy._records.records import RunningRecord
 from pymoo_hdte.drive import DriveEffect, SteadyMotion
 
 _CHANNELS = ("transmission_error", "motor_torque", "coupling_torque", "lead")

@@ -23,7 +23,7 @@ from experiments.studies.virtual_rig.sensors import (
     measure,
 )
 from pymoo_hdte.checks import InvalidInput, one_of, real_number
-from pymoo_hdte.discrepancy.campaign.campaign import (
+from pymoo_hdte.discrepancy._records.campaign import (
     BelievedDrive,
     Campaign,
     Rig,

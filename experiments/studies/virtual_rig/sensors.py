@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pymoo_hdte.discrepancy.campaign.believed import Rig
+from pymoo_hdte.discrepancy._records.believed import Rig
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ from experiments.studies.virtual_rig.listed_forms import (
     Drawn,
     uniform_phase,
 )
-from pymoo_hdte.discrepancy.campaign.believed import BelievedDrive
+from pymoo_hdte.discrepancy._records.believed import BelievedDrive
 from pymoo_hdte.units import ARCSEC
 
 

@@ -8,15 +8,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pymoo_hdte.discrepancy.drive.gap import Gap
-from pymoo_hdte.discrepancy.drive.misfit.relevance import Relevance, largest_change, relevance
-from pymoo_hdte.discrepancy.drive.proof import Proof
-from pymoo_hdte.discrepancy.engine.rules import RULES
-from pymoo_hdte.discrepancy.engine.verdict import Verdict
-from pymoo_hdte.discrepancy.report.document import sentence
-from pymoo_hdte.discrepancy.report.gap_words import gap_sentence
-from pymoo_hdte.discrepancy.report.optimum import Choice
-from pymoo_hdte.discrepancy.report.tables import EffectRow, effect_rows, hypothesis_rows
+from pymoo_hdte.discrepancy._answers.where.relevance import Relevance, largest_change, relevance
+from pymoo_hdte.discrepancy._report.document import sentence
+from pymoo_hdte.discrepancy._report.optimum import Choice
+from pymoo_hdte.discrepancy._report.tables import EffectRow, effect_rows, hypothesis_rows
+from pymoo_hdte.discrepancy._report.write import gap_sentence
+from pymoo_hdte.discrepancy._selection.rules import RULES
+from pymoo_hdte.discrepancy._selection.verdict import Verdict
+from pymoo_hdte.discrepancy._verdicts.gap import Gap
+from pymoo_hdte.discrepancy._verdicts.validation_drive import Proof
 from pymoo_hdte.units import ARCSEC
 
 NAMED = SimpleNamespace(

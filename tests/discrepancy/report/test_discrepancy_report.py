@@ -11,20 +11,20 @@ from analysed_campaigns import ripple_analysis
 from hypothesis import given
 from hypothesis import strategies as st
 
+from pymoo_hdte._reports.html import digits, number
 from pymoo_hdte.checks import InvalidInput
-from pymoo_hdte.discrepancy.drive.coverage import campaign_limits
-from pymoo_hdte.discrepancy.drive.misfit.location import locate
-from pymoo_hdte.discrepancy.drive.next_test import Proposal
-from pymoo_hdte.discrepancy.drive.proof import prove
-from pymoo_hdte.discrepancy.drive.revision import drive_model, revised_model
-from pymoo_hdte.discrepancy.report import write as report
-from pymoo_hdte.discrepancy.report.certainty import how_sure
-from pymoo_hdte.discrepancy.report.folder import FOLDER
-from pymoo_hdte.discrepancy.report.gap_words import gap_sentence
-from pymoo_hdte.discrepancy.report.optimum import OptimumShift
-from pymoo_hdte.discrepancy.report.tables import parameter_rows
-from pymoo_hdte.discrepancy.report.write import write_report
-from pymoo_hdte.discrepancy.robust_optimum import optimum_shift
+from pymoo_hdte.discrepancy._answers.next_test_drive import Proposal
+from pymoo_hdte.discrepancy._answers.revision_drive import drive_model, revised_model
+from pymoo_hdte.discrepancy._answers.where.coverage import campaign_limits
+from pymoo_hdte.discrepancy._answers.where.location import locate
+from pymoo_hdte.discrepancy._report import write as report
+from pymoo_hdte.discrepancy._report.certainty import how_sure
+from pymoo_hdte.discrepancy._report.folder import FOLDER
+from pymoo_hdte.discrepancy._report.optimum import OptimumShift
+from pymoo_hdte.discrepancy._report.tables import parameter_rows
+from pymoo_hdte.discrepancy._report.write import gap_sentence, write_report
+from pymoo_hdte.discrepancy._robust_optimum import optimum_shift
+from pymoo_hdte.discrepancy._verdicts.validation_drive import prove
 from pymoo_hdte.drive import (
     LawAtPort,
     LoadInertia,
@@ -34,7 +34,6 @@ from pymoo_hdte.drive import (
     preset,
 )
 from pymoo_hdte.effects.stiffness import SoftWindup
-from pymoo_hdte.reports.html import digits, number
 from pymoo_hdte.units import ARCSEC
 
 PROPOSAL = Proposal("Turn it backwards.", "running", -600.0, 40.0, ("a", "b"), 12.0)

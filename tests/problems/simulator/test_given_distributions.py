@@ -7,7 +7,7 @@ import scipy
 
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.problems import Design, robust_problem
-from pymoo_hdte.problems.simulator.inputs import Inputs
+from pymoo_hdte.problems._simulator.inputs import Inputs
 
 X = {"x": Design(1.0, 2.0)}
 NORMAL = chaospy.Normal(0.0, 1.0)

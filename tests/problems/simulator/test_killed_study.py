@@ -14,8 +14,8 @@ import pytest
 
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.problems import Design, robust_problem
-from pymoo_hdte.problems.simulator.identity import identity
-from pymoo_hdte.problems.simulator.run_file import RunFile
+from pymoo_hdte.problems._simulator.identity import identity
+from pymoo_hdte.problems._simulator.run_file import RunFile
 
 NAMES = ("x", "a")
 RUNS, PROBLEM = "runs.jsonl", "problem.npz"

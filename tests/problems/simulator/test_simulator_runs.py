@@ -17,9 +17,9 @@ from pymoo_hdte.problems import (
     UntrustedSurrogate,
     robust_problem,
 )
-from pymoo_hdte.problems.simulator.run_file import RunFile
-from pymoo_hdte.problems.simulator.runs import Simulator
-from pymoo_hdte.problems.simulator.workers import Workers
+from pymoo_hdte.problems._simulator.run_file import RunFile
+from pymoo_hdte.problems._simulator.runs import Simulator
+from pymoo_hdte.problems._simulator.workers import Workers
 
 
 def quiet(simulator, designs, noise=None, **options):

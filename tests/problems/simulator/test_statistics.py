@@ -19,7 +19,7 @@ from pymoo_hdte.problems import (
     WorstCase,
     robust_problem,
 )
-from pymoo_hdte.problems.simulator.around import SAMPLES, Around, CommonSamples
+from pymoo_hdte.problems._simulator.around import SAMPLES, Around, CommonSamples
 
 LIMIT = 3.5
 ASKED = (

@@ -6,8 +6,8 @@ import pytest
 import scipy
 from places import STORED
 
+from pymoo_hdte._io.archive import FileFormat
 from pymoo_hdte.checks import InvalidInput
-from pymoo_hdte.io.archive import FileFormat
 from pymoo_hdte.problems import (
     CVaR,
     Design,
@@ -20,9 +20,9 @@ from pymoo_hdte.problems import (
     WorstCase,
     robust_problem,
 )
-from pymoo_hdte.problems.simulator.distributions import described, rebuilt
-from pymoo_hdte.problems.simulator.statistics import Statistic
-from pymoo_hdte.problems.simulator.stored import FORMAT
+from pymoo_hdte.problems._simulator.distributions import described, rebuilt
+from pymoo_hdte.problems._simulator.statistics import Statistic
+from pymoo_hdte.problems._simulator.stored import FORMAT
 from pymoo_hdte.surrogate import TruncatedNormal
 
 KEYS = ("F", "G", "F_band")

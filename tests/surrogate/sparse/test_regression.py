@@ -5,16 +5,16 @@ import numpy as np
 import pytest
 from threadpoolctl import threadpool_info, threadpool_limits
 
-from pymoo_hdte.one_thread import ONE_THREAD
+from pymoo_hdte._one_thread import ONE_THREAD
 from pymoo_hdte.problems import Design
-from pymoo_hdte.problems.simulator.inputs import Inputs
-from pymoo_hdte.surrogate.sparse import adaptive
-from pymoo_hdte.surrogate.sparse import regression as module
-from pymoo_hdte.surrogate.sparse.adaptive import fit_adaptively
-from pymoo_hdte.surrogate.sparse.draws import SpreadPoints, draw_around, draw_designs
-from pymoo_hdte.surrogate.sparse.kernel import EvenPolynomials, covariance, variances
-from pymoo_hdte.surrogate.sparse.regression import Regression
-from pymoo_hdte.surrogate.sparse.terms import closed, likely_terms, products
+from pymoo_hdte.problems._simulator.inputs import Inputs
+from pymoo_hdte.surrogate._sparse import adaptive
+from pymoo_hdte.surrogate._sparse import regression as module
+from pymoo_hdte.surrogate._sparse.adaptive import fit_adaptively
+from pymoo_hdte.surrogate._sparse.draws import SpreadPoints, draw_around, draw_designs
+from pymoo_hdte.surrogate._sparse.kernel import EvenPolynomials, covariance, variances
+from pymoo_hdte.surrogate._sparse.regression import Regression
+from pymoo_hdte.surrogate._sparse.terms import closed, likely_terms, products
 
 INPUTS = Inputs(
     {"x": Design(0.5, 1.0, deviation=0.1)},

@@ -9,10 +9,10 @@ from hypothesis import strategies as st
 
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.problems import Design
-from pymoo_hdte.problems.simulator.inputs import Inputs
-from pymoo_hdte.surrogate.sparse.measures import Distribution, Measure, OrthonormalPolynomials
-from pymoo_hdte.surrogate.sparse.moments import SparseMoments
-from pymoo_hdte.surrogate.sparse.polynomial import SparsePolynomial
+from pymoo_hdte.problems._simulator.inputs import Inputs
+from pymoo_hdte.surrogate._sparse.measures import Distribution, Measure, OrthonormalPolynomials
+from pymoo_hdte.surrogate._sparse.moments import SparseMoments
+from pymoo_hdte.surrogate._sparse.polynomial import SparsePolynomial
 
 DISTRIBUTIONS = {
     "normal": (chaospy.Normal(2.0, 0.3), 2.0, 0.3),

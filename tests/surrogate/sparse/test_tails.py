@@ -5,9 +5,9 @@ import pytest
 from numpy.polynomial import chebyshev
 from scipy.stats import norm
 
-from pymoo_hdte.surrogate.sparse.axes import TAIL, Axis, noise_axis, standard_normal
-from pymoo_hdte.surrogate.sparse.polynomial import SparsePolynomial
-from pymoo_hdte.surrogate.sparse.tails import STEPS, _added, _slabs, beyond_all_runs
+from pymoo_hdte.surrogate._sparse.axes import TAIL, Axis, noise_axis, standard_normal
+from pymoo_hdte.surrogate._sparse.polynomial import SparsePolynomial
+from pymoo_hdte.surrogate._sparse.tails import STEPS, _added, _slabs, beyond_all_runs
 
 DESIGN, NOISE = Axis("x", None, (-1.0, 1.0)), noise_axis("a", standard_normal())
 AXES, HERE = [DESIGN, NOISE], np.zeros((1, 1))

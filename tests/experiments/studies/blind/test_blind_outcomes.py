@@ -10,7 +10,7 @@ from experiments.studies.blind.cases import Case, all_cases
 from experiments.studies.blind.data import outcome, read_outcomes
 from experiments.studies.blind.experiment import OUTCOMES, SECONDS
 from experiments.studies.blind.scoring import COLUMNS, verdict_scores
-from pymoo_hdte.discrepancy.drive.analysis import examine_drive
+from pymoo_hdte.discrepancy._verdicts.drive import examine_drive
 
 DOZEN = 12
 """Cases that the nightly run takes, spread over the list; the gate runs the cheapest one anew."""

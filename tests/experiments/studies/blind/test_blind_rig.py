@@ -38,7 +38,7 @@ from experiments.studies.virtual_rig.rig import TrueRig
 from experiments.studies.virtual_rig.runs import Condition as TheirCondition
 from experiments.studies.virtual_rig.runs import simulate_run
 from pymoo_hdte.discrepancy import read_campaign
-from pymoo_hdte.drive.effects import drive_effects
+from pymoo_hdte.drive._effects import drive_effects
 
 RATED = Condition(2000.0, 40.0, 1000.0, 1, "train")
 SHORT = (RATED, replace(RATED, load=0.0, role="held_out"))

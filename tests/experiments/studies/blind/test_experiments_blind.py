@@ -51,12 +51,12 @@ from experiments.studies.blind.targets import (
     WRONG,
     demands,
 )
-from pymoo_hdte.discrepancy.drive.evidence import Data, start_parameters
-from pymoo_hdte.discrepancy.drive.features import measure
-from pymoo_hdte.discrepancy.drive.finding import DriveFinding
-from pymoo_hdte.discrepancy.engine.candidate import Layout, out_of_tolerance
-from pymoo_hdte.discrepancy.engine.fitting import fit
-from pymoo_hdte.discrepancy.engine.hypothesis import Hypothesis
+from pymoo_hdte.discrepancy._evidence.order_lines.evidence import Data, start_parameters
+from pymoo_hdte.discrepancy._evidence.order_lines.features import measure
+from pymoo_hdte.discrepancy._selection.candidate import Layout, out_of_tolerance
+from pymoo_hdte.discrepancy._selection.fitting import fit
+from pymoo_hdte.discrepancy._selection.hypothesis import Hypothesis
+from pymoo_hdte.discrepancy._verdicts.drive_finding import DriveFinding
 
 ROOT = 99
 SHORT = (

@@ -9,7 +9,7 @@ from planted_balances import EFFECTS, swept
 from planted_features import analysed, known_data, measured
 
 from pymoo_hdte.checks import InvalidInput
-from pymoo_hdte.discrepancy.engine.candidate import Layout
+from pymoo_hdte.discrepancy._selection.candidate import Layout
 from pymoo_hdte.units import ARCSEC
 
 pytest.importorskip("pysindy", reason="needs the extra blind")

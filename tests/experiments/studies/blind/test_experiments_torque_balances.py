@@ -7,7 +7,7 @@ from planted_features import measured
 
 from experiments.studies.blind.candidate_terms import BREAKAWAYS
 from experiments.studies.blind.torque_balances import balances, regression
-from pymoo_hdte.discrepancy.engine.candidate import Layout
+from pymoo_hdte.discrepancy._selection.candidate import Layout
 
 
 def test_the_balances_of_a_clean_drive_are_nil():

@@ -11,8 +11,8 @@ from experiments.runner.result import Finding
 from experiments.studies.measured import emps, kinova
 from experiments.studies.measured import rigs as measured_rigs
 from experiments.studies.measured.rigs import MEASURED
-from pymoo_hdte.discrepancy.mechanism.analysis import examine_mechanism
-from pymoo_hdte.discrepancy.mechanism.files import read_rig
+from pymoo_hdte.discrepancy._records.rig_files import read_rig
+from pymoo_hdte.discrepancy._verdicts.mechanism import examine_mechanism
 
 
 def result_of(experiment, folder, out):

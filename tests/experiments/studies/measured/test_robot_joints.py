@@ -5,8 +5,8 @@ import pytest
 
 from experiments.studies.measured.known_answers import KNOWN_RIGS
 from experiments.studies.measured.rigs import MEASURED, RIGS
-from pymoo_hdte.discrepancy.mechanism.analysis import examine_mechanism
-from pymoo_hdte.discrepancy.mechanism.files import read_rig
+from pymoo_hdte.discrepancy._records.rig_files import read_rig
+from pymoo_hdte.discrepancy._verdicts.mechanism import examine_mechanism
 
 SLOWEST, FASTEST = 0.05, 1.0
 """Speeds at which friction is compared, in units of the largest one."""

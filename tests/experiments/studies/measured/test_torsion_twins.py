@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from experiments.studies.measured.rigs import MEASURED, RIGS
-from pymoo_hdte.discrepancy.joint.analysis import JointFinding
-from pymoo_hdte.discrepancy.joint.halves import joint_of, torsion_half
-from pymoo_hdte.discrepancy.joint.held_out import torsion_gaps, voted
-from pymoo_hdte.discrepancy.joint.torsion import examine_torsion
-from pymoo_hdte.discrepancy.mechanism.files import read_rig
-from pymoo_hdte.discrepancy.report.torsion import torsion_document
-from pymoo_hdte.drive.effects.static_error import KinematicTorsion
+from pymoo_hdte.discrepancy._evidence.force_balances.joint_halves import joint_of, torsion_half
+from pymoo_hdte.discrepancy._records.rig_files import read_rig
+from pymoo_hdte.discrepancy._report.torsion import torsion_document
+from pymoo_hdte.discrepancy._verdicts.held_out_torsion import torsion_gaps, voted
+from pymoo_hdte.discrepancy._verdicts.joint import JointFinding
+from pymoo_hdte.discrepancy._verdicts.joint_torsion import examine_torsion
+from pymoo_hdte.drive._effects.static_error import KinematicTorsion
 from pymoo_hdte.effects.hysteresis import MaxwellSlip
 from pymoo_hdte.effects.stiffness import HardeningStiffness
 from pymoo_hdte.mechanism import Record

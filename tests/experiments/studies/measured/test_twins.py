@@ -11,8 +11,8 @@ import pytest
 
 from experiments.studies.measured.rigs import MEASURED, RIGS, Study, torques_of
 from experiments.studies.measured.twins import drag_at, find_twins
-from pymoo_hdte.discrepancy.mechanism.analysis import examine_mechanism
-from pymoo_hdte.discrepancy.mechanism.files import read_rig
+from pymoo_hdte.discrepancy._records.rig_files import read_rig
+from pymoo_hdte.discrepancy._verdicts.mechanism import examine_mechanism
 from pymoo_hdte.effects.friction import CoulombFriction
 from pymoo_hdte.effects.gravity import Gravity
 from pymoo_hdte.effects.linear import LinearSpring

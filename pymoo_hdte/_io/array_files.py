@@ -1,0 +1,294 @@
+"""Formats that hold columns as arrays by name: one reader for each, found by the file's ending.
+
+MATLAB up to v7, NumPy's npz and JSON lines need nothing else; xlsx needs openpyxl, and HDF5, which
+MATLAB v7.3 is, needs h5py. The extra `EXTRA` brings both.
+"""
+
+from __future__ import annotations
+
+import importlib
+import json
+import math
+import tokenize
+import zipfile
+import zlib
+from array import array
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pymoo_hdte._io import matlab
+from pymoo_hdte._io.budget import Budget, regular_file
+from pymoo_hdte._io.text_header import MOST_LINES_ABOVE
+from pymoo_hdte._io.text_lines import line_blocks
+from pymoo_hdte.checks import InvalidInput
+
+EXTRA = "pymoo-hdte[formats]"
+"""What to install for xlsx, HDF5 and MATLAB v7.3."""
+
+_HDF5 = b"\x89HDF\r\n\x1a\n"
+_USER_BLOCK = 512
+"""Bytes in which MATLAB v7.3 writes its own header, before HDF5 begins."""
+
+
+@dataclass(frozen=True, eq=False)
+class Arrays:
+    """Vectors by name, each of shape (n,), and how many rows of the file stand above the first."""
+
+    vectors: dict[str, NDArray[np.float64]]
+    above: int = 0
+
+
+def read_arrays(path: Path, form: str, names: Sequence[str]) -> Arrays:
+    """Read vectors of a file.
+
+    Parameters
+    ----------
+    path : Path
+    form : str
+        One of `READERS`.
+    names : sequence of str
+        Of variables, keys, titles, or paths of data sets. A value that is missing is NaN.
+
+    Raises
+    ------
+    InvalidInput
+        For a file that is damaged or above its `Budget`, a name that is not that of a vector of
+        real numbers, vectors of several lengths, or a library that is not installed.
+    OSError
+        If it cannot be read.
+    """
+    Budget.now().check("bytes", regular_file(path), path.name)
+    return READERS[form][1](path, names)
+
+
+def format_of(path: Path, form: str) -> str:
+    """Return the format of a file: as stated, but where the ending of a text is of another."""
+    if form == "csv":
+        for other, (endings, _) in READERS.items():
+            if path.name.endswith(endings):
+                return other
+    return form
+
+
+def _library(name: str, path: Path) -> Any:
+    try:
+        return importlib.import_module(name)
+    except ImportError:
+        allowed = f'a file that needs {name}, after: pip install "{EXTRA}"'
+        if path.suffix == ".mat":
+            allowed += "; or save it as v5 or v7"
+        raise InvalidInput(
+            path.name, f"a file for {name}, which is not installed", allowed
+        ) from None
+
+
+def _checked(
+    path: Path, names: Sequence[str], arrays: Mapping[str, Any], there: Sequence[str]
+) -> dict[str, NDArray[np.float64]]:
+    """Return arrays as vectors, all of one length.
+
+    An array needs a ``dtype`` and a ``shape``, and is read by ``array[...]`` once these, and all
+    arrays together, keep the budget.
+    """
+    budget, expanded = Budget.now(), 0
+    right: dict[str, Any] = {}
+    for name in names:
+        values, shown = arrays.get(name), None
+        if values is not None:
+            shape = tuple(values.shape)
+            shown = f"{values.dtype} of shape {list(shape)}"
+            length = max(shape, default=0)
+            same = all(length == max(one.shape) for one in right.values())
+            if values.dtype.kind in "iuf" and math.prod(shape) == length > 0 and same:
+                right[name] = values
+                budget.check("rows", length, f"{path.name}: {name}")
+                # A file may hold chunks that are larger than what is in them.
+                chunk = math.prod(getattr(values, "chunks", None) or ())
+                expanded += max(length, chunk) * values.dtype.itemsize
+        if name not in right:
+            allowed = f"a vector of real numbers, all of one length; there are {list(there)}"
+            raise InvalidInput(f"{path.name}: {name}", shown, allowed[:500])
+    budget.check("bytes", expanded, f"{path.name}, expanded")
+    return {name: np.ravel(values[...]).astype(float) for name, values in right.items()}
+
+
+def _read_matlab(path: Path, names: Sequence[str]) -> Arrays:
+    with path.open("rb") as file:
+        start = file.read(_USER_BLOCK + len(_HDF5))
+    if start.startswith(_HDF5) or start[_USER_BLOCK:] == _HDF5:
+        return _read_hdf5(path, names)
+    return Arrays(matlab.read_vectors(path, names))
+
+
+def _read_hdf5(path: Path, names: Sequence[str]) -> Arrays:
+    h5py = _library("h5py", path)
+    try:
+        with h5py.File(path, "r") as file:
+            arrays = {}
+            for name in names:
+                data = file.get(name)
+                # Links lead to other files, which nobody named.
+                own = isinstance(data, h5py.Dataset) and data.file.filename == file.filename
+                if own and not data.is_virtual and data.external is None:
+                    arrays[name] = data
+            return Arrays(_checked(path, names, arrays, list(file)))
+    except InvalidInput:
+        raise
+    except (OSError, ValueError, KeyError, RuntimeError, TypeError) as error:
+        allowed = "an intact HDF5 file, or a MATLAB file saved as v5 or v7"
+        raise InvalidInput(path.name, str(error)[:200], allowed) from None
+
+
+_DAMAGED = (
+    *(OSError, ValueError, LookupError, TypeError, EOFError, RuntimeError, SyntaxError),
+    *(zlib.error, zipfile.BadZipFile, tokenize.TokenError),
+)
+"""What libraries raise where bytes of a packed file were changed."""
+
+
+@dataclass(frozen=True)
+class _Member:
+    """An array of an npz file that is read when it is asked for, and what its head says of it."""
+
+    archive: Any
+    name: str
+    dtype: np.dtype[Any]
+    shape: tuple[int, ...]
+
+    def __getitem__(self, _: Any) -> NDArray[Any]:
+        return np.asarray(self.archive[self.name])
+
+
+def _member(archive: Any, name: str) -> _Member:
+    """Return an array of an open npz file; `ValueError` if it is none of numbers."""
+    with archive.zip.open(f"{name}.npy") as file:
+        version = np.lib.format.read_magic(file)
+        heads = {
+            (1, 0): np.lib.format.read_array_header_1_0,
+            (2, 0): np.lib.format.read_array_header_2_0,
+        }
+        shape, _, dtype = heads[version](file)
+    return _Member(archive, name, dtype, shape)
+
+
+def _check_zip(path: Path, wanted: Callable[[str], bool]) -> list[str]:
+    """Return the names in a zip file, whose wanted members together fit into the budget."""
+    with zipfile.ZipFile(path) as packed:
+        members = packed.infolist()
+    size = sum(one.file_size for one in members if wanted(one.filename))
+    Budget.now().check("bytes", size, f"{path.name}, expanded")
+    return [one.filename for one in members]
+
+
+def _read_npz(path: Path, names: Sequence[str]) -> Arrays:
+    try:
+        members = _check_zip(path, lambda member: member.removesuffix(".npy") in names)
+        there = [member.removesuffix(".npy") for member in members]
+        with np.load(path, allow_pickle=False) as file:
+            arrays = {name: _member(file, name) for name in names if name in there}
+            return Arrays(_checked(path, names, arrays, there))
+    except InvalidInput:
+        raise
+    except _DAMAGED as error:
+        if isinstance(error, OSError) and not path.is_file():
+            raise
+        raise InvalidInput(path.name, str(error)[:200], "an intact npz file of numbers") from None
+
+
+def _read_json_lines(path: Path, names: Sequence[str]) -> Arrays:
+    columns = {name: array("d") for name in names}
+    there: list[str] = []
+    for numbers, lines in line_blocks(path, "JSON lines"):
+        for number, line in zip(numbers, lines, strict=True):
+            place = f"{path.name}, line {number}"
+            try:
+                row = json.loads(line)
+            except (ValueError, RecursionError) as error:
+                raise InvalidInput(place, str(error), "one JSON object in each line") from None
+            if not isinstance(row, dict):
+                raise InvalidInput(place, row, "one JSON object in each line")
+            there = there or list(row)
+            for name, column in columns.items():
+                value = row.get(name)
+                if isinstance(value, bool) or not isinstance(value, int | float | None):
+                    raise InvalidInput(f"{place}: {name}", value, "a number")
+                try:
+                    column.append(np.nan if value is None else value)
+                except OverflowError:
+                    raise InvalidInput(f"{place}: {name}", value, "a finite number") from None
+    arrays = {name: np.array(column) for name, column in columns.items()}
+    known = {name: one for name, one in arrays.items() if not np.all(np.isnan(one))}
+    return Arrays(_checked(path, names, known, there))
+
+
+def _read_xlsx(path: Path, names: Sequence[str]) -> Arrays:
+    openpyxl = _library("openpyxl", path)
+    budget = Budget.now()
+    try:
+        _check_zip(path, lambda _: True)
+        book = openpyxl.load_workbook(path, read_only=True, data_only=True)
+        try:
+            sheet = book.worksheets[0]
+            # What a sheet says of its size may be too small, and rows beyond it would be left out.
+            sheet.reset_dimensions()
+            rows = sheet.iter_rows(values_only=True)
+            titles: list[str] = []
+            above = 0
+            for row in rows:
+                above += 1
+                cells = ["" if cell is None else str(cell).strip() for cell in row]
+                titles = max(titles, cells, key=lambda one: sum(one.count(n) == 1 for n in names))
+                if all(cells.count(name) == 1 for name in names):
+                    break
+                if above >= MOST_LINES_ABOVE:
+                    break
+            if not all(titles.count(name) == 1 for name in names):
+                allowed = f"{', '.join(names)}, each once, in the first sheet"
+                raise InvalidInput(f"{path.name}: columns", titles, allowed)
+            places = [titles.index(name) for name in names]
+            columns = [array("d") for _ in names]
+            row_of_file, first = above, True
+            for row in rows:
+                row_of_file += 1
+                budget.check("rows", row_of_file, f"{path.name}: rows")
+                found = [row[at] if at < len(row) else None for at in places]
+                # Units may stand below the titles.
+                if first and any(isinstance(one, str) for one in found):
+                    first, above = False, above + 1
+                    if not any(isinstance(one, int | float) for one in found):
+                        continue
+                first = False
+                for name, column, value in zip(names, columns, found, strict=True):
+                    if isinstance(value, bool) or not isinstance(value, int | float | None):
+                        place = f"{path.name}, row {row_of_file}: {name}"
+                        raise InvalidInput(place, value, "a number")
+                    column.append(np.nan if value is None else value)
+        finally:
+            book.close()
+    except InvalidInput:
+        raise
+    except _DAMAGED as error:
+        if isinstance(error, OSError) and not path.is_file():
+            raise
+        raise InvalidInput(path.name, str(error)[:200], "an intact xlsx file") from None
+    arrays = {name: np.array(column) for name, column in zip(names, columns, strict=True)}
+    # Sheets have rows that were formatted and never filled.
+    filled = np.flatnonzero(np.any([~np.isnan(one) for one in arrays.values()], axis=0))
+    last = int(filled[-1]) + 1 if filled.size else 0
+    arrays = {name: one[:last] for name, one in arrays.items()}
+    return Arrays(_checked(path, names, arrays, titles), above)
+
+
+READERS: dict[str, tuple[tuple[str, ...], Callable[[Path, Sequence[str]], Arrays]]] = {
+    "matlab": ((".mat",), _read_matlab),
+    "json_lines": ((".jsonl", ".ndjson", ".jsonl.gz", ".ndjson.gz"), _read_json_lines),
+    "npz": ((".npz",), _read_npz),
+    "xlsx": ((".xlsx",), _read_xlsx),
+    "hdf5": ((".h5", ".hdf5"), _read_hdf5),
+}
+"""For each format the endings of its files and its reader."""

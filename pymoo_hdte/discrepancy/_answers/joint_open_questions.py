@@ -1,0 +1,253 @@
+"""What records of a joint with two encoders leave open, and the test that settles it."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pymoo_hdte.discrepancy._evidence.force_balances.candidates import turns_back
+from pymoo_hdte.discrepancy._evidence.force_balances.unexplained import fitted_values, share_removed
+from pymoo_hdte.discrepancy._selection.hypothesis import Hypothesis
+from pymoo_hdte.discrepancy._selection.verdict import NOT_PROVEN
+from pymoo_hdte.discrepancy._verdicts.joint import SLOWING, JointFinding
+from pymoo_hdte.discrepancy._verdicts.joint_torsion import errors_of
+from pymoo_hdte.discrepancy._verdicts.validation_mechanism import rests_told
+from pymoo_hdte.effects.sentence_blanks import in_words
+from pymoo_hdte.mechanism.balances import quantity_names
+from pymoo_hdte.units import ARCSEC
+
+_LAGS = {"hysteresis", "coulomb_friction", "stribeck_friction"}
+_OF_LOAD = {
+    *("soft_windup", "hardening_stiffness", "backlash", "kinematic_error"),
+    "load_dependent_friction",
+}
+_MOST_TOLD = 4
+
+
+def near_by(finding: JointFinding) -> list[Hypothesis]:
+    """Return sets of effects that explain most of the torsion that was fitted, the best first.
+
+    All of them are what these records do not rule out while none is named; else those that are as
+    good as the named one.
+    """
+    torsion = finding.torsion
+    verdict, least = torsion.verdict, torsion.data.rules.partial_share
+    if verdict.accepted is not verdict.base:
+        return list(verdict.equivalent)
+    every = [one for one in (verdict.chosen, *verdict.alternatives) if one is not None]
+    found = [
+        one
+        for one in sorted(every, key=lambda one: one.bic)
+        if all(candidate.frees is None for candidate in one.candidates)
+        and share_removed(torsion.sensors, torsion.data, verdict.base, one.fit) >= least
+    ]
+    return found[:_MOST_TOLD]
+
+
+def torsion_limits(finding: JointFinding) -> list[str]:
+    """Return what the records cannot tell of the torsion, in sentences."""
+    torsion, gear = finding.torsion, finding.joint.gear.name
+    shaft = torsion.mechanism.ports[0].name
+    found = [
+        *wiring_doubts(finding),
+        "The zeros of the two encoders are not known: a constant torque ahead of the gear, or a "
+        "constant error of it, is part of them. Held-out records are compared about their means.",
+    ]
+    if not turns_back(torsion.data, shaft):
+        found.append(
+            "The joint turns one way only: dry friction ahead of the gear is part of the zeros, "
+            "and hysteresis of the gear shows only as far as the torque rises and falls."
+        )
+    elif not turns_back(torsion.data, gear):
+        found.append("The torque only rises or only falls: hysteresis of the gear does not show.")
+    near = near_by(finding)
+    if torsion.verdict.accepted is torsion.verdict.base and near:
+        words = "; or ".join(in_words(one.label) for one in near)
+        told = f"What was fitted would also be explained by {words}"
+        if NOT_PROVEN in torsion.verdict.doubts:
+            told += f"; but {NOT_PROVEN} with the best of them"
+        found.append(f"{told}: none is named.")
+    found += rests_told(torsion)
+    return [*found, *_delay(finding), *_in_both(finding), *_beyond_band(finding)]
+
+
+def _beyond_band(finding: JointFinding) -> list[str]:
+    """Return the limits of the search beyond the band, which speaks of forces and ripple."""
+    gear = finding.joint.gear.name
+    words = {
+        f"The force at the {gear}": f"The torsion of the {gear}",
+        f"Ripple at the {gear}": f"An error of the {gear}",
+        "makes the forces of the held-out records": "makes the torsion of the held-out records",
+        "its ripple": "its error",
+        "a torque cannot": "an error cannot",
+    }
+    found = list(finding.torsion.ripples.limits)
+    for theirs, ours in words.items():
+        found = [one.replace(theirs, ours) for one in found]
+    return found
+
+
+def _in_both(finding: JointFinding) -> list[str]:
+    """Return which orders beyond the band vary both the torque and the torsion."""
+    both = [
+        one.order
+        for one, _ in errors_of(finding.torsion.ripples)
+        if any(abs(one.order - r.order) <= r.resolution for r in finding.torque.ripples.found)
+    ]
+    if not both:
+        return []
+    orders = ", ".join(f"{one:.5g}" for one in both)
+    return [
+        f"Order {orders} varies the torque as well: an error of the gear shakes the motor, and its "
+        "torque then grows with the square of the speed; a ripple of the motor's torque does not."
+    ]
+
+
+def _delay(finding: JointFinding) -> list[str]:
+    """Return that a viscous friction ahead of the gear may be the delay of an encoder."""
+    torsion = finding.torsion
+    sets = (torsion.verdict.chosen, *near_by(finding))
+    fits = [one.fit for one in sets if one is not None]
+    levels = [
+        _slope(finding, effect.law)
+        for fit in fits
+        for effect in fit.effects
+        if effect.name in SLOWING
+    ]
+    if not levels:
+        return []
+    late = 1e3 * levels[0] / finding.stiffness
+    whole = fitted_values(finding.torque.mechanism, finding.torque.accepted)
+    damping = sum(one for name, one in whole.items() if name.startswith("damping of "))
+    told = (
+        f"A torsion in proportion to the speed may be friction ahead of the gear, "
+        f"{levels[0]:.3g} N.m.s/rad, or the load's encoder is read {late:.2g} ms after the "
+        "motor's: the angles do not tell."
+    )
+    if 0.0 < damping < levels[0]:
+        told += (
+            f" The viscous friction of the whole joint is {damping:.3g} only, so that it cannot "
+            "all be friction."
+        )
+    return [told]
+
+
+def _slope(finding: JointFinding, law: object) -> float:
+    """Return the torque of a law over the speed at the largest speed, N.m.s/rad."""
+    shaft = finding.torsion.mechanism.ports[0].name
+    speed = max(float(np.abs(one.ports[shaft].speed).max()) for one in finding.torsion.data.spectra)
+    coefficient = getattr(law, "coefficient", 0.0)
+    exponent, reference = getattr(law, "exponent", 1.0), getattr(law, "reference", 1.0)
+    if hasattr(law, "exponent"):
+        return float(coefficient * speed * (speed / reference) ** (exponent - 2.0))
+    return float(coefficient)
+
+
+def torsion_test(finding: JointFinding) -> str:
+    """Return the test that best settles what is open of the torsion."""
+    torsion = finding.torsion
+    gear, shaft = finding.joint.gear.name, torsion.mechanism.ports[0].name
+    chosen = torsion.verdict.chosen
+    sets = [one for one in (chosen, *near_by(finding)) if one is not None]
+    names = {name for one in sets for name, _ in one.names}
+    wide = max(float(np.ptp(one.ports[gear].position)) for one in torsion.data.spectra) / ARCSEC
+    found = []
+    if not turns_back(torsion.data, shaft):
+        found.append(
+            "Run the same sweep backwards as well: what keeps its sign is compliance or an error "
+            "of the gear, what turns it is friction or hysteresis."
+        )
+    if names & _LAGS or not found:
+        found.append(
+            f"Stop at a few angles and reverse slowly until the torsion has changed by some "
+            f"{round(0.1 * wide)} arcseconds: friction ahead of the gear turns with the direction "
+            "at once, hysteresis only over a torsion of its own."
+        )
+    if names & _OF_LOAD:
+        found.append(
+            "Repeat the sweep with another load: an error of the gear stays over the angle, "
+            "compliance, wind-up and friction that grows with the load follow the torque."
+        )
+    if names & set(SLOWING):
+        found.append(
+            "Repeat it at a third of the speed and read the encoders in the other order: a delay "
+            "turns its sign, friction does not."
+        )
+    return " ".join(found)
+
+
+Values = NDArray[np.float64]
+
+
+def wiring_doubts(finding: JointFinding) -> list[str]:
+    """Return what may be wrong with the encoders of a joint, in sentences.
+
+    Nothing where the spring alone, or a friction named ahead of the gear, is the better answer.
+
+    Parameters
+    ----------
+    finding : JointFinding
+    """
+    torsion = finding.torsion
+    if torsion.verdict.status == "adequate":
+        return []
+    motor, load = finding.joint.motor, finding.joint.load
+    torque, acceleration, speed, angle, twist = _signals(finding)
+    rules, ones = torsion.data.rules, np.ones_like(twist)
+    left = float(torsion.base_misfit[0]) / finding.stiffness
+    if left**2 >= rules.main_share * float(np.var(twist)):
+        (slope, _), share = _explained(twist, [angle], [ones])
+        if share >= rules.explained_share:
+            return [
+                f"The angle of {motor} is {1.0 + slope:.4g} times that of {load}, where a gear "
+                "turns both alike: the sign or the ratio of one of their columns may be wrong."
+            ]
+        (slope, _), share = _explained(twist, [torque], [ones])
+        if slope < 0.0 and share >= rules.explained_share:
+            return [
+                f"The torsion falls as the torque rises: {motor} and {load} may be exchanged, or "
+                "the sign of the torque or of both angles be wrong."
+            ]
+    if torsion.verdict.status != "unlisted":
+        return []
+    (drag, spring, *_), share = _explained(torque, [speed], [twist, acceleration, ones])
+    if drag < 0.0 < spring and share >= rules.explained_share:
+        return [
+            "What is left is in proportion to the speed, and drives, as no friction does: the "
+            f"encoder of {motor} may be read {-1e3 * drag / spring:.2g} ms after that of {load}."
+        ]
+    return []
+
+
+def _explained(wanted: Values, by: list[Values], beside: list[Values]) -> tuple[Values, float]:
+    """Return the coefficients of signals in another one, and the share that the first explain.
+
+    Of the power that is left beside the others; those have no share of their own.
+    """
+    fits = []
+    for signals in (beside, [*by, *beside]):
+        columns = np.column_stack(signals)
+        coefficients = np.asarray(np.linalg.lstsq(columns, wanted, rcond=None)[0])
+        fits.append((coefficients, float(np.sum((wanted - columns @ coefficients) ** 2))))
+    (_, before), (coefficients, after) = fits
+    return coefficients, 1.0 - after / before if before > 0.0 else 0.0
+
+
+def _signals(finding: JointFinding) -> tuple[Values, ...]:
+    """Return torque of the motor, its acceleration and speed, angle of the load, and torsion.
+
+    Of all fitted records behind each other, SI, each of shape (n,).
+    """
+    torsion, joint = finding.torsion, finding.joint
+    shaft, names = torsion.mechanism.ports[0].name, quantity_names(torsion.mechanism)
+    found = []
+    for balance in torsion.data.spectra:
+        motor, twist = balance.ports[shaft], balance.ports[joint.gear.name].position
+        torque = sum(
+            one.gain.value * balance.in_time(balance.terms[0, names.index(f"gain of {one.name}")])
+            for one in torsion.mechanism.inputs
+        )
+        inertial = balance.terms[0, names.index(f"inertia of {joint.motor}")]
+        signals = torque, -balance.in_time(inertial), motor.speed, motor.position - twist, twist
+        found.append(np.array(signals))
+    return tuple(np.concatenate(found, axis=1))

@@ -1,0 +1,249 @@
+"""The next experiment: the test that best separates the named effect from other hypotheses.
+
+Two models that fit all measurements are compared in tests within the range of measured conditions,
+both new conditions and repeats of records, which still average the noise. Their difference is
+weighted by the noise and by the uncertainty of both predictions: see `separation`, with which
+campaigns are planned, too, and Box and Hill (Technometrics 1967). A test that leaves the answer to
+chance is not proposed. Where nothing is missing, the record with the most uncertain prediction is
+the most informative one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pymoo_hdte.discrepancy._answers.planned_tests import Grid, Model, separation
+from pymoo_hdte.discrepancy._evidence.order_lines.features import MEANS
+from pymoo_hdte.discrepancy._evidence.order_lines.parameters import labels_by_order
+from pymoo_hdte.discrepancy._records.line_fit import CHANNELS
+from pymoo_hdte.discrepancy._selection.candidate import labels_apart
+from pymoo_hdte.discrepancy._selection.fitting import Fit
+from pymoo_hdte.discrepancy._selection.verdict import Verdict
+from pymoo_hdte.discrepancy._verdicts.drive_finding import DriveFinding
+from pymoo_hdte.drive._effects import ENCODER_LINE
+
+TESTS = ("running", "torsion_sweep", "reclocked_encoder", "none")
+
+_RIVALS = 2
+OF_ENCODER = ("eccentricity", ENCODER_LINE)
+LARGEST_TURNS = 100
+"""Cycles per output turn; the response of the drive identifies faster lines as its own."""
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """What to measure next.
+
+    Attributes
+    ----------
+    description : str
+        For the report.
+    test : str
+        One of `TESTS`; "none" where no test within the limits separates the two models, or where
+        no known effect comes near the misfit.
+    speed_rpm, load_torque : float or None
+        r/min of the input, negative in reverse, and N.m; None for a sweep or no test.
+    separates : tuple of str, or None
+        Labels of the two models; None where the aim is a less uncertain prediction, or there is no
+        model worth a test.
+    expected_separation : float
+        Expected chi-square between the two models, or of the uncertain prediction; without a test
+        the largest of all.
+    """
+
+    description: str
+    test: str
+    speed_rpm: float | None
+    load_torque: float | None
+    separates: tuple[str, str] | None
+    expected_separation: float
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the proposal as plain types."""
+        return asdict(self) | {"separates": list(self.separates) if self.separates else None}
+
+
+def next_experiment(finding: DriveFinding) -> Proposal:
+    """Return the test to make next.
+
+    Parameters
+    ----------
+    finding : DriveFinding
+        Of `analysis.examine_drive`.
+    """
+    proposal, orders = _proposed(finding), finding.campaign.believed.error_orders
+    return replace(proposal, description=labels_by_order(proposal.description, orders))
+
+
+def _proposed(finding: DriveFinding) -> Proposal:
+    """Return the test with labels of candidates in its description."""
+    verdict, grid = finding.verdict, Grid.of(finding)
+    if verdict.chosen is None:
+        return _most_uncertain(grid, grid.model(verdict.base))
+    if verdict.status == "unlisted" and not verdict.comes_near:
+        said = "No known effect comes near, so that a test between two of them would tell nothing."
+        return Proposal(said, "none", None, None, None, 0.0)
+    chosen = verdict.chosen.fit
+    model = grid.model(chosen)
+    twin = _encoder_twin(grid, chosen, model) or _zero_twin(grid, finding, chosen, model)
+    least = verdict.rules.separated_chi_square
+    if twin is not None and verdict.status != "unlisted" and twin.expected_separation >= least:
+        return twin
+    rivals = nearest_rivals(verdict)
+    hypotheses = [grid.model(fitted) for fitted in rivals]
+    if not hypotheses:
+        return _most_uncertain(grid, model)
+    separations = np.array([separation(model, hypothesis) for hypothesis in hypotheses])
+    told = np.flatnonzero(separations.max(axis=1) >= least)
+    if not len(told):
+        return _no_test(model.label, hypotheses, separations, verdict)
+    # One test for all rivals where there is one, or else for the nearest that a test separates.
+    together = separations[told].min(axis=0)
+    if together.max() < least:
+        told = told[:1]
+        together = separations[told[0]]
+    test = int(np.argmax(together))
+    closest = int(told[np.argmin(separations[told, test])])
+    labels = model.label, hypotheses[closest].label
+    same = any(one.fit is rivals[closest] for one in verdict.equivalent)
+    # What two models of a class share is not what a test is to tell apart.
+    sets = [chosen.candidates, rivals[closest].candidates]
+    one, other = labels_apart(sets) if same else labels
+    said = _aim(verdict, one, other, same)
+    proposed = _proposal(grid, test, said, labels, float(separations[closest, test]))
+    never = [k for k in range(len(hypotheses)) if separations[k].max() < least]
+    if not never:
+        return proposed
+    left_over = _inseparable(model.label, [hypotheses[k] for k in never])
+    return replace(proposed, description=f"{proposed.description} {left_over}")
+
+
+def _inseparable(label: str, rivals: Sequence[Model]) -> str:
+    others = " or from ".join(rival.label for rival in rivals)
+    return f"What separates {label} from {others}? No test within the limits does."
+
+
+def _no_test(
+    label: str, rivals: Sequence[Model], separations: NDArray[np.float64], verdict: Verdict
+) -> Proposal:
+    """Say that all tests leave it to chance which of the models is right."""
+    said = _inseparable(label, rivals)
+    if verdict.status == "unlisted":
+        said = f"Neither {label} nor {rivals[0].label} explains the data. {said}"
+    labels = label, rivals[0].label
+    return Proposal(said, "none", None, None, labels, float(separations[0].max()))
+
+
+def nearest_rivals(verdict: Verdict) -> list[Fit]:
+    """Return the fits of the nearest other hypotheses, nearest first."""
+    if verdict.chosen is None:
+        return []
+    names = verdict.chosen.names
+    others = [
+        *verdict.equivalent,
+        *sorted(verdict.alternatives, key=lambda hypothesis: hypothesis.bic),
+    ]
+    found: dict[frozenset[tuple[str, str]], Fit] = {}
+    for hypothesis in others:
+        # Of nested models the larger one can imitate the chosen one in every test.
+        if hypothesis in verdict.equivalent or not names <= hypothesis.names:
+            found.setdefault(hypothesis.names, hypothesis.fit)
+    return list(found.values())[:_RIVALS]
+
+
+def _aim(verdict: Verdict, one: str, other: str, same: bool) -> str:
+    """Return what a test is for; ``same`` tells whether both models are of one class."""
+    if verdict.status == "unlisted":
+        return f"Neither {one} nor {other} explains the data; they differ most in"
+    if same:
+        return f"The data cannot tell {one} from {other}; what can is"
+    return f"The data separate {one} from others; the best further test against {other} is"
+
+
+def _proposal(
+    grid: Grid, test: int, said: str, labels: tuple[str, str], expected: float
+) -> Proposal:
+    what, speed, load, kind = grid.condition(test)
+    return Proposal(f"{said} {what}.", kind, speed, load, labels, expected)
+
+
+def _most_uncertain(grid: Grid, model: Model) -> Proposal:
+    """Return the running record with the most uncertain prediction of the fit."""
+    running = slice(len(grid.speed_rpm))
+    variance = np.sum(model.influence[running] ** 2, axis=(1, 2)) * model.steady[running]
+    if not variance.any():
+        said = "In none of the tests within the limits does the drive have a steady state."
+        return Proposal(said, "none", None, None, None, 0.0)
+    test = int(np.argmax(variance))
+    what, speed, load, kind = grid.condition(test)
+    text = f"The model is least certain of {what}: make it."
+    return Proposal(text, kind, speed, load, None, float(variance[test]))
+
+
+def _encoder_twin(grid: Grid, chosen: Fit, model: Model) -> Proposal | None:
+    """Return the test that separates a line of whole cycles per output turn from the encoder's."""
+    ratio = grid.data.campaign.believed.ratio
+    for place, candidate in enumerate(chosen.candidates):
+        if candidate.order is None or candidate.name not in (*OF_ENCODER, "kinematic_error"):
+            continue
+        turns = round(candidate.order * ratio)
+        if turns > LARGEST_TURNS or abs(candidate.order * ratio - turns) > 1e-6:
+            continue
+        of_encoder = "eccentricity" if turns == 1 else ENCODER_LINE
+        twin = "kinematic_error:mesh" if candidate.name in OF_ENCODER else f"{of_encoder}:sensor"
+        twin = f"{twin}@{candidate.order:.4g}"
+        parts = chosen.effects_by_candidate
+        base = chosen.values[: len(grid.data.base)]
+        others = [effect for k, part in enumerate(parts) if k != place for effect in part]
+        without = grid.predict(base, others)
+        # Half a period reverses the encoder's line and leaves that of the drive unchanged.
+        change = 2.0 * (model.predicted - without)[: len(grid.speed_rpm)]
+        expected = np.sum(change**2, axis=1) * model.steady[: len(change)]
+        test = int(np.argmax(expected))
+        _, speed, load, _ = grid.condition(test)
+        text = (
+            f"{candidate.label} and {twin} predict nearly the same in every record: turn the disc "
+            f"of the output encoder by {180.0 / turns:.3g} degrees on its shaft and repeat a "
+            f"record at {speed:.4g} r/min with {load:.3g} N.m. A line of the encoder turns "
+            "with it; one of the drive stays."
+        )
+        labels = (candidate.label, twin)
+        return Proposal(text, "reclocked_encoder", speed, load, labels, float(expected[test]))
+    return None
+
+
+def _zero_twin(grid: Grid, finding: DriveFinding, chosen: Fit, model: Model) -> Proposal | None:
+    """Return the test that separates dry friction at the input from a zero error of the sensor.
+
+    In reverse friction changes its sign and a zero error does not. Everything else is mirrored, so
+    that the forward record gives the uncertainty of the rest of the mean input torque.
+    """
+    one_way = len({record.input_speed > 0.0 for record in finding.campaign.train}) == 1
+    for candidate, parts in zip(chosen.candidates, chosen.effects_by_candidate, strict=True):
+        placed = parts[0].at_port() if parts else None
+        if not one_way or placed is None or placed[0] != "input" or not placed[1].constant:
+            continue
+        level = placed[1].constant
+        triangles = grid.data.whiteners
+        row = triangles[:, MEANS.index(CHANNELS.index("input_torque"))]
+        influence = model.influence[: len(row)]
+        known = np.sum(np.einsum("rf,rfp->rp", row, influence) ** 2, axis=1)
+        expected = (2.0 * level) ** 2 / (np.sum(row**2, axis=1) + known)
+        expected *= model.steady[: len(row)]
+        test = int(np.argmax(expected))
+        speed, load = float(grid.speed_rpm[test]), float(grid.load_torque[test])
+        twin = "zero error of the input torque sensor"
+        what = "" if placed[1].breakaway == level else "The level of "
+        text = (
+            f"{what}{candidate.label} and a {twin} of {level:.2g} N.m predict the same as long as "
+            f"the input turns one way: repeat the record at {speed:.4g} r/min with {load:.3g} N.m "
+            "in reverse, or tare the sensor with the motor uncoupled."
+        )
+        labels = (candidate.label, twin)
+        return Proposal(text, "running", -speed, 0.0 - load, labels, float(expected[test]))
+    return None

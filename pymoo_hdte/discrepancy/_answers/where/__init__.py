@@ -1,0 +1,1 @@
+"""Where model and records disagree: the map, its flagged cells, and both in words."""

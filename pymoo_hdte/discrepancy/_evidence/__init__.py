@@ -1,0 +1,1 @@
+"""What records say about a model: whitened residuals and what could explain them."""

@@ -1,0 +1,255 @@
+"""Forces beyond the band of the motion, whitened, over the position and the speed of a port.
+
+Beyond the cutoff a motion is too small to be measured, and so are its forces; but where a machine
+is, and how fast it moves, is known there as well. What varies with the position shows as a line of
+a frequency in proportion to the speed, up to half the sampling rate of the force, or less where
+its rows lie between those that were measured.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.fft import next_fast_len
+from scipy.signal import welch
+
+from pymoo_hdte.discrepancy._selection.rules import Rules
+from pymoo_hdte.effects.effect import place_of
+from pymoo_hdte.mechanism import LawAt, Mechanism, Port, Record
+from pymoo_hdte.mechanism.motion import margin_of, motion_of, smooth
+from pymoo_hdte.mechanism.port_motion import motion_at_port
+
+Values = NDArray[np.float64]
+
+FEWEST_ROWS = 30
+"""For sums of fewer the power of noise has no exponential distribution."""
+_PADDED = 4
+"""Length of a transform over that of its signal, so that powers between its lines are known."""
+_CHANGES = 3
+"""Powers of the position, 0 on, with which the amplitude of what is taken out may change."""
+_BEYOND = 1.25
+"""Lowest frequency over the cutoff: there the slow part, which is taken away, is below 3 %."""
+_SEGMENT, _SEGMENTS = 512, 8
+"""Most samples in a window, and fewest windows of a record: for its spectrum, and to tell what
+has one frequency from what follows the position."""
+
+
+@dataclass(frozen=True, eq=False)
+class HighBand:
+    """The force at a port in one record beyond the band of the motion.
+
+    Attributes
+    ----------
+    time, position, speed : ndarray, shape (n,)
+        s, and of the port, SI.
+    plain : ndarray, shape (n,)
+        Force of the inputs at the port, N or N.m.
+    force : ndarray, shape (n,)
+        The same, whitened: noise has the same power at each frequency.
+    lowest, highest : float
+        Hz, of what is looked at.
+    window : int
+        Samples.
+    """
+
+    time: Values
+    position: Values
+    speed: Values
+    plain: Values
+    force: Values
+    lowest: float
+    highest: float
+    window: int
+    _frequency: Values = field(repr=False)
+    _gain: Values = field(repr=False)
+
+    def inside(self, order: float) -> NDArray[np.bool_]:
+        """Return where the frequency of an order is between ``lowest`` and ``highest``, (n,)."""
+        frequency = order * np.abs(self.speed) / (2.0 * np.pi)
+        return np.asarray((frequency >= self.lowest) & (frequency <= self.highest))
+
+    def gain(self, order: float) -> Values:
+        """Return the factor of the whitening at the frequency of an order, 1/SI, shape (n,).
+
+        Zero where that is not between ``lowest`` and ``highest``.
+        """
+        frequency = order * np.abs(self.speed) / (2.0 * np.pi)
+        return np.interp(frequency, self._frequency, self._gain) * self.inside(order)
+
+    @property
+    def step(self) -> float:
+        """Time between samples, s."""
+        return float((self.time[-1] - self.time[0]) / (len(self.time) - 1))
+
+    def ways(self) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+        """Return where the port moves forward, and where backward, shape (n,) each."""
+        return self.speed > 0.0, self.speed < 0.0
+
+    def line_power(self, rows: NDArray[np.int64], frequencies: Values) -> Values:
+        """Return the power of a window at frequencies, Hz, per unit of noise, (n_frequencies,)."""
+        force = self.force[rows]
+        size = next_fast_len(_PADDED * len(force), real=True)
+        power = np.abs(np.fft.rfft(force, size)) ** 2 / len(force)
+        return np.interp(frequencies, np.fft.rfftfreq(size, self.step), power)
+
+    def without_order(self, order: float) -> HighBand:
+        """Return it without an order, the amplitude of which may change slowly with position."""
+        gain, force = self.gain(order), self.force.copy()
+        middle, half = np.mean(self.position), max(0.5 * float(np.ptp(self.position)), 1e-300)
+        for way in self.ways():
+            rows = np.flatnonzero(gain * way)
+            if len(rows) < FEWEST_ROWS:
+                continue
+            place = ((self.position[rows] - middle) / half)[:, None] ** np.arange(_CHANGES)
+            angle = (order * self.position[rows])[:, None]
+            lines = gain[rows, None] * np.hstack([place * np.cos(angle), place * np.sin(angle)])
+            force[rows] -= lines @ np.linalg.lstsq(lines, force[rows], rcond=None)[0]
+        return replace(self, force=force)
+
+    def without_frequency(self, frequency: float) -> HighBand:
+        """Return it without a frequency in Hz, window by window."""
+        angle, force = 2.0 * np.pi * frequency * self.time, self.force.copy()
+        for start in range(0, len(self.time), self.window):
+            rows = slice(start, start + self.window)
+            lines = np.column_stack([np.cos(angle[rows]), np.sin(angle[rows])])
+            force[rows] -= lines @ np.linalg.lstsq(lines, force[rows], rcond=None)[0]
+        return replace(self, force=force)
+
+
+def high_bands(
+    mechanism: Mechanism,
+    port: Port,
+    records: Sequence[Record],
+    cutoff: float,
+    rules: Rules,
+) -> list[HighBand]:
+    """Return the forces of the inputs at a port beyond a cutoff, by record.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+    port : Port
+    records : sequence of Record
+        As they were sampled.
+    cutoff : float
+        Hz, up to which the motion is known.
+    rules : Rules
+
+    Returns
+    -------
+    list of HighBand
+        Without records that have little beyond the cutoff, are short, or have no such force.
+    """
+    found = []
+    for record in records:
+        lowest, share = _BEYOND * cutoff, 0.5 * rules.nyquist_share
+        if record.interpolated:
+            share = min(share, rules.interpolated_share)
+        highest = share / record.step
+        margin = margin_of(cutoff, record.step)
+        inner = slice(margin, len(record.time) - margin)
+        count = len(record.time[inner])
+        window = min(_SEGMENT, count // _SEGMENTS)
+        if 2.0 * lowest > highest or window < _SEGMENTS:
+            continue
+        motions = {
+            name: motion_of(record.channel(name), record.step, cutoff)
+            for name in mechanism.coordinates
+        }
+        motion = motion_at_port(
+            port,
+            {name: one.position for name, one in motions.items()},
+            {name: one.speed for name, one in motions.items()},
+        )
+        force = _force_at(mechanism, port, record)
+        # Half, as smoothing passes all up to the frequency that it is given.
+        force = (force - smooth(force, record.step, 0.5 * cutoff))[inner]
+        if np.ptp(force) == 0.0:
+            continue
+        frequency, gain = _whitening(force, record.step, window, lowest)
+        found.append(
+            HighBand(
+                record.time[inner],
+                motion.position[inner],
+                motion.speed[inner],
+                force,
+                _filtered(force, record.step, frequency, gain),
+                lowest,
+                highest,
+                window,
+                frequency,
+                gain,
+            )
+        )
+    return found
+
+
+def _force_at(mechanism: Mechanism, port: Port, record: Record) -> Values:
+    """Return the force at a port that the inputs balance, (n,); zero where they drive none of it.
+
+    A force F at a port enters the balance of a coordinate as its share times F: F is the solution
+    by least squares of the balances of those coordinates that an input drives.
+    """
+    driven = {name for one in mechanism.inputs for name, acts in one.acts.items() if acts}
+    shares = {name: share for name, share in port.motion.items() if share and name in driven}
+    size = sum(share**2 for share in shares.values())
+    force = np.zeros(len(record.time))
+    for one in mechanism.inputs:
+        acts = sum(share * one.acts.get(name, 0.0) for name, share in shares.items())
+        if acts:
+            force += acts / size * one.gain.value * record.channel(one.name)
+    return force
+
+
+def _whitening(force: Values, step: float, window: int, lowest: float) -> tuple[Values, Values]:
+    """Return frequencies, Hz, and the factor at each with which a force becomes white."""
+    frequency, power = welch(force, 1.0 / step, nperseg=window, detrend="constant")
+    inside = frequency >= lowest
+    floor = max(1e-12 * float(power.max()), 1e-300)
+    power = np.where(inside, np.maximum(power, floor), np.inf)
+    return frequency, np.sqrt(2.0 * step / power)
+
+
+def _filtered(force: Values, step: float, frequency: Values, gain: Values) -> Values:
+    """Return a force with a factor at each frequency, without delay."""
+    spectrum = np.fft.rfft(force)
+    there = np.fft.rfftfreq(len(force), step)
+    return np.asarray(np.fft.irfft(spectrum * np.interp(there, frequency, gain), len(force)))
+
+
+def ports_apart(mechanism: Mechanism) -> list[Port]:
+    """Return one port for each motion at which forces of inputs act; one with a gear, if any.
+
+    Motions in proportion are one: a force at one of these ports is a force at each.
+    """
+    found: dict[frozenset[tuple[str, float]], Port] = {}
+    for port in mechanism.ports:
+        motion = _direction(port)
+        if not port.read and (motion not in found or (port.gear and not found[motion].gear)):
+            found[motion] = port
+    return list(found.values())
+
+
+def _shares(port: Port) -> dict[str, float]:
+    return {name: port.motion[name] for name in sorted(port.motion) if port.motion[name]}
+
+
+def _direction(port: Port) -> frozenset[tuple[str, float]]:
+    """Return the shares of a port's motion over the first of them, but for rounding."""
+    shares = _shares(port)
+    first = next(iter(shares.values()))
+    return frozenset((name, float(f"{share / first:.9g}")) for name, share in shares.items())
+
+
+def known_orders(mechanism: Mechanism, port: Port, effects: Collection[LawAt]) -> list[float]:
+    """Return the orders of effects at ports of the same motion, per turn of this port."""
+    found = []
+    for one in effects:
+        there, order = mechanism.port(one.port), place_of(one)[2]
+        if order and _direction(there) == _direction(port):
+            theirs, ours = (next(iter(_shares(each).values())) for each in (there, port))
+            found.append(abs(order * theirs / ours))
+    return found

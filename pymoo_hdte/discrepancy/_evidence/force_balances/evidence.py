@@ -1,0 +1,188 @@
+"""Force balances of measured records as evidence, and the unexplained residual as their noise.
+
+The noise of the sensors is estimated from the records. No model of a real machine fits down to it:
+the residual of the best model (the rest) then counts as noise, as in Birge's ratio (Physical Review
+40, 1932).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pymoo_hdte.discrepancy._evidence.force_balances.whitened_balances import (
+    BalanceObjective,
+    Values,
+    WhitenedBalances,
+)
+from pymoo_hdte.discrepancy._selection.candidate import Candidate, out_of_tolerance
+from pymoo_hdte.discrepancy._selection.excess import Excess
+from pymoo_hdte.discrepancy._selection.fitting import Fit, Response, Vector
+from pymoo_hdte.discrepancy._selection.rules import RULES, Rules
+from pymoo_hdte.mechanism import LawAt, Mechanism, Record
+from pymoo_hdte.mechanism.balances import ForceBalance
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredData(WhitenedBalances):
+    """Force balances of records in the form of `fitting.Evidence`.
+
+    Attributes
+    ----------
+    mechanism, spectra, deviation, known
+        As in `WhitenedBalances`.
+    rules : Rules
+        Thresholds of the verdict.
+    """
+
+    rules: Rules = RULES
+
+    def what(self, part: str) -> str:
+        """Return in words what a part is."""
+        return (
+            f"force balance of {part}" if part in self.mechanism.coordinates else f"reading {part}"
+        )
+
+    @property
+    def evident(self) -> frozenset[str]:
+        """None: no effect shows by itself in records of a mechanism."""
+        return frozenset()
+
+    @property
+    def remainder(self) -> float:
+        """Share of the base's excess up to which a residual is attributed to no effect."""
+        return self.rules.mechanism_remainder
+
+    def objective(self, candidates: Sequence[Candidate]) -> BalanceObjective:
+        """Return whitened residuals with candidates."""
+        return BalanceObjective(self, candidates)
+
+    def response(self, fitted: Fit) -> Response:
+        """Return how the whitened residuals of a fit respond to further effects."""
+        base = fitted.values[: len(self.base)]
+        return lambda added: -self.whitened_forces(base, added)
+
+    def corrections(self, candidate: Candidate) -> None:
+        """Return none: no forms of laws are known beside those of the library."""
+
+    def rows_of_parts(self) -> list[NDArray[np.int_]]:
+        """Return the indices of the residuals of each part."""
+        return [np.flatnonzero(self._part == part) for part in range(len(self.names))]
+
+    def excess(self, fitted: Fit) -> Excess:
+        """Return the excess chi-square of a fit by record and part, shape (r, n_parts)."""
+        chi_square, degrees_of_freedom = self._chi_square(fitted.residuals), self._coefficients
+        return Excess(chi_square - degrees_of_freedom, degrees_of_freedom)
+
+    def known_over_noise(self) -> float:
+        """Return the ratio of exactly known forces to the noise.
+
+        The largest ratio of powers in the force balance of a coordinate in a record. Without a
+        force that is known exactly all others are known up to a common factor only. A part that is
+        the same in all records at rest may be the zero of a sensor and does not count.
+        """
+        believed = np.array([parameter.start for parameter in self.base])
+        known = self._linear[0] - self.whitened_forces(believed, self.known)
+        for part in range(len(self.names)):
+            still = (self.frequency == 0.0) & (self._part == part)
+            known[still] -= known[still].mean() if still.any() else 0.0
+        ratios = self._chi_square(known) / self._coefficients
+        return float(ratios[:, : len(self.mechanism.coordinates)].max())
+
+    def out_of_tolerance(self, at_bounds: Sequence[str], together: bool = False) -> list[Candidate]:
+        """Return a candidate for each quantity of the mechanism that a fit left at a bound."""
+        return [
+            out_of_tolerance(name, name) for name in at_bounds if name in self.mechanism.quantities
+        ]
+
+    def held_out_vote(self, base: Fit, fitted: Fit) -> None:
+        """Return None: held-out records of a mechanism are simulated, once the verdict stands."""
+        return
+
+    def with_noise_of(self, fitted: Fit) -> None:
+        """Return None: the noise of measured motion and force is that of the sensors."""
+        return
+
+    def with_rest(self, residuals: Vector) -> MeasuredData:
+        """Return the data with whitened residuals (n,) beyond the sensors' noise as further noise.
+
+        White, one level for each part of a record: with weights by frequency a model that is
+        wrong at low frequencies would be fitted to the others.
+        """
+        found = []
+        for residual, one in zip(self.coefficients(residuals), self.spectra, strict=True):
+            beyond = np.sum(residual**2 - one.noise**2 * one.kept, axis=1, keepdims=True)
+            level = np.maximum(beyond, 0.0) / one.kept.sum(axis=1, keepdims=True)
+            found.append(np.sqrt(one.noise**2 + level))
+        return replace(self, deviation=tuple(found))
+
+    def coefficients(self, residuals: Vector) -> list[Values]:
+        """Return whitened residuals (n,) as coefficients (n_parts, n_bins) of each record.
+
+        SI; zero where a part is not known.
+        """
+        found, start = [], 0
+        for balance, deviation in zip(self.spectra, self.deviation, strict=True):
+            whole, end = np.zeros(deviation.shape), start + int(balance.kept.sum())
+            whole[balance.kept] = residuals[start:end]
+            found.append(whole * deviation)
+            start = end
+        return found
+
+    def power(self, residuals: Vector) -> Vector:
+        """Return the sum of squares of whitened residuals (n,) by part, in squares of its unit."""
+        return np.sum([np.sum(one**2, axis=1) for one in self.coefficients(residuals)], axis=0)
+
+    def _chi_square(self, residuals: Vector) -> Values:
+        """Return the sum of squares of whitened residuals (n,) by record and part."""
+        found = np.zeros((len(self.spectra), len(self.names)))
+        np.add.at(found, (self._record, self._part), residuals**2)
+        return found
+
+    @property
+    def _coefficients(self) -> Values:
+        """Number of coefficients by record and part."""
+        return np.array([one.kept.sum(axis=1) for one in self.spectra], dtype=float)
+
+    @cached_property
+    def _part(self) -> NDArray[np.int_]:
+        return np.concatenate([np.nonzero(one.kept)[0] for one in self.spectra])
+
+    @cached_property
+    def _record(self) -> NDArray[np.int_]:
+        sizes = [int(one.kept.sum()) for one in self.spectra]
+        return np.repeat(np.arange(len(sizes)), sizes)
+
+
+def measured_data(
+    mechanism: Mechanism,
+    records: Sequence[Record],
+    cutoff: float,
+    known: Sequence[LawAt] = (),
+    rules: Rules = RULES,
+) -> MeasuredData:
+    """Return records of a mechanism with the noise of their sensors.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+    records : sequence of Record
+    cutoff : float
+        Hz, up to which the motion is known.
+    known : sequence of LawAt
+        Effects that the mechanism has; rows in which one holds a port at rest are left out.
+    rules : Rules
+        Thresholds by which the records are judged.
+
+    Raises
+    ------
+    InvalidInput
+        See `ForceBalance`.
+    """
+    spectra = tuple(ForceBalance(mechanism, record, cutoff, known) for record in records)
+    noise = tuple(one.noise for one in spectra)
+    return MeasuredData(mechanism, spectra, noise, tuple(known), rules)

@@ -1,0 +1,247 @@
+"""The observations of a campaign as evidence for a fit, by record and part of the data."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pymoo_hdte.discrepancy._evidence.order_lines.candidates import out_of_tolerance
+from pymoo_hdte.discrepancy._evidence.order_lines.features import MEANS, Features, measure
+from pymoo_hdte.discrepancy._evidence.order_lines.forms import Ranges, corrections
+from pymoo_hdte.discrepancy._evidence.order_lines.objective import Objective
+from pymoo_hdte.discrepancy._evidence.order_lines.observations import (
+    Observations,
+    cell_chi_square,
+    cell_degrees_of_freedom,
+)
+from pymoo_hdte.discrepancy._evidence.order_lines.parameters import base_parameters
+from pymoo_hdte.discrepancy._evidence.order_lines.steady_states import SCREENING
+from pymoo_hdte.discrepancy._evidence.order_lines.torsion_curve import torsion_points
+from pymoo_hdte.discrepancy._records.campaign import Campaign
+from pymoo_hdte.discrepancy._records.line_fit import CHANNELS
+from pymoo_hdte.discrepancy._selection.candidate import Candidate
+from pymoo_hdte.discrepancy._selection.excess import Excess, Vote
+from pymoo_hdte.discrepancy._selection.fitting import Fit, Response
+from pymoo_hdte.discrepancy._selection.rules import RULES, Rules
+from pymoo_hdte.drive import DriveEffect
+from pymoo_hdte.effects.unknowns import Parameter
+
+Vector = NDArray[np.float64]
+
+PARTS = (*CHANNELS, "torsion_sweep")
+"""Parts of the data, as in `Excess`: channels of the running records, and the sweeps."""
+
+
+@dataclass(frozen=True, eq=False)
+class Data(Observations):
+    """The observations of a campaign as the engine's `Evidence`.
+
+    Attributes
+    ----------
+    rules : Rules
+        Thresholds of the verdict.
+    evident : frozenset of str
+        As of `Evidence`.
+    """
+
+    rules: Rules = RULES
+    evident: frozenset[str] = frozenset()
+
+    @property
+    def remainder(self) -> float:
+        """Share of the base's excess up to which a residual counts as the model's own error."""
+        return self.rules.model_accuracy**2
+
+    def objective(self, candidates: Sequence[Candidate]) -> Objective:
+        """Return whitened residuals of the drive with candidates."""
+        return Objective(self, candidates)
+
+    def response(self, fitted: Fit) -> Response:
+        """Return how the whitened residuals of a fit respond to further effects."""
+        base = fitted.values[None, : len(self.base)]
+        stands = self.prediction(base, fitted.effects)
+        before = self.features.of_prediction(stands)
+        before_torsion = self.torsion_residuals(base, fitted.effects)
+        priors = np.zeros(len(fitted.residuals) - before.size - before_torsion.size)
+
+        def change(added: Sequence[DriveEffect]) -> Vector:
+            effects = (*fitted.effects, *added)
+            there = self.prediction(base, effects, stands.balance, SCREENING)
+            # A record without a steady state says nothing of the effect.
+            steady = (there.balance.converged & stands.balance.converged)[:, None]
+            changed = self.features.of_prediction(there) - before
+            running = self.whiten(np.where(steady, changed, 0.0))[0]
+            torsion = self.torsion_residuals(base, effects) - before_torsion
+            return np.concatenate([running, np.nan_to_num(torsion[0]), priors])
+
+        return change
+
+    def corrections(self, candidate: Candidate) -> list[DriveEffect]:
+        """Return the corrections of a law's form: see `forms.of_laws`."""
+        return corrections(candidate, _ranges_of(self))
+
+    def rows_of_parts(self) -> list[NDArray[np.int_]]:
+        """Return the indices of the residuals of each channel, and of the sweeps."""
+        n_records, n_features = self.features.values.shape
+        first = n_features * np.arange(n_records)[:, None]
+        found = []
+        for channel in range(len(CHANNELS)):
+            mean = [MEANS.index(channel)] if channel in MEANS else []
+            places = np.append(mean, self.features.places(channel)).astype(int)
+            found.append((first + places).ravel())
+        return [*found, n_records * n_features + np.arange(self.n_sweep_residuals)]
+
+    def excess(self, fitted: Fit) -> Excess:
+        """Return the excess chi-square of a fit by record and part of the data.
+
+        Parts are the four channels of the running records, cell by cell as on the map of the
+        misfit, and the torsion sweeps, which count as one more record: shape (r + 1, 5).
+        """
+        n_records, n_features = self.features.values.shape
+        n_running = n_records * n_features
+        n_sweeps = self.n_sweep_residuals
+        whitened = fitted.residuals[:n_running].reshape(n_records, n_features)
+        cells = cell_chi_square(self, np.einsum("rij,rj->ri", self.whiteners, whitened))
+        known = np.isfinite(cells)
+        chi_square, degrees_of_freedom = np.zeros((2, n_records + 1, cells.shape[1] + 1))
+        degrees_of_freedom[:-1, :-1] = np.where(known, cell_degrees_of_freedom(self), 0.0).sum(
+            axis=2
+        )
+        chi_square[:-1, :-1] = np.where(known, cells, 0.0).sum(axis=2)
+        sweeps = fitted.residuals[n_running : n_running + n_sweeps]
+        chi_square[-1, -1], degrees_of_freedom[-1, -1] = sweeps @ sweeps, n_sweeps
+        return Excess(chi_square - degrees_of_freedom, degrees_of_freedom)
+
+    def out_of_tolerance(self, at_bounds: Sequence[str], together: bool = False) -> list[Candidate]:
+        """Return a candidate for each base parameter that a fit left at a bound."""
+        believed = self.campaign.believed
+        return out_of_tolerance(
+            self.base, at_bounds, believed.error_orders, together, believed.effects
+        )
+
+    def held_out_vote(self, base: Fit, fitted: Fit) -> Vote | None:
+        """Return what the records kept out of the fit say of two fits; None without any.
+
+        What creeps in them is noise or an error of the model: as noise it covers most of what a
+        loop that forgets does, and as an error it outweighs that. What speaks better for the change
+        counts, so that only what is denied both ways is denied.
+        """
+        if (data := self.held_out) is None:
+            return None
+        if not self.creep:
+            return data._vote(base, fitted)
+        settled = replace(data.features.conditions, fading=None)
+        both = data, replace(data, features=replace(data.features, conditions=settled))
+        votes = [each._vote(base, fitted) for each in both]
+        return max(votes, key=lambda vote: (vote.before - vote.after) / max(vote.change, 1e-300))
+
+    def _vote(self, base: Fit, fitted: Fit) -> Vote:
+        """Return what these records say of two fits."""
+        before, after = (
+            self.whiten(
+                self.predict(one.values[None, : len(self.base)], one.effects)[0]
+                - self.features.values
+            )
+            for one in (base, fitted)
+        )
+        change = after - before
+        return Vote(float(before @ before), float(after @ after), float(change @ change))
+
+    @cached_property
+    def held_out(self) -> Data | None:
+        """Features of the records kept out of the fit, or None without such records.
+
+        If records with rattling were left out of the fit, they are left out here, too.
+        """
+        records = self.campaign.held_out
+        if not records:
+            return None
+        features = measure(self.campaign, records, self.features.orders.tolist())
+        if len(self.features.records) < len(self.campaign.train):
+            held = flanks_held(features, self.campaign.torque_scale, self.rules)
+            features = features.rows(np.flatnonzero(held))
+        return replace(self, features=features, torsion=()) if features.records else None
+
+    def with_noise_of(self, fitted: Fit) -> Data | None:
+        """Return the data with the noise of another model; None where it adds little to theirs.
+
+        The non-repeatable error is a motion, which reaches all channels through the response of
+        the drive, its effects included.
+        """
+        base = fitted.values[: len(self.base)]
+        renewed = replace(self, reference=base, reference_effects=fitted.effects)
+        variances = (np.diagonal(one.covariance, axis1=1, axis2=2) for one in (renewed, self))
+        ratio = np.divide(*variances).max()
+        return renewed if ratio > self.rules.changed_noise_ratio else None
+
+    @property
+    def loaded(self) -> Data:
+        """The data without records whose load does not hold the tooth flanks together.
+
+        With a clearance such a drive rattles and has no steady state that could be fitted.
+        """
+        held = flanks_held(self.features, self.campaign.torque_scale, self.rules)
+        if np.all(held) or held.sum() < self.rules.fewest_records:
+            return self
+        return replace(self, features=self.features.rows(np.flatnonzero(held)))
+
+
+def _ranges_of(data: Data) -> Ranges:
+    """Return what the records of some data run through."""
+    when, believed = data.features.conditions, data.campaign.believed
+    torques = [np.abs(when.output_torque).max(), *(np.abs(one.path).max() for one in data.torsion)]
+    lines = zip(believed.error_orders, believed.error_amplitudes, strict=True)
+    return Ranges(
+        np.abs(when.input_speed),
+        float(max(torques)),
+        float(max(torques)) / believed.stiffness,
+        float(np.ptp(when.elapsed)),
+        believed.ratio,
+        believed.stiffness,
+        believed.damping,
+        max(believed.load_inertia, believed.output_inertia),
+        tuple(order for order, amplitude in lines if amplitude > 0.0),
+        tuple(data.features.orders.tolist()),
+        data.rules.form_terms,
+    )
+
+
+def flanks_held(features: Features, torque_scale: float, rules: Rules) -> NDArray[np.bool_]:
+    """Return which records have a load above the amplitude of their torque, shape (r,)."""
+    m = len(features.orders)
+    lines = features.values[:, features.places(2)].reshape(len(features.records), m, 2)
+    swing = np.hypot(lines[..., 0], lines[..., 1]).sum(axis=1)
+    load = np.abs(features.conditions.output_torque)
+    return np.asarray(load > np.maximum(swing, torque_scale * rules.least_held_load))
+
+
+def training_data(campaign: Campaign, features: Features, rules: Rules = RULES) -> Data:
+    """Return features of training records with first guesses, and the sweeps."""
+    points = tuple(torsion_points(record, campaign.rig) for record in campaign.torsion)
+    return Data(
+        campaign,
+        features,
+        start_parameters(campaign, features),
+        points,
+        rules=rules,
+    )
+
+
+def start_parameters(campaign: Campaign, features: Features) -> tuple[Parameter, ...]:
+    """Return the base parameters, with first guesses from the slowest record."""
+    believed = campaign.believed
+    slowest = int(np.argmin(np.abs(features.conditions.input_speed)))
+    values, places = features.values[slowest], features.places(0)
+    phases = []
+    for order in believed.error_orders:
+        line = int(np.argmin(np.abs(features.orders - order)))
+        real, imaginary = values[places[line]]
+        # amplitude sin(x + phase) has the phasor -i amplitude exp(i phase).
+        phases.append(float(np.angle(1j * (real + 1j * imaginary))))
+    load = features.conditions.output_torque
+    offset = float(np.median(features.values[:, 0] - load / believed.stiffness))
+    return base_parameters(believed, campaign.rig, phases, offset)

@@ -1,0 +1,301 @@
+"""Corrections of a law's form: small forces of the same argument at the same port.
+
+No bearing has exactly the friction curve of a library. Whatever the curve, it is a force of the
+speed at its port, a spring's is one of the deflection, a ripple's one of the angle. The corrections
+of a law span smooth functions of its argument, or further harmonics. To first order, what is left
+of a misfit beside all of them cannot be an error of that law's form.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.polynomial.chebyshev import Chebyshev
+from numpy.typing import NDArray
+
+from pymoo_hdte.discrepancy._evidence.order_lines.corrections import (
+    AnyForce,
+    AnyForceOfLoad,
+    Correction,
+    DampingByRecord,
+    Force,
+    LoadRate,
+)
+from pymoo_hdte.discrepancy._selection.candidate import Candidate
+from pymoo_hdte.drive import DriveEffect
+from pymoo_hdte.drive._effects import (
+    Eccentricity,
+    KinematicErrorLine,
+    PreslidingFriction,
+    ThermalDrift,
+)
+from pymoo_hdte.effects.friction import smoothed_sign
+from pymoo_hdte.effects.hysteresis import MaxwellSlip
+from pymoo_hdte.effects.law import PortState, Response, Values
+from pymoo_hdte.effects.ripple import PeriodicTorque
+from pymoo_hdte.effects.stiffness import HardeningStiffness, PeriodicStiffness, SoftWindup
+
+# Sizes are far below those that matter: only directions count.
+_SHARE = 1e-3
+"""Of the torque or stiffness of the drive, for what varies with an angle."""
+_LARGER_SHARE = 5e-3
+"""For what changes means."""
+_ANGLE = 1e-7
+"""rad, of an error of the output angle."""
+_SHARPNESS = 3.0
+"""Of the bends, as of a play with a soft skin."""
+_BENDS = tuple(np.geomspace(0.01, 1.0, 8).tolist())
+"""Torsions, as shares of the largest, at which a stiffness may bend and springs may slip."""
+_PARTS = (0.0, np.pi / 2.0)
+"""Phases of the two parts of a line."""
+_RATES = (1, 2, 3, 4)
+"""Derivatives of the load's acceleration: a line that a coupling delays by a third of a radian
+needs no more for a hundredth of its torque."""
+_DRIFTS = (0.1, 0.3, 1.0, 3.0)
+"""Time constants of a drift, as shares of the session."""
+
+
+@dataclass(frozen=True, eq=False)
+class Ranges:
+    """What the records of a drive run through, SI.
+
+    Attributes
+    ----------
+    speed : ndarray, shape (r,)
+        Of the input.
+    torque, travel : float
+        Largest at the output, and the torsion by it.
+    duration : float
+        Of the session.
+    ratio, stiffness, damping, inertia : float
+        Of the believed drive; the inertia that of its load.
+    lines : tuple of float
+        Orders of the believed static error.
+    shown : tuple of float
+        Orders that are analysed.
+    terms : int
+        Curves of the speed, or harmonics of an angle, that another form may hold.
+    """
+
+    speed: NDArray[np.float64]
+    torque: float
+    travel: float
+    duration: float
+    ratio: float
+    stiffness: float
+    damping: float
+    inertia: float
+    lines: tuple[float, ...]
+    shown: tuple[float, ...]
+    terms: int
+
+    def multiples(self, order: float) -> list[float]:
+        """Return an order and those of its harmonics that are analysed."""
+        multiples = [k * order for k in range(1, self.terms + 1)]
+        return [one for one in multiples if np.min(np.abs(np.subtract(self.shown, one))) < 1e-6]
+
+    def slower(self, port: str) -> float:
+        """Return turns of the input per turn of a port."""
+        return self.ratio if port == "output" else 1.0
+
+
+def corrections(candidate: Candidate, ranges: Ranges) -> list[DriveEffect]:
+    """Return the corrections of the form of a candidate's laws; none where no form is known."""
+    of_name = _FORMS.get(candidate.frees or candidate.name)
+    return [] if of_name is None else of_name(candidate, ranges)
+
+
+def _friction(candidate: Candidate, ranges: Ranges) -> list[DriveEffect]:
+    """Friction of any curve; at the output bristles show in the sweep, which turns there."""
+    found: list[DriveEffect] = [
+        Correction(candidate.port, AnyForce(_of_speed(power, candidate.port, ranges)))
+        for power in range(ranges.terms)
+    ]
+    return found + (_contacts(ranges) if candidate.port == "output" else [])
+
+
+def _contacts(ranges: Ranges) -> list[DriveEffect]:
+    """Contacts of the output that bend before they slip, by any way up to those of a bearing."""
+    size, shares = _SHARE * ranges.torque, _BENDS[:4]
+    laws = [PreslidingFriction(size, share * ranges.travel, 1e-3) for share in shares]
+    return [Correction("output", law) for law in laws]
+
+
+def _of_speed(
+    power: int, port: str, ranges: Ranges, order: float = 0.0, phase: float = 0.0
+) -> Force:
+    """Return a friction by a polynomial of the speed's logarithm, perhaps times a cosine."""
+    slower = ranges.slower(port)
+    low, high = np.log([0.7 * ranges.speed.min() / slower, 1.1 * ranges.speed.max() / slower])
+    curve = Chebyshev.basis(power)
+    slope = curve.deriv()
+    size = _LARGER_SHARE * ranges.torque / ranges.ratio * slower
+
+    def force(state: PortState) -> Response:
+        sign, steep = smoothed_sign(state.speed)
+        speed = np.maximum(np.abs(state.speed), 1e-9)
+        place = np.clip((2.0 * np.log(speed) - low - high) / (high - low), -1.5, 1.5)
+        wave = size * np.cos(state.phase(order) + phase) if order else size
+        value, growth = curve(place), slope(place) * 2.0 / ((high - low) * speed)
+        return Response(wave * value * sign, damping=wave * (growth + value * steep))
+
+    return force
+
+
+def _varying_friction(candidate: Candidate, ranges: Ranges) -> list[DriveEffect]:
+    port, slower = candidate.port, ranges.slower(candidate.port)
+    found = _friction(candidate, ranges)
+    for order in (slower * one for one in ranges.multiples(candidate.order or 1.0)):
+        for phase in _PARTS:
+            for power in range(2):
+                force = _of_speed(power, port, ranges, order, phase)
+                found.append(Correction(port, AnyForce(force, (order,))))
+    return found
+
+
+def _friction_of_load(candidate: Candidate, ranges: Ranges) -> list[DriveEffect]:
+    """Friction of any power of the load, which may differ where the load drives."""
+    scale = ranges.torque / ranges.ratio
+    found: list[DriveEffect] = [*_friction(candidate, ranges)[:2]]
+    for power in (0.0, 0.5, 1.0, 2.0):
+        for driven in (False, True):
+
+            def force(state: PortState, power: float = power, driven: bool = driven) -> Response:
+                load = np.asarray(state.load)
+                sign, steep = smoothed_sign(state.speed)
+                size = _LARGER_SHARE * scale * (np.abs(load) / scale) ** power
+                if driven:
+                    size = size * np.sign(load)
+                    return Response(size * sign**2, damping=2.0 * size * sign * steep)
+                return Response(size * sign, damping=size * steep)
+
+            found.append(Correction("input", AnyForceOfLoad(force)))
+    return found
+
+
+def _stiffness(candidate: Candidate, ranges: Ranges) -> list[DriveEffect]:
+    """Stiffness that bends anywhere; with the angle too, where a clearance varies."""
+    bends = [SoftWindup(_LARGER_SHARE, share * ranges.travel, _SHARPNESS) for share in _BENDS]
+    cubic = HardeningStiffness(_LARGER_SHARE * ranges.stiffness / ranges.travel**2)
+    found: list[DriveEffect] = [Correction("mesh", law) for law in bends]
+    found.append(Correction("mesh", cubic))
+    for order in ranges.multiples(candidate.order) if candidate.order else ():
+        for phase in _PARTS:
+            waving = [_waving(law, order, phase) for law in bends[::2]]
+            found += [Correction("mesh", AnyForce(force, (order,))) for force in waving]
+    return found
+
+
+def _waving(law: SoftWindup, order: float, phase: float) -> Force:
+    """Return a bend that comes and goes with the angle."""
+
+    def force(state: PortState) -> Response:
+        one, wave = law.respond(state), np.cos(state.phase(order) + phase)
+        return Response(one.torque * wave, one.slope * wave)
+
+    return force
+
+
+def _springs(candidate: Candidate, ranges: Ranges) -> list[DriveEffect]:
+    """Springs at the mesh that slip at any torsion; all four of each at the same."""
+    size = _SHARE * ranges.torque
+    return [Correction("mesh", MaxwellSlip(size, share * ranges.travel, 1e-3)) for share in _BENDS]
+
+
+def _stiffness_wave(candidate: Candidate, ranges: Ranges) -> list[DriveEffect]:
+    orders = ranges.multiples(candidate.order or 2.0)
+    laws = [PeriodicStiffness(order, phase, _SHARE) for order in orders for phase in _PARTS]
+    return [Correction("mesh", law) for law in laws]
+
+
+def _ripple(candidate: Candidate, ranges: Ranges) -> list[DriveEffect]:
+    size, order = _SHARE * ranges.torque / ranges.ratio, candidate.order or 1.0
+    orders = ranges.multiples(order)
+    # It moves its own angle, through which each harmonic shows at the next lower one, too.
+    shown = {round(one / order) for one in orders}
+    orders += [(k + 1) * order for k in shown if k < ranges.terms and k + 1 not in shown]
+    return [
+        Correction("input", PeriodicTorque(order, phase, size))
+        for order in orders
+        for phase in _PARTS
+    ]
+
+
+def _error(candidate: Candidate, ranges: Ranges) -> list[DriveEffect]:
+    orders = ranges.multiples(candidate.order or 1.0)
+    return [KinematicErrorLine(order, _ANGLE, phase) for order in orders for phase in _PARTS]
+
+
+def _scale_error(candidate: Candidate, ranges: Ranges) -> list[DriveEffect]:
+    orders = ranges.multiples(candidate.order or 1.0)
+    return [
+        Eccentricity(_ANGLE, phase, order * ranges.ratio) for order in orders for phase in _PARTS
+    ]
+
+
+def _reaction(candidate: Candidate, ranges: Ranges) -> list[DriveEffect]:
+    """Return torques by the load at the orders of the error in any phase, as with a lag."""
+    fastest, found = ranges.speed.max(), []
+    for order in ranges.lines:
+        for phase in _PARTS:
+            for power in (0, 1):
+
+                def force(
+                    state: PortState, order: float = order, phase: float = phase, power: int = power
+                ) -> Response:
+                    faster = (np.abs(state.speed) / fastest) ** power
+                    wave: Values = np.cos(state.phase(order) + phase)
+                    return Response(1e-2 * _SHARE * np.asarray(state.load) * wave * faster)
+
+                found.append(Correction("input", AnyForceOfLoad(force, (order,))))
+    return list[DriveEffect](found)
+
+
+def _damping(candidate: Candidate, ranges: Ranges) -> list[DriveEffect]:
+    """Return a damping that grows with the speed of the input, or with the torsion's rate."""
+    share = ranges.speed / ranges.speed.max()
+    rate = 100.0 * _ANGLE * ranges.speed.max()
+
+    def force(state: PortState) -> Response:
+        slope = _LARGER_SHARE * ranges.damping * np.abs(state.speed) / rate
+        return Response(slope * state.speed, damping=2.0 * slope)
+
+    found: list[DriveEffect] = [DampingByRecord(0.05 * share**power) for power in (1, 2)]
+    return [*found, Correction("mesh", AnyForce(force))]
+
+
+def _drift(candidate: Candidate, ranges: Ranges) -> list[DriveEffect]:
+    times = [share * ranges.duration for share in _DRIFTS if ranges.duration > 0.0]
+    return [ThermalDrift(_ANGLE / time, time) for time in times]
+
+
+def _load(candidate: Candidate, ranges: Ranges) -> list[DriveEffect]:
+    """Return torques of a load that hangs on a spring, a damper or both: a series in the rate."""
+    fastest = ranges.speed.max()
+    return [LoadRate(k, _SHARE * ranges.inertia / fastest**k) for k in _RATES]
+
+
+_FORMS: dict[str, Callable[[Candidate, Ranges], list[DriveEffect]]] = {
+    "coulomb_friction": _friction,
+    "presliding_friction": _friction,
+    "stribeck_friction": _friction,
+    "nonlinear_drag": _friction,
+    "position_dependent_friction": _varying_friction,
+    "load_dependent_friction": _friction_of_load,
+    "hardening_stiffness": _stiffness,
+    "soft_windup": _stiffness,
+    "backlash": _stiffness,
+    "clearance_variation": _stiffness,
+    "hysteresis": _springs,
+    "mesh_stiffness_variation": _stiffness_wave,
+    "torque_ripple": _ripple,
+    "kinematic_error": _error,
+    "eccentricity": _scale_error,
+    "kinematic_reaction": _reaction,
+    "damping_reference": _damping,
+    "damping": _damping,
+    "load_inertia": _load,
+    "thermal_drift": _drift,
+}

@@ -1,0 +1,250 @@
+"""Features of a campaign with their full covariance, and their prediction by a model.
+
+Residuals are whitened by that covariance, so that their sum of squares is a chi-square. The small
+changes of the static error from record to record count as noise, which reaches all channels through
+the response of the drive.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg.lapack import dtrtrs
+
+from pymoo_hdte.discrepancy._evidence.order_lines.features import (
+    MEANS,
+    Features,
+)
+from pymoo_hdte.discrepancy._evidence.order_lines.prediction import (
+    Prediction,
+    coefficients_of,
+    predict,
+)
+from pymoo_hdte.discrepancy._evidence.order_lines.steady_states import PREDICTION, Effort
+from pymoo_hdte.discrepancy._evidence.order_lines.torsion_curve import TorsionPoints
+from pymoo_hdte.discrepancy._records.campaign import Campaign
+from pymoo_hdte.discrepancy._records.known_values import of_equal_numbers
+from pymoo_hdte.discrepancy._records.line_fit import CHANNELS
+from pymoo_hdte.discrepancy._selection.candidate import Layout
+from pymoo_hdte.drive import DriveEffect, LawAtPort, SteadyMotion, mean_torsion
+from pymoo_hdte.effects.unknowns import Parameter
+
+Vector = NDArray[np.float64]
+Values = NDArray[np.float64]
+
+_COURSE = 0.1
+"""Share by which what creeps may differ from a sum of decays, line by line: it slows down as it
+fades, and goes by fits and starts where lines of the error beat."""
+
+
+@dataclass(frozen=True, eq=False)
+class Observations:
+    """Features to fit, whitened, for a campaign.
+
+    Attributes
+    ----------
+    campaign : Campaign
+    features : Features
+    base : tuple of Parameter
+    torsion : tuple of TorsionPoints
+        Sweeps with the input locked.
+    reference : ndarray, shape (n_base,), optional
+        Base values for the response to the repeatability; by default the starts.
+    reference_effects : tuple of DriveEffect
+        Effects included in this response: they may move a resonance, which amplifies the
+        repeatability.
+    """
+
+    campaign: Campaign
+    features: Features
+    base: tuple[Parameter, ...]
+    torsion: tuple[TorsionPoints, ...] = ()
+    reference: Vector | None = None
+    reference_effects: tuple[DriveEffect, ...] = ()
+
+    @cached_property
+    def whiteners(self) -> NDArray[np.float64]:
+        """Lower triangles L, shape (r, f, f), of the `covariance` L L^T of each record."""
+        return np.asarray(np.linalg.cholesky(self.covariance), dtype=np.float64)
+
+    @cached_property
+    def covariance(self) -> NDArray[np.float64]:
+        """Covariance of the features of each record, shape (r, f, f).
+
+        Of sensors, of the repeatability, and of what still creeps in laws that forget gradually.
+        """
+        layout = Layout(self.base)
+        start = layout.array("start") if self.reference is None else self.reference
+        known = self.features.covariance + self._repeatability(layout, start)
+        return known + self._creep(float(start[layout.index("stiffness")]))
+
+    @property
+    def creep(self) -> float:
+        """Mesh torque that fades in believed and included effects, N.m: see `Behaviour.creep`."""
+        effects = (*self.campaign.believed.effects, *self.reference_effects)
+        laws = (one for one in effects if isinstance(one, LawAtPort) and one.port == "mesh")
+        return sum(one.law.creep for one in laws)
+
+    def _creep(self, stiffness: float) -> NDArray[np.float64] | float:
+        """Return the covariance by torsion that fades in a record, which loads had left before.
+
+        Nobody knows how long the drive had turned on when a record began, so that any of it may be
+        left, and fade at any rate: each decay has the size of the whole force as its deviation,
+        which is so much more than the noise that a smaller one would make no difference.
+        """
+        size, features = self.creep / stiffness, self.features
+        fading = features.conditions.fading
+        if fading is None or not size:
+            return 0.0
+        real, imaginary = features.places(0).T
+        left = np.zeros((*fading.shape[:2], features.values.shape[1]))
+        left[..., 0] = fading[..., 0].real
+        left[..., real], left[..., imaginary] = fading[..., 1:].real, fading[..., 1:].imag
+        found = np.einsum("rki,rkj->rij", left, left)
+        # What hardly fades at all moves the mean.
+        found[:, 0, 0] += 1.0
+        each = np.arange(left.shape[2])
+        found[:, each, each] *= 1.0 + _COURSE**2
+        return np.asarray(size**2 * found)
+
+    def _repeatability(self, layout: Layout, start: Vector) -> NDArray[np.float64]:
+        """Return the covariance by small changes of the static error for each record."""
+        rig, believed = self.campaign.rig, self.campaign.believed
+        lines = range(len(believed.error_orders))
+        spread = rig.repeatability / max(len(lines), 1) ** 0.5
+        moved = [start]
+        for line in lines:
+            places = [layout.index(f"error_{part}_{line}") for part in ("amplitude", "phase")]
+            amplitude, phase = start[places]
+            for step in (spread, 1j * spread):
+                shifted = start.copy()
+                phasor = amplitude * np.exp(1j * phase) + step
+                shifted[places] = np.abs(phasor), np.angle(phasor)
+                moved.append(shifted)
+        predicted = self.predict(np.array(moved), self.reference_effects)
+        change = predicted[1:] - predicted[0]
+        covariance = np.einsum("vri,vrj->rij", change, change)
+        covariance[:, 0, 0] += spread**2
+        return covariance
+
+    def predict(self, vectors: Vector, effects: Sequence[DriveEffect]) -> NDArray[np.float64]:
+        """Return features, shape (v, r, f), of vectors (v, n_base) of base parameters."""
+        return self.features.of_prediction(self.prediction(vectors, effects))
+
+    def prediction(
+        self,
+        vectors: Vector,
+        effects: Sequence[DriveEffect],
+        start: SteadyMotion | None = None,
+        effort: Effort = PREDICTION,
+    ) -> Prediction:
+        """Return the prediction behind `predict`, steady states included."""
+        values = self._named(vectors)
+        believed, rig = self.campaign.believed, self.campaign.rig
+        features = self.features
+        orders = features.orders.tolist()
+        conditions = features.conditions
+        return predict(believed, rig, conditions, orders, values, effects, start, effort)
+
+    def _named(self, vectors: Vector) -> dict[str, Vector]:
+        return {p.name: column for p, column in zip(self.base, vectors.T, strict=True)}
+
+    def torsion_residuals(
+        self, vectors: Vector, effects: Sequence[DriveEffect]
+    ) -> NDArray[np.float64]:
+        """Return whitened residuals (v, n_points) of the sweeps; none where there is no sweep."""
+        groups = of_equal_numbers(self.campaign.believed.effects, self._named(vectors))
+        found = np.empty((len(vectors), self.n_sweep_residuals))
+        for rows, known in groups if self.torsion else ():
+            found[rows] = self._swept(vectors[rows], known, effects)
+        return found
+
+    def _swept(
+        self, vectors: Vector, known: Sequence[DriveEffect], effects: Sequence[DriveEffect]
+    ) -> NDArray[np.float64]:
+        """Return whitened residuals of the sweeps where the believed effects are ``known``."""
+        values = self._named(vectors)
+        coefficients = coefficients_of(self.campaign.believed, values, (*known, *effects), 1)
+        stiffness = coefficients.stiffness * values["locked_stiffness"]
+        coefficients = replace(coefficients, stiffness=stiffness)
+        # Vectors with equal sensor errors have the same path of the torque.
+        of_sensors: dict[tuple[float, float], list[int]] = {}
+        sensors = (values[f"output_torque_{one}"].tolist() for one in ("gain", "zero"))
+        for row, sensor in enumerate(zip(*sensors, strict=True)):
+            of_sensors.setdefault(sensor, []).append(row)
+        found = []
+        for points in self.torsion:
+            torsion = np.empty((len(vectors), len(points.angle)))
+            for (gain, zero), rows in of_sensors.items():
+                some = coefficients if len(of_sensors) == 1 else coefficients.rows(np.array(rows))
+                path = (points.path - zero) / (1.0 + gain)
+                torsion[rows] = mean_torsion(some, path)[:, points.intervals]
+            found.append((torsion - points.angle) @ points.whitening.T)
+        return np.hstack(found)
+
+    @property
+    def n_sweep_residuals(self) -> int:
+        """Number of residuals of the sweeps: one a point, less the constant of each sweep."""
+        return sum(len(points.angle) - 1 for points in self.torsion)
+
+    def whiten(self, differences: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return whitened differences of features (..., r, f), flat: shape (..., r f)."""
+        white = np.empty_like(differences)
+        for record, triangle in enumerate(self.whiteners):
+            part = differences[..., record, :].reshape(-1, len(triangle)).T
+            # Unknown values are NaN here and are counted as lost afterwards. LAPACK itself, which
+            # reads columns first: SciPy's checks would take several times as long.
+            solved, _ = dtrtrs(triangle.T, part, trans=True)
+            white[..., record, :] = solved.T.reshape(differences[..., record, :].shape)
+        return white.reshape(*differences.shape[:-2], -1)
+
+
+def cell_degrees_of_freedom(data: Observations) -> Values:
+    """Return those of each cell, shape (4, 1 + m)."""
+    degrees_of_freedom = np.full((len(CHANNELS), 1 + len(data.features.orders)), 2.0)
+    degrees_of_freedom[:, 0] = 1.0
+    return degrees_of_freedom
+
+
+def cell_chi_square(data: Observations, difference: Values) -> Values:
+    """Return the chi-square of each cell for differences of features (r, f); (r, 4, 1 + m)."""
+    covariance = data.covariance
+    found = np.full((len(difference), *cell_degrees_of_freedom(data).shape), np.nan)
+    for channel in range(len(CHANNELS)):
+        if channel in MEANS:
+            found[:, channel, 0] = difference[:, channel] ** 2 / covariance[:, channel, channel]
+        for line, pair in enumerate(data.features.places(channel)):
+            block = covariance[:, pair[:, None], pair]
+            part = difference[:, pair, None]
+            solved = np.linalg.solve(block, part)
+            found[:, channel, 1 + line] = np.sum(part * solved, axis=(1, 2))
+    return found
+
+
+def cell_noise(data: Observations) -> Values:
+    """Return the standard deviation of a part of each cell, shape (r, 4, 1 + m).
+
+    Of a mean its own, of a line the root mean square of those of its real and imaginary part.
+    """
+    variance = np.diagonal(data.covariance, axis1=1, axis2=2)
+    found = np.full((len(variance), *cell_degrees_of_freedom(data).shape), np.nan)
+    for channel in range(len(CHANNELS)):
+        if channel in MEANS:
+            found[:, channel, 0] = variance[:, MEANS.index(channel)]
+        found[:, channel, 1:] = variance[:, data.features.places(channel)].mean(axis=2)
+    return np.sqrt(found)
+
+
+def as_lines(data: Observations, difference: Values) -> NDArray[np.complex128]:
+    """Return differences of features (r, f) as phasors of cells (r, 4, 1 + m)."""
+    found = np.full((len(difference), *cell_degrees_of_freedom(data).shape), np.nan, dtype=complex)
+    for channel in range(len(CHANNELS)):
+        if channel in MEANS:
+            found[:, channel, 0] = difference[:, channel]
+        real, imaginary = data.features.places(channel).T
+        found[:, channel, 1:] = difference[:, real] + 1j * difference[:, imaginary]
+    return found

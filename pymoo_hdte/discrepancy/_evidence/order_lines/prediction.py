@@ -1,0 +1,310 @@
+"""Predicted readings of the rig's sensors: order lines and means of every channel.
+
+One call of the harmonic balance serves all records of a campaign and all vectors of parameters that
+share their effects. Loads are the measured ones, not the planned ones.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pymoo_hdte.discrepancy._evidence.order_lines.parameters import MECHANICAL
+from pymoo_hdte.discrepancy._evidence.order_lines.steady_states import (
+    PREDICTION,
+    Effort,
+    merged,
+    steady_motions,
+)
+from pymoo_hdte.discrepancy._records.believed import BelievedDrive, Rig
+from pymoo_hdte.discrepancy._records.known_values import of_equal_numbers
+from pymoo_hdte.discrepancy._records.line_fit import CHANNELS
+from pymoo_hdte.drive import (
+    Coefficients,
+    DriveEffect,
+    SteadyMotion,
+)
+from pymoo_hdte.drive._effects import Session
+from pymoo_hdte.drive._solve.order_spectrum import sine_phasor
+
+_SAME = 1e-8
+"""Orders nearer to each other are one; those of a torus are sums of rounded numbers."""
+_UNRESOLVED = 0.1
+"""Cycles in an output turn within which two lines are read as one; farther apart, they are lines of
+their own to records of a few turns."""
+
+
+@dataclass(frozen=True)
+class Conditions:
+    """Operating conditions of r records, arrays of shape (r,).
+
+    Attributes
+    ----------
+    input_speed : ndarray
+        Measured mean, rad/s.
+    output_torque : ndarray
+        Measured mean, N.m: load with the sensor's gain and zero.
+    elapsed : ndarray
+        Middle of the record within the session, s.
+    bends : complex ndarray, shape (r, 3, 1 + m)
+        Contribution of a drift that is curved within a record: see `OrderLines`.
+    temperature : ndarray, optional
+        In kelvin, NaN where it is not known; by default in no record.
+    input_angle, travel : ndarray, optional
+        Of the input in the middle of the record, and from its start to its end, rad; by default 0.
+    fading : complex ndarray, shape (r, k, 1 + m), optional
+        Contribution of what fades within a record, see `OrderLines`; by default nothing fades.
+    """
+
+    input_speed: NDArray[np.float64]
+    output_torque: NDArray[np.float64]
+    elapsed: NDArray[np.float64]
+    bends: NDArray[np.complex128]
+    temperature: NDArray[np.float64] | None = None
+    input_angle: NDArray[np.float64] | None = None
+    travel: NDArray[np.float64] | None = None
+    fading: NDArray[np.complex128] | None = None
+
+    def rows(self, rows: NDArray[np.int_]) -> Conditions:
+        """Return the conditions of some of the records."""
+        known = {one.name: getattr(self, one.name) for one in fields(self)}
+        of_rows = {name: one[rows] for name, one in known.items() if one is not None}
+        return replace(self, **of_rows)
+
+    def __len__(self) -> int:
+        return len(self.input_speed)
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """Means, shape (v, r, 4), and phasors, (v, r, 4, m), of `CHANNELS` for v vectors, r records.
+
+    SI. The mean of the output torque and of the input angle are conditions, not predictions.
+    ``balance`` has the steady states, vectors outermost.
+    """
+
+    mean: NDArray[np.float64]
+    phasors: NDArray[np.complex128]
+    balance: SteadyMotion
+
+
+def predict(
+    believed: BelievedDrive,
+    rig: Rig,
+    conditions: Conditions,
+    orders: Sequence[float],
+    values: dict[str, NDArray[np.float64]],
+    effects: Sequence[DriveEffect] = (),
+    start: SteadyMotion | None = None,
+    effort: Effort = PREDICTION,
+) -> Prediction:
+    """Return the predicted readings of the sensors.
+
+    Vectors that share the numbers of the believed effects are solved together.
+
+    Parameters
+    ----------
+    believed, rig
+    conditions : Conditions
+    orders : sequence of float, length m
+        Orders of the predicted lines, in cycles per input turn.
+    values : dict of ndarray, shape (v,)
+        Parameters by name, those of `parameters.base_parameters`.
+    effects : sequence of DriveEffect
+        In addition to the believed ones; shared by all vectors.
+    start : SteadyMotion, optional
+        Steady states of the records for nearby values, to begin from.
+    effort : Effort
+        How far the steady states are searched for.
+    """
+    parts = []
+    groups = of_equal_numbers(believed.effects, values)
+    for rows, known in groups:
+        some = {name: column[rows] for name, column in values.items()}
+        present = (*known, *effects)
+        parts.append(
+            _predict_group(believed, rig, conditions, orders, some, present, start, effort)
+        )
+    if len(parts) == 1:
+        return parts[0]
+    return _joined(parts, [rows for rows, _ in groups], len(conditions))
+
+
+def _predict_group(
+    believed: BelievedDrive,
+    rig: Rig,
+    conditions: Conditions,
+    orders: Sequence[float],
+    values: dict[str, NDArray[np.float64]],
+    present: Sequence[DriveEffect],
+    start: SteadyMotion | None,
+    effort: Effort,
+) -> Prediction:
+    """Return the prediction of vectors that share all effects ``present``."""
+    count, records = len(values["offset"]), len(conditions)
+    gain = 1.0 + values["output_torque_gain"][:, None]
+    load = (conditions.output_torque - values["output_torque_zero"][:, None]) / gain
+    coefficients = coefficients_of(believed, values, present, records)
+    if conditions.temperature is not None:
+        coefficients = replace(coefficients, temperature=np.tile(conditions.temperature, count))
+    near = None if start is None else start.rows(np.tile(np.arange(records), count))
+    speed = np.tile(conditions.input_speed, count)
+    balance = steady_motions(coefficients, speed, load.ravel(), rig, near, effort)
+    output_torque = balance.coupling_torque
+    if rig.output_torque_at == "brake":
+        # Behind the load inertia there is no torque but that of the load, which is constant.
+        output_torque = output_torque * (np.arange(output_torque.shape[1]) == 0)
+    channels = [
+        balance.transmission_error,
+        balance.motor_torque + _driving(balance, coefficients),
+        output_torque,
+        balance.lead,
+    ]
+    lines = _lines(balance, channels, orders, believed.ratio, conditions)
+    means = np.array([channel[:, 0].real for channel in channels])
+    phasors = lines.reshape(count, records, len(CHANNELS), len(orders))
+    mean = means.T.reshape(count, records, len(CHANNELS))
+    _read(believed.ratio, conditions, orders, values, present, mean, phasors)
+    return Prediction(mean, phasors, balance)
+
+
+def _joined(
+    parts: Sequence[Prediction], places: Sequence[NDArray[np.int_]], records: int
+) -> Prediction:
+    """Return predictions of several groups of vectors as one, in the order of their places."""
+    order = np.argsort(np.concatenate(places))
+    mean = np.concatenate([one.mean for one in parts])[order]
+    phasors = np.concatenate([one.phasors for one in parts])[order]
+    cases = [np.add.outer(records * rows, np.arange(records)).ravel() for rows in places]
+    return Prediction(mean, phasors, merged([one.balance for one in parts], cases))
+
+
+def coefficients_of(
+    believed: BelievedDrive,
+    values: dict[str, NDArray[np.float64]],
+    effects: Sequence[DriveEffect],
+    records: int,
+) -> Coefficients:
+    """Return the coefficients of all rows, vectors outermost, with all effects; believed first."""
+    rows = {name: np.repeat(values[name], records) for name in MECHANICAL}
+    lines = [
+        sine_phasor(values[f"error_amplitude_{line}"], values[f"error_phase_{line}"])
+        for line in range(len(believed.error_orders))
+    ]
+    coefficients = Coefficients(
+        ratio=believed.ratio,
+        input_speed=0.0,
+        load_torque=0.0,
+        stiffness=rows["stiffness"],
+        damping=rows["damping"],
+        stiffness_depth=0.0,
+        stiffness_phase=0.0,
+        input_inertia=rows["input_inertia"],
+        input_damping=rows["input_damping"],
+        output_inertia=believed.output_inertia + rows["load_inertia"],
+        output_damping=rows["output_damping"],
+        error_orders=np.array(believed.error_orders),
+        error_phasors=np.repeat(np.array(lines).T, records, axis=0),
+        load_inertia=rows["load_inertia"],
+    )
+    for effect in effects:
+        coefficients = effect.apply(coefficients)
+    return coefficients
+
+
+def _lines(
+    balance: SteadyMotion,
+    channels: Sequence[NDArray[np.complex128]],
+    orders: Sequence[float],
+    ratio: float,
+    conditions: Conditions,
+) -> NDArray[np.complex128]:
+    """Return the phasors of all channels at analysed orders, (n, 4, m), records innermost.
+
+    A case that has diverged is NaN in all its harmonics, and so at all orders.
+    """
+    kept = tuple(balance.torus.orders.tolist())
+    angle, travel = (
+        np.zeros(len(conditions)) if one is None else one
+        for one in (conditions.input_angle, conditions.travel)
+    )
+    read = _readings(kept, tuple(orders), ratio)
+    lines = np.stack([one[:, read.columns] for one in channels], axis=1)
+    np.conjugate(lines, out=lines, where=read.conjugate)
+    if read.beyond.any():
+        turned, passed = (np.outer(one, read.beyond) for one in (angle, travel))
+        seen = np.exp(1j * turned) * np.sinc(passed / (2.0 * np.pi))
+        lines *= np.tile(seen, (len(lines) // len(seen), 1))[:, None]
+    return np.asarray(lines @ read.places)
+
+
+class _Readings(NamedTuple):
+    """Harmonics (k,) that are read: their columns, whether conjugate, and the orders beyond.
+
+    ``places`` (k, m) is one where a harmonic is read at an analysed order.
+    """
+
+    columns: NDArray[np.int_]
+    conjugate: NDArray[np.bool_]
+    beyond: NDArray[np.float64]
+    places: NDArray[np.float64]
+
+
+@lru_cache(maxsize=64)
+def _readings(kept: tuple[float, ...], orders: tuple[float, ...], ratio: float) -> _Readings:
+    """Return which lines are read where.
+
+    A line is read at its own order, or at the nearest one that a record of one output turn cannot
+    tell from it: errors of orders 2 and 2.02 beat at 0.02, which is 2/101 there. Over a longer
+    record it turns against that order, and the less of it is seen. Lines as near to zero as that
+    are in no analysed line, and drift in a record.
+    """
+    kept_orders = np.array(kept)
+    nearest = np.abs(np.subtract.outer(np.abs(kept_orders), orders)).argmin(axis=1)
+    beyond = np.abs(kept_orders) - np.take(orders, nearest)
+    columns = np.flatnonzero(np.abs(beyond) * ratio < _UNRESOLVED)
+    beyond = np.where(np.abs(beyond) < _SAME, 0.0, beyond)[columns]
+    places = np.zeros((len(columns), len(orders)))
+    places[np.arange(len(columns)), nearest[columns]] = 1.0
+    found = _Readings(columns, kept_orders[columns] < 0.0, beyond, places)
+    for one in found:
+        one.flags.writeable = False
+    return found
+
+
+def _driving(balance: SteadyMotion, coefficients: Coefficients) -> NDArray[np.complex128]:
+    """Return the harmonics of a motor's ripple, as its torque sensor reads it; (1, n_harmonics)."""
+    total = np.zeros((1, len(balance.torus.orders)), dtype=complex)
+    for port, law in coefficients.laws:
+        for order in law.orders if port == "input" and law.drives else ():
+            column, conjugate = balance.torus.place(order)
+            total[:, column] += law.driving.conjugate() if conjugate else law.driving
+    return total
+
+
+def _read(
+    ratio: float,
+    conditions: Conditions,
+    orders: Sequence[float],
+    values: dict[str, NDArray[np.float64]],
+    effects: Sequence[DriveEffect],
+    mean: NDArray[np.float64],
+    phasors: NDArray[np.complex128],
+) -> None:
+    """Add the errors of the sensors in place: offset, drift, eccentricity, gains and zeros."""
+    mean[..., 0] += values["offset"][:, None]
+    session = Session(orders, ratio, conditions.elapsed, conditions.bends)
+    for effect in effects:
+        added = effect.reading_lines(session)
+        if added is not None:
+            mean[..., 0] -= added[0]
+            phasors[..., 0, :] -= added[1]
+    for channel, name in ((1, "input_torque"), (2, "output_torque")):
+        gain = 1.0 + values[f"{name}_gain"][:, None]
+        mean[..., channel] = gain * mean[..., channel] + values[f"{name}_zero"][:, None]
+        phasors[..., channel, :] *= gain[..., None]

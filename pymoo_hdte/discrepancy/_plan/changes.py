@@ -1,0 +1,176 @@
+"""The signatures of a drive's effects and of their rivals, from its equations."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pymoo_hdte.discrepancy._evidence.order_lines.candidates import drive_candidates
+from pymoo_hdte.discrepancy._evidence.order_lines.evidence import Data, flanks_held
+from pymoo_hdte.discrepancy._evidence.order_lines.features import MEANS
+from pymoo_hdte.discrepancy._evidence.order_lines.objective import Objective
+from pymoo_hdte.discrepancy._evidence.order_lines.sizes import Scales, port_sizes
+from pymoo_hdte.discrepancy._plan.limits import PlanLimits
+from pymoo_hdte.discrepancy._plan.signatures import Signatures
+from pymoo_hdte.discrepancy._selection.candidate import Candidate, Layout
+from pymoo_hdte.discrepancy._selection.fitting import Fit
+from pymoo_hdte.drive import DriveEffect
+from pymoo_hdte.effects.effect import effect_named, place_of
+
+Values = NDArray[np.float64]
+Change = Callable[[Sequence[DriveEffect]], Values]
+
+_STEP = 1e-3
+"""Step of difference quotients, in units of a parameter's scale."""
+_STRONGER = 5.0
+"""Multiple of its typical strength at which a rival is linearised a second time."""
+
+
+def signatures_of(data: Data, limits: PlanLimits, rated_torque: float) -> Signatures:
+    """Return the signatures of effects for the tests behind data.
+
+    Parameters
+    ----------
+    data : Data
+        Of imagined records: running ones, then sweeps.
+    limits : PlanLimits
+    rated_torque : float
+        Scale of torques where all loads are zero, N.m.
+    """
+    objective = Objective(data, ())
+    residuals, jacobian = objective.residuals(objective.start), objective.jacobian(objective.start)
+    fitted = Fit((), data.base, objective.start, residuals, jacobian)
+    change = data.response(fitted)
+    by_port: dict[str, list[Candidate]] = {}
+    for one in _candidates(data, limits, rated_torque):
+        if one.listed:
+            by_port.setdefault(_label(one.name, one.port), []).append(one)
+    wanted = _wanted(limits, by_port)
+    rivals = [
+        (
+            label,
+            [(_by_test(data, form), sided) for one in ones for form, sided in _forms(one, change)],
+        )
+        for label, ones in by_port.items()
+    ]
+    layout = Layout(data.base)
+    widths = (layout.array("upper") - layout.array("lower")) / layout.array("scale")
+    # What bounds tell counts as a uniform distribution between them, as in `Fit.covariance`.
+    known = 12.0 / widths**2 + (layout.array("scale") / layout.array("prior")) ** 2
+    found = Signatures.of(
+        list(wanted),
+        _by_test(data, [change(parts) for parts in wanted.values()]),
+        rivals,
+        np.array(_by_test(data, list(jacobian.T))),
+        known,
+    )
+    held = flanks_held(data.features, data.campaign.torque_scale, data.rules)
+    labels = {*wanted, *by_port}
+    return replace(
+        found,
+        held=np.append(held, np.ones(len(data.torsion), dtype=bool)),
+        rattling=frozenset(one for one in labels if effect_named(one.split(":")[0]).rattles),
+    )
+
+
+def _label(name: str, port: str) -> str:
+    return f"{name}:{port}"
+
+
+def _candidates(data: Data, limits: PlanLimits, rated_torque: float) -> list[Candidate]:
+    """Return candidates at the sizes that matter, lines at the orders of the stated effects."""
+    believed, features = data.campaign.believed, data.features
+    paths = [float(np.abs(one.path).max()) for one in data.torsion]
+    torque = max([float(np.abs(features.conditions.output_torque).max()), *paths])
+    torque = torque if limits.sweeps or any(limits.loads) else rated_torque
+    motor = float(np.abs(features.values[:, MEANS.index(1)]).max())
+    motor = max(motor, torque / believed.ratio)
+    braking = features.conditions.output_torque * np.sign(features.conditions.input_speed)
+    least = data.campaign.torque_scale * data.rules.least_held_load
+    scales = Scales(
+        speed=float(np.abs(features.conditions.input_speed).max()),
+        torque=torque,
+        motor_torque=motor,
+        duration=limits.session,
+        error=limits.share * torque / believed.stiffness,
+        input_torque=limits.share * motor,
+        output_torque=limits.share * torque,
+        driven=bool(braking.max() > least and braking.min() < -least),
+    )
+    seen = stated_orders(limits.effects, believed.ratio)
+    sizes = port_sizes(believed, features.orders.tolist(), seen, scales)
+    return drive_candidates(sizes, believed.effects)
+
+
+def stated_orders(effects: Sequence[DriveEffect], ratio: float) -> list[float]:
+    """Return the orders of effects in cycles per input turn."""
+    found = set()
+    for effect in effects:
+        _, port, order = place_of(effect)
+        if order is not None:
+            found.add(order / (ratio if port in ("output", "sensor") else 1.0))
+    return sorted(found)
+
+
+def _wanted(
+    limits: PlanLimits, by_port: dict[str, list[Candidate]]
+) -> dict[str, tuple[DriveEffect, ...]]:
+    """Return the effects to be found by their label; stated ones of one label act together."""
+    if not limits.effects:
+        return {
+            label: ones[0].build([one.start for one in ones[0].parameters])
+            for label, ones in by_port.items()
+        }
+    found: dict[str, tuple[DriveEffect, ...]] = {}
+    for effect in limits.effects:
+        name, port, _ = place_of(effect)
+        label = _label(name, port)
+        found[label] = (*found.get(label, ()), effect)
+    return found
+
+
+def _forms(one: Candidate, change: Change) -> list[tuple[list[Values], bool]]:
+    """Return the linearised forms of a candidate: changes, and whether the first is one-sided."""
+    if one.linear:
+        return [([change(one.build(start)) for start in one.starts], False)]
+    one_sided = one.parameters[0].lower >= 0.0
+    found = []
+    for start in (*one.starts, *_strongest(one)):
+        here = change(one.build(start))
+        changes = [here]
+        for place, parameter in enumerate(one.parameters[1:], start=1):
+            step = _STEP * parameter.scale
+            step = -step if start[place] + step > parameter.upper else step
+            moved = [value + step * (k == place) for k, value in enumerate(start)]
+            changes.append((change(one.build(moved)) - here) / _STEP)
+        found.append((changes, one_sided))
+    return found
+
+
+def _strongest(one: Candidate) -> list[tuple[float, ...]]:
+    """Return the starts of a candidate with a larger strength, where its form is another one.
+
+    A wind-up that is as soft as it may be is nearly a play.
+    """
+    most = one.parameters[0].upper
+    return [(min(_STRONGER * start[0], most), *start[1:]) for start in one.starts]
+
+
+def _by_test(data: Data, rows: Sequence[Values]) -> list[Values]:
+    """Return whitened changes as arrays of tests, (n_tests, f), padded with zeros."""
+    records, size = data.features.values.shape
+    widest = max([size, *(len(one.angle) - 1 for one in data.torsion)])
+    found = []
+    for row in rows:
+        placed = np.zeros((records + len(data.torsion), widest))
+        placed[:records, :size] = np.nan_to_num(row[: records * size]).reshape(records, size)
+        start = records * size
+        for k, points in enumerate(data.torsion):
+            length = len(points.angle) - 1
+            placed[records + k, :length] = np.nan_to_num(row[start : start + length])
+            start += length
+        found.append(placed)
+    return found

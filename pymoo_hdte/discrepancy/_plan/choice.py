@@ -1,0 +1,131 @@
+"""The smallest set of tests that separates effects: one test after the other, then fewer again."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pymoo_hdte.discrepancy._answers.separation import noncentrality_for, power
+from pymoo_hdte.discrepancy._plan.signatures import Counts, Signatures, is_rival
+from pymoo_hdte.discrepancy._selection.rules import Rules
+
+Values = NDArray[np.float64]
+
+_GAIN = 1e-9
+"""Least gain of a further test, as a share of one aim: rounding."""
+
+
+@dataclass(frozen=True, eq=False)
+class Aims:
+    """What a set of tests should reach: each effect detected, and told from each of its rivals.
+
+    Attributes
+    ----------
+    signatures : Signatures
+    rules : Rules
+        `Rules.single_effect_gain` detects an effect, `Rules.evidence_distance` separates two.
+    power : float
+        Wanted chance of each.
+    """
+
+    signatures: Signatures
+    rules: Rules
+    power: float
+
+    @property
+    def pairs(self) -> NDArray[np.bool_]:
+        """Which rivals are to be told from which effects, (n_effects, n_rivals)."""
+        signatures = self.signatures
+        found = [
+            [is_rival(one, other) for other in signatures.rivals] for one in signatures.effects
+        ]
+        return np.array(found, dtype=bool).reshape(len(found), len(signatures.rivals))
+
+    def powers(self, counts: Counts) -> tuple[Values, Values]:
+        """Return the powers of detection (n_effects,) and separation (n_effects, n_rivals).
+
+        ``counts``, shape (n_tests,), tells how often each test is made.
+        """
+        alone, beside = self.signatures.noncentralities(counts)
+        return (
+            power(alone, self.rules.single_effect_gain),
+            power(beside, self.rules.evidence_distance),
+        )
+
+    def shares(self, counts: Counts) -> Values:
+        """Return how much of what each aim needs a set of tests gives, at most 1; (n_aims,)."""
+        alone, beside = self.signatures.noncentralities(counts)
+        detected = alone / noncentrality_for(self.power, self.rules.single_effect_gain)
+        apart = beside / noncentrality_for(self.power, self.rules.evidence_distance)
+        return np.minimum(np.concatenate([detected, apart[self.pairs]]), 1.0)
+
+
+def smallest_set(aims: Aims, most: int) -> Counts:
+    """Return how often each test is made in a small set that reaches what can be reached.
+
+    Tests are added by what they contribute to the aims, and taken away again as long as every aim
+    that was reached still is. Aims that all tests, each made ``most`` times, do not reach are left
+    aside: no set of ``most`` tests reaches them. Nor are effects told from others at the cost of
+    tests, if the tests do not even show them.
+
+    Parameters
+    ----------
+    aims : Aims
+    most : int
+        Largest number of tests.
+
+    Returns
+    -------
+    ndarray of int, shape (n_tests,)
+    """
+    n_tests, n_effects = len(aims.signatures.grams), len(aims.signatures.effects)
+    owners = np.append(np.arange(n_effects), np.nonzero(aims.pairs)[0])
+    possible = aims.shares(np.full(n_tests, most)) >= 1.0
+    while True:
+        pursued = possible & possible[:n_effects][owners]
+        counts = _set_for(aims, most, pursued)
+        seen = aims.shares(counts)[:n_effects] >= 1.0
+        if not np.any(pursued[:n_effects] & ~seen):
+            return counts
+        possible[:n_effects] &= seen
+
+
+def _set_for(aims: Aims, most: int, pursued: NDArray[np.bool_]) -> Counts:
+    """Return a small set of tests for the aims that are ``pursued``, shape (n_aims,)."""
+    n_tests = len(aims.signatures.grams)
+    grown = np.zeros(n_tests, dtype=int)
+    while grown.sum() < most and not _reached(aims, grown, pursued).all():
+        here = aims.shares(grown)[pursued].sum()
+        one_more = grown + np.eye(n_tests, dtype=int)
+        gains = [aims.shares(counts)[pursued].sum() - here for counts in one_more]
+        if max(gains) <= _GAIN:
+            break
+        grown = one_more[int(np.argmax(gains))]
+    found = [_pruned(aims, grown, pursued)]
+    if not _reached(aims, found[0], pursued).all():
+        # Where tests help only together, adding one by one does not find them.
+        found.append(_pruned(aims, np.ones(n_tests, dtype=int), pursued))
+    allowed = [one for one in found if one.sum() <= most]
+    return max(allowed, key=lambda one: (_reached(aims, one, pursued).sum(), -one.sum()))
+
+
+def _reached(aims: Aims, counts: Counts, pursued: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    return (aims.shares(counts) >= 1.0)[pursued]
+
+
+def _pruned(aims: Aims, counts: Counts, pursued: NDArray[np.bool_]) -> Counts:
+    """Take tests away, the most dispensable first, while all that was reached still is."""
+    counts, reached = counts.copy(), _reached(aims, counts, pursued)
+    while counts.any():
+        left: dict[int, float] = {}
+        for test in np.flatnonzero(counts):
+            fewer = counts - np.eye(len(counts), dtype=int)[test]
+            alone, beside = aims.signatures.noncentralities(fewer)
+            if np.all(_reached(aims, fewer, pursued) >= reached):
+                left[int(test)] = float(np.log1p(alone).sum() + np.log1p(beside).sum())
+        if not left:
+            return counts
+        counts[max(left, key=lambda test: left[test])] -= 1
+    return counts

@@ -1,0 +1,282 @@
+"""A sensor whose zero changes between the records of a session.
+
+The mean transmission error follows the load; what is left of it may step once, at a change of the
+zero of an encoder, be off in one record, or drift with the temperature. It is a change of the zero
+if a step or one record, and no smooth drift, leaves hardly more than noise.
+
+The mean input torque less that of the load is friction: a level at each speed, and a share of the
+load. A record that alone departs from that, by more than its stated zero, has another zero.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import norm
+from scipy.stats import t as student
+
+from pymoo_hdte.discrepancy._records.believed import BelievedDrive, Rig
+from pymoo_hdte.discrepancy._records.cleaning.findings import RowFault
+from pymoo_hdte.discrepancy._records.line_fit import OrderLines, order_lines
+from pymoo_hdte.discrepancy._records.records import ReadingError, RunningRecord
+from pymoo_hdte.discrepancy._selection.rules import Rules
+
+Values = NDArray[np.float64]
+
+_LEAST_FREEDOM = 4
+"""Degrees of freedom that loads and a step leave; with fewer, every step fits."""
+
+_FEWEST = 2
+"""Least number of records before and after a change that stays."""
+
+_OWN = 0.1
+"""Least square of what levels leave of one record's departure: half where two share one."""
+
+_FOLLOWED = 1e-9
+"""Directions of levels that are none, as a share of the largest: of a load that never changes."""
+
+_WARMING = (0.03, 0.1, 0.3, 1.0)
+"""Time constants of drifts that are compared, in lengths of the session."""
+
+
+class _Means(NamedTuple):
+    """Mean transmission errors by rising time in the session, whitened with what explains them."""
+
+    lines: list[OrderLines]
+    values: Values
+    loads: Values
+    weights: Values
+    elapsed: Values
+
+
+class _Change(NamedTuple):
+    """A zero that differs in some successive records, and by how much, rad or N.m."""
+
+    records: slice
+    channel: str
+    size: float
+
+
+def with_one_zero(
+    records: Sequence[RunningRecord], believed: BelievedDrive, rig: Rig, rules: Rules
+) -> tuple[tuple[RunningRecord, ...], tuple[RowFault, ...]]:
+    """Return records without a zero that differs between them, and where it does.
+
+    Parameters
+    ----------
+    records : sequence of RunningRecord
+        Of one session, in any order.
+    believed : BelievedDrive
+    rig : Rig
+    rules : Rules
+
+    Returns
+    -------
+    records : tuple of RunningRecord
+        The same objects if there is no change.
+    faults : tuple of RowFault
+        At most one of a torque, in one record, and one of an encoder, in one or from it on.
+    """
+    ordered = sorted(records, key=lambda one: one.elapsed)
+    if len(ordered) < _LEAST_FREEDOM:
+        return tuple(records), ()
+    faults = []
+    for change_of in (_torque_change, _encoder_change):
+        means = _means(ordered, believed, rig)
+        change = change_of(ordered, means, believed, rig, rules)
+        if change is not None:
+            changed = ordered[change.records]
+            n_rows = sum(len(one.time) for one in changed)
+            size = (change.channel, 0, n_rows, change.size)
+            faults.append(RowFault(changed[0].name, "new zero", *size, "modelled"))
+            ordered[change.records] = [_shifted(one, change, len(changed)) for one in changed]
+    by_name = {one.name: one for one in ordered}
+    return tuple(by_name[one.name] for one in records), tuple(faults)
+
+
+def _shifted(record: RunningRecord, change: _Change, number: int) -> RunningRecord:
+    """Return a record without a change; the mean of one record alone remains uncertain by it."""
+    values = getattr(record, change.channel) - change.size
+    error = ReadingError(change.channel, abs(change.size))
+    errors = (*record.reading_errors, error) if number == 1 else record.reading_errors
+    return replace(record, **{change.channel: values}, reading_errors=errors)
+
+
+def _means(records: Sequence[RunningRecord], believed: BelievedDrive, rig: Rig) -> _Means:
+    orders = [1.0 / believed.ratio, *believed.error_orders]
+    lines = [order_lines(one, rig, believed.ratio, orders) for one in records]
+    torque = np.array([one.mean[2] for one in lines])
+    shared = rig.repeatability**2 / max(len(believed.error_orders), 1)
+    variance = shared + np.array([one.covariance[0, 0, 0] for one in lines])
+    # Every load has a level of its own, since how the torsion grows with it is not known here; but
+    # small deviations of the load from what was set turn the drive by one stiffness.
+    states = [(one.load_torque, one.input_speed > 0.0) for one in records]
+    levels = np.array([[one == other for other in dict.fromkeys(states)] for one in states])
+    beside = torque - np.array([one.load_torque for one in records])
+    return _Means(
+        lines,
+        np.array([one.mean[0] for one in lines]) - torque / believed.stiffness,
+        np.column_stack([levels, beside / believed.stiffness]),
+        1.0 / np.sqrt(variance),
+        np.array([one.elapsed for one in records]),
+    )
+
+
+def _outlier(
+    records: Sequence[RunningRecord], values: Values, design: Values, weights: Values, rules: Rules
+) -> tuple[int, float] | None:
+    """Return the record whose value alone departs from the others, and by how much, or None.
+
+    From a level at each speed, beside further columns of a design (n, p). What fits nearly as well
+    is a doubt: another record, as where two share one level, or a session that warms up.
+    """
+    number = len(records)
+    speeds = np.array([one.input_speed for one in records])
+    levels = np.column_stack([speeds[:, None] == np.unique(speeds), design])
+    axes, sizes, _ = np.linalg.svd(levels * weights[:, None], full_matrices=False)
+    axes = axes[:, sizes > _FOLLOWED * sizes[0]]
+    freedom = number - axes.shape[1] - 1
+    if freedom < _LEAST_FREEDOM:
+        return None
+    left = values * weights
+    left = left - axes @ (axes.T @ left)
+    elapsed = np.array([one.elapsed for one in records])
+    constants = (float(np.ptp(elapsed)) or 1.0) * np.array(_WARMING)
+    warming = np.exp(-np.divide.outer(elapsed - elapsed[0], constants))
+    courses = np.column_stack([np.eye(number), warming * weights[:, None]])
+    courses -= axes @ (axes.T @ courses)
+    own = np.sum(courses**2, axis=0)
+    known = own > _OWN
+    gains = np.where(known, (left @ courses) ** 2 / np.where(known, own, 1.0), 0.0)
+    place = int(np.argmax(gains[:number]))
+    least = float(student.isf(rules.row_fault_chance / number / 2.0, freedom)) ** 2
+    # What is left may be more than noise, as an effect may move the mean.
+    rest = max(float(left @ left - gains[place]) / freedom, 1.0)
+    if not gains[place] - np.delete(gains, place).max() > least * rest:
+        return None
+    return place, float(left[place] / own[place] / weights[place])
+
+
+def _torque_change(
+    records: Sequence[RunningRecord],
+    means: _Means,
+    believed: BelievedDrive,
+    rig: Rig,
+    rules: Rules,
+) -> _Change | None:
+    """Return the torque whose zero differs in one record."""
+    ratio = believed.ratio
+    of_input, of_output = np.array([one.mean[1:3] for one in means.lines]).T
+    variance = np.array([one.covariance[1:3, 0, 0] @ [1.0, ratio**-2] for one in means.lines])
+    forward = np.sign([one.input_speed for one in records])
+    loads = np.column_stack([of_output, forward * np.abs(of_output)])
+    friction = of_input - of_output / ratio
+    found = _outlier(records, friction, loads, 1.0 / np.sqrt(variance), rules)
+    if found is None:
+        return None
+    place, size = found
+    channel = "input_torque"
+    turned = size * ratio / believed.stiffness
+    others = np.delete(means.values, place)[_alike(records, place)]
+    # A load that is read wrong departs from the transmission error of others, too.
+    if others.size and abs(departs := means.values[place] - np.mean(others)) > abs(
+        departs - turned
+    ):
+        channel, size = "output_torque", -size * ratio
+    stated = getattr(rig, f"{channel}_zero")
+    return _Change(slice(place, place + 1), channel, size) if abs(size) > stated else None
+
+
+def _alike(records: Sequence[RunningRecord], place: int) -> list[bool]:
+    """Return which of the other records have the load and direction of one, shape (n - 1,)."""
+    states = [(one.load_torque, one.input_speed > 0.0) for one in records]
+    return [one == states[place] for one in (*states[:place], *states[place + 1 :])]
+
+
+def places_of_change(elapsed: Values) -> NDArray[np.int_]:
+    """Return the first records after a possible change, for rising times of records (n,), s.
+
+    Not between records taken at once, nor near the ends of the session.
+    """
+    places = np.flatnonzero(np.diff(elapsed) > 0.0) + 1
+    return places[(places >= _FEWEST) & (places <= len(elapsed) - _FEWEST)]
+
+
+def _left(means: _Means, *courses: Values) -> tuple[float, float]:
+    """Return the chi-square beside loads and further courses, and the size of the last one."""
+    design = np.column_stack([means.loads, *courses]) * means.weights[:, None]
+    values = means.values * means.weights
+    sizes = np.linalg.lstsq(design, values)[0]
+    left = values - design @ sizes
+    return float(left @ left), float(sizes[-1])
+
+
+def _step(means: _Means, rules: Rules) -> tuple[int, float] | None:
+    """Return the first record after a change of the zero, and its size in rad."""
+    number, n_loads = means.loads.shape
+    freedom = number - n_loads - 1
+    if freedom < _LEAST_FREEDOM:
+        return None
+    places = places_of_change(means.elapsed)
+    if not places.size:
+        return None
+    steps = [_left(means, (np.arange(number) >= place).astype(float)) for place in places]
+    best = int(np.argmin([chi_square for chi_square, _ in steps]))
+    chi_square, size = steps[best]
+    least = float(norm.isf(rules.row_fault_chance / number / 2.0)) ** 2
+    length = float(np.ptp(means.elapsed))
+    times = means.elapsed / length
+    smooth = [_left(means, times, times**2)[0]]
+    smooth += [_left(means, np.exp(-times / constant))[0] for constant in _WARMING]
+    # What is left may be more than noise, as an effect may move the mean with the speed.
+    left = max(chi_square / freedom, 1.0)
+    clear = left < rules.contradicting_chi_square and min(smooth) - chi_square > least * left
+    return (int(places[best]), size) if clear else None
+
+
+def _encoder_change(
+    records: Sequence[RunningRecord],
+    means: _Means,
+    believed: BelievedDrive,
+    rig: Rig,
+    rules: Rules,
+) -> _Change | None:
+    """Return the encoder whose zero changes, in one record or from it on."""
+    found = _step(means, rules)
+    if found is not None:
+        place, size = found
+        where = slice(place, len(records))
+    else:
+        found = _outlier(records, means.values, means.loads, means.weights, rules)
+        if found is None:
+            return None
+        place, size = found
+        where = slice(place, place + 1)
+    speeds = np.array([one.input_speed for one in records])
+    if _is_of_input(means, believed, speeds, where, size):
+        return _Change(where, "input_angle", size * believed.ratio)
+    return _Change(where, "output_angle", -size)
+
+
+def _is_of_input(
+    means: _Means, believed: BelievedDrive, speeds: Values, where: slice, size: float
+) -> bool:
+    """Tell whether the zero of the input changed: with it all phases turn."""
+    phasors = np.array([one.phasors[0, 1:] for one in means.lines])
+    turns = np.exp(1j * np.array(believed.error_orders) * size * believed.ratio)
+    late, others = phasors[where], np.ones(len(speeds), dtype=bool)
+    others[where] = False
+    alike = others & np.isin(speeds, speeds[where])
+    usual = phasors[alike if alike.any() else others]
+
+    def apart(some: NDArray[np.complex128]) -> float:
+        middle, before = (
+            np.median(one.real, axis=0) + 1j * np.median(one.imag, axis=0) for one in (some, usual)
+        )
+        return float(np.sum(np.abs(middle - before) ** 2))
+
+    return apart(late * turns) < 0.5 * apart(late)

@@ -1,0 +1,305 @@
+"""The verdict as a document of plain types, for ``verdict.json``: SI values with their units."""
+
+from __future__ import annotations
+
+import platform
+from collections.abc import Mapping, Sequence
+from importlib.metadata import version
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pymoo_hdte.discrepancy._answers.next_test_drive import Proposal
+from pymoo_hdte.discrepancy._answers.where.map import Location
+from pymoo_hdte.discrepancy._answers.where.relevance import relevance
+from pymoo_hdte.discrepancy._evidence.order_lines.evidence import PARTS
+from pymoo_hdte.discrepancy._evidence.order_lines.parameters import base_unit, labels_by_order
+from pymoo_hdte.discrepancy._selection.candidate import Candidate, labels_apart
+from pymoo_hdte.discrepancy._selection.fitting import Fit
+from pymoo_hdte.discrepancy._selection.hypothesis import (
+    Hypothesis,
+    adequate,
+    expected_values,
+    label_of,
+)
+from pymoo_hdte.discrepancy._selection.rules import Rules
+from pymoo_hdte.discrepancy._selection.verdict import Verdict
+from pymoo_hdte.discrepancy._verdicts.drive_finding import DriveFinding
+from pymoo_hdte.discrepancy._verdicts.stated_sensors import scale_error, shares_scale
+from pymoo_hdte.effects.sentence_blanks import joined_sentences
+from pymoo_hdte.effects.unknowns import HARMONIC_NAMES, Parameter, line_with_variance
+
+SCHEMA_VERSION = 1
+"""Version of ``verdict.json``: raised when a field is removed or changes name, type or meaning."""
+
+_DEVIATIONS = 1.959964
+"""Half-width of a central 95 % interval of a normal value, in standard deviations."""
+
+
+def verdict_document(
+    finding: DriveFinding,
+    location: Location,
+    held_out: Mapping[str, Any] | None,
+    proposal: Proposal,
+) -> dict[str, Any]:
+    """Return the verdict with its evidence, as types that `json.dumps` accepts.
+
+    Parameters
+    ----------
+    finding : DriveFinding
+    location : Location
+    held_out : mapping or None
+        ``before``, ``after``, ``noise_floor``, ``unit`` and more, of plain types; None where no
+        record was held out.
+    proposal : Proposal
+    """
+    verdict = finding.verdict
+    matters, orders = relevance(finding, location), finding.campaign.believed.error_orders
+    absent = {"reason": "no held-out record can be predicted, so that nothing can be proved"}
+    return {
+        "schema_version": SCHEMA_VERSION,
+        "campaign": finding.campaign.title,
+        "status": verdict.status,
+        "sentence": sentence(verdict, orders),
+        "probability": verdict.probability,
+        "doubts": [labels_by_order(one, orders) for one in verdict.doubts],
+        "effects": effects_of(verdict),
+        "relevance": None if matters is None else matters.as_dict(),
+        "alternatives": _alternatives(verdict),
+        "base": {
+            "chi_square": verdict.base.chi_square,
+            "degrees_of_freedom": verdict.degrees_of_freedom,
+            "parameters": base_parameters(verdict.accepted, verdict.rules),
+        },
+        "residual_over_noise": residual_of_parts(finding),
+        **with_believed_effects([one.to_dict() for one in finding.campaign.believed.effects]),
+        "held_out": absent if held_out is None else dict(held_out),
+        "next_experiment": proposal.as_dict(),
+        "location": location.summary(),
+        **finding.rows.as_dict(),
+        "versions": {
+            "python": platform.python_version(),
+            **{name: version(name) for name in ("pymoo-hdte", "numpy", "scipy", "numba")},
+        },
+    }
+
+
+def with_believed_effects(effects: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """Return the field ``believed_effects``, of plain types, if there are any."""
+    return {"believed_effects": [dict(effect) for effect in effects]} if effects else {}
+
+
+def believed_in_words(document: Mapping[str, Any]) -> list[str]:
+    """Return the believed effects of a verdict's document, each with its numbers."""
+    found = []
+    for effect in document.get("believed_effects", ()):
+        parts = [
+            f"{name} {value['value']:.4g} {value['unit']}"
+            if isinstance(value, Mapping)
+            else f"{name} {value:.4g}"
+            for name, value in effect.items()
+            if name not in ("name", "port")
+        ]
+        where = f" ({effect['port']})" if "port" in effect else ""
+        found.append(f"{effect['name']}{where}: {', '.join(parts)}".replace("_", " "))
+    return found
+
+
+def sentence(verdict: Verdict, error_orders: Sequence[float] = ()) -> str:
+    """Return the verdict in words; lines of the static error of a drive by their orders."""
+    chosen = verdict.chosen
+    if verdict.status == "adequate":
+        return "Nothing is missing: the believed drive explains the records within its tolerances."
+    if chosen is None:
+        return "Something is missing that no known effect explains."
+    what = joined_sentences([candidate.sentence for candidate in chosen.candidates])
+    if not chosen.listed:
+        return f"Something is missing that is none of the known effects. {what}"
+    if verdict.status == "unlisted":
+        missing = "Something is missing that no known effect explains"
+        if not verdict.comes_near:
+            return f"{missing}, not even half of it."
+        return f"{missing}. The nearest is {labels_by_order(chosen.label, error_orders)}."
+    if verdict.status == "class" and verdict.equivalent:
+        what = f"{what} {_or_else([chosen, *verdict.equivalent], error_orders)}"
+    if verdict.doubts:
+        doubts = labels_by_order("; ".join(verdict.doubts), error_orders)
+        return f"{what} That is not all, or not quite right: {doubts}."
+    return what
+
+
+def _or_else(sets: Sequence[Hypothesis], error_orders: Sequence[float]) -> str:
+    """Return in words what the sets of a class say beside the first; what all share is left out.
+
+    A part of the first is told with it because it leaves doubts alone.
+    """
+    labels = labels_apart([one.candidates for one in sets])
+    first, *others = (labels_by_order(one, error_orders) for one in labels)
+    place = "" if labels[0] == sets[0].label else f", in place of {first}"
+    whole = label_of(sets[0].candidates)
+    alone = [" alone, which leaves doubts" * (label_of(one.candidates) < whole) for one in sets[1:]]
+    listed = "; or ".join(one + how for one, how in zip(others, alone, strict=True))
+    return f"Or, which these data cannot tell from it{place}: {listed}."
+
+
+def residual_of_parts(finding: DriveFinding) -> dict[str, dict[str, float]]:
+    """Return for each part of the data how large misfits are, in multiples of the noise.
+
+    Root mean squares of the residuals of the believed drive and of the accepted model; the noise
+    is that of the sensors and of the repeatability of the static error.
+    """
+    found = {}
+    fits = {"before": finding.verdict.base, "after": finding.verdict.accepted}
+    sizes = {}
+    for when, fitted in fits.items():
+        excess = finding.data.excess(fitted)
+        degrees_of_freedom = excess.degrees_of_freedom.sum(axis=0)
+        ratio = excess.of_parts / np.maximum(degrees_of_freedom, 1.0) + 1.0
+        sizes[when] = np.where(degrees_of_freedom > 0.0, np.sqrt(np.maximum(ratio, 0.0)), np.nan)
+    for place, part in enumerate(PARTS):
+        if np.isfinite(sizes["before"][place]):
+            found[part] = {when: float(size[place]) for when, size in sizes.items()}
+    return found
+
+
+def effects_of(verdict: Verdict) -> list[dict[str, Any]]:
+    """Return the accepted effects; none unless the verdict names or classes them."""
+    fitted, found = verdict.accepted, []
+    for candidate, place in fitted.places:
+        rows, accuracy = range(place.start, place.stop), _accuracy(candidate, verdict)
+        bounded = [fitted.parameters[row].name for row in rows if fitted.bound_sides[row] != 0.0]
+        found.append(
+            {
+                "name": candidate.name,
+                "port": candidate.port,
+                "order": candidate.order,
+                "sentence": candidate.sentence,
+                "parameters": _parameters(candidate, fitted, rows, verdict.rules, accuracy),
+                "at_bound": bounded,
+                "explained": verdict.chosen.explained if verdict.chosen else None,
+            }
+        )
+    return found
+
+
+def _accuracy(candidate: Candidate, verdict: Verdict) -> float:
+    """Return how closely the values of an effect are known at best, as a relative half-width.
+
+    No closer than the model predicts the effect. And where a law of no exact form leaves more than
+    noise, the real law has another form: a standard deviation of its values is the share that it
+    leaves of the misfit's amplitude, beyond what may be noise. It counts up to what the form of a
+    curve may leave: an effect that explains less is named in part, and what is told is its size.
+    """
+    rules, chosen, freedom = verdict.rules, verdict.chosen, verdict.degrees_of_freedom
+    accuracy = rules.model_accuracy if candidate.remembers else rules.exact_model_accuracy
+    if chosen is None or candidate.exact or not verdict.leaves_more_than_noise:
+        return accuracy
+    beyond = chosen.fit.chi_square - adequate(freedom, rules) * freedom
+    left = min(beyond / (verdict.base.chi_square - freedom), 1.0 - rules.explained_share)
+    return float(np.hypot(accuracy, _DEVIATIONS * np.sqrt(left)))
+
+
+def _parameters(
+    candidate: Candidate, fitted: Fit, rows: Sequence[int], rules: Rules, accuracy: float
+) -> dict[str, Any]:
+    """Return values with intervals; cosine and sine part as amplitude and phase.
+
+    No value is told more closely than to a relative ``accuracy``, however little noise there is.
+
+    Torques, and what is found from them, are known no closer than the scale of their sensors.
+
+    For a base parameter out of tolerance, its fitted value.
+
+    The phase is that of amplitude cos(order theta_in + phase), in the direction of the part fitted.
+    """
+    found: dict[str, Any] = {}
+    if candidate.frees is not None:
+        rows = [[one.name for one in fitted.parameters].index(candidate.frees)]
+    values, scale = expected_values(fitted, rules), scale_error(fitted, rules)
+    for row in rows:
+        one = fitted.parameters[row]
+        shared = scale if shares_scale(_unit(candidate, one.line or one.name)) else 0.0
+        if one.begins_line:
+            pair = np.array([row, row + 1])
+            own = (accuracy * np.hypot(*values[pair]) / _DEVIATIONS) ** 2 * np.eye(2)
+            own += (shared / _DEVIATIONS) ** 2 * np.outer(values[pair], values[pair])
+            covariance = fitted.covariance[np.ix_(pair, pair)] + own
+            found |= _line(one.line, candidate, values[pair], covariance)
+        elif not one.line:
+            own = float(np.hypot(accuracy, shared) * values[row] / _DEVIATIONS) ** 2
+            variance = fitted.covariance[row, row] + own
+            # A time or a torsion of a law is above zero, however little the data say of it.
+            least = 0.0 if one.lower > 0.0 else -np.inf
+            found[one.name] = quantity(values[row], variance, _unit(candidate, one.name), least)
+    return found
+
+
+def _unit(candidate: Candidate, name: str) -> str:
+    return base_unit(name) if candidate.unit is None else candidate.unit(name)
+
+
+def _line(
+    name: str, candidate: Candidate, parts: NDArray[np.float64], covariance: NDArray[np.float64]
+) -> dict[str, Any]:
+    """Return amplitude and phase of a line, with intervals, from its cosine and sine parts."""
+    cosine, sine = parts
+    amplitude, phase = line_with_variance(cosine, sine, covariance)
+    prefix = next(one for one in reversed(HARMONIC_NAMES) if name.startswith(one))
+    return {
+        name: quantity(*amplitude, _unit(candidate, name)),
+        f"{prefix}phase": quantity(*phase, _unit(candidate, "phase")),
+    }
+
+
+def quantity(value: float, variance: float, unit: str, least: float = -np.inf) -> dict[str, Any]:
+    """Return a value with its unit and its 95 % interval, which begins at ``least`` or above."""
+    half = _DEVIATIONS * float(np.sqrt(max(variance, 0.0)))
+    return {
+        "value": float(value),
+        "unit": unit,
+        "interval95": [max(float(value) - half, least), float(value) + half],
+    }
+
+
+def base_parameters(fitted: Fit, rules: Rules) -> dict[str, Any]:
+    """Return the base values of a fit with units, intervals and whether they ended at a bound."""
+    found, scale = {}, scale_error(fitted, rules)
+    for row, parameter in enumerate(fitted.parameters[: fitted.n_base]):
+        value, unit = fitted.values[row], base_unit(parameter.name)
+        shared = scale * value / _DEVIATIONS if shares_scale(unit) else 0.0
+        entry = quantity(value, fitted.covariance[row, row] + shared**2, unit)
+        entry["interval95"] = _within_bounds(parameter, entry["interval95"], rules)
+        found[parameter.name] = entry | {"at_bound": parameter.name in fitted.at_bounds}
+    return found
+
+
+def _within_bounds(parameter: Parameter, interval: list[float], rules: Rules) -> list[float]:
+    """Return an interval clipped to the bounds; all between them if it is nearly as wide."""
+    lower, upper = parameter.lower, parameter.upper
+    if interval[1] - interval[0] > rules.undetermined_share * (upper - lower):
+        return [lower, upper]
+    return [max(interval[0], lower), min(interval[1], upper)]
+
+
+def _alternatives(verdict: Verdict) -> list[dict[str, Any]]:
+    """Return the other sets of effects with their evidence, by rising BIC."""
+    chosen = verdict.chosen
+
+    def evidence(hypothesis: Hypothesis) -> dict[str, Any]:
+        return {
+            "effects": [
+                {"name": one.name, "port": one.port, "order": one.order}
+                for one in hypothesis.candidates
+            ],
+            "bic": hypothesis.bic,
+            "bic_gap": hypothesis.bic - chosen.bic if chosen else None,
+            "chi_square": hypothesis.fit.chi_square,
+            "explained": hypothesis.explained,
+            "at_bound": list(hypothesis.fit.at_bounds),
+            "equivalent": verdict.is_equivalent(hypothesis),
+        }
+
+    return [
+        evidence(hypothesis) for hypothesis in sorted(verdict.alternatives, key=lambda one: one.bic)
+    ]

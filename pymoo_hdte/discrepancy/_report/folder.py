@@ -1,0 +1,32 @@
+"""The folder of a report on a verdict."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from pymoo_hdte._reports.folder import ReportFolder
+from pymoo_hdte.discrepancy._answers.revision_drive import MODEL_FILE, SHEET_FILE
+
+FOLDER = ReportFolder("verdict.json", optional=(MODEL_FILE, SHEET_FILE))
+
+
+def check_report_folder(out: str | Path) -> None:
+    """Refuse a folder that cannot take a report, before the analysis is run.
+
+    Parameters
+    ----------
+    out : str or Path
+        New, empty, or an earlier report, which `report` replaces.
+
+    Raises
+    ------
+    InvalidInput
+        If the folder holds anything else.
+    OSError
+        If it cannot be written.
+
+    Examples
+    --------
+    >>> check_report_folder("a_new_folder")
+    """
+    FOLDER.check(Path(out))

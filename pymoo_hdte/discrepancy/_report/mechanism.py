@@ -1,0 +1,182 @@
+"""The report on measured records: verdict, revised model and a page, all or nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pymoo_hdte._reports.figures import data_uri
+from pymoo_hdte._reports.html import number, page, percent
+from pymoo_hdte.discrepancy._answers.next_test_mechanism import NextTest
+from pymoo_hdte.discrepancy._answers.revision_mechanism import MODEL_FILE, revised_mechanism
+from pymoo_hdte.discrepancy._records.rig_model import model_text
+from pymoo_hdte.discrepancy._report.certainty import how_sure_of_records
+from pymoo_hdte.discrepancy._report.document import believed_in_words
+from pymoo_hdte.discrepancy._report.folder import FOLDER
+from pymoo_hdte.discrepancy._report.mechanism_document import evidence, mechanism_verdict_document
+from pymoo_hdte.discrepancy._report.mechanism_figures import gaps as gaps_figure
+from pymoo_hdte.discrepancy._report.mechanism_figures import (
+    misfit_over_frequency,
+    misfit_over_motion,
+    overlay,
+)
+from pymoo_hdte.discrepancy._report.tables import STATUSES
+from pymoo_hdte.discrepancy._report.torsion import torsion_document, torsion_picture
+from pymoo_hdte.discrepancy._verdicts.joint import JointFinding, revised_joint
+from pymoo_hdte.discrepancy._verdicts.mechanism_finding import MechanismFinding
+from pymoo_hdte.discrepancy._verdicts.validation_mechanism import MeasuredGap
+
+_SIZES = 5
+"""Parameters on the first screen."""
+
+
+def write_mechanism_report(
+    title: str,
+    finding: MechanismFinding,
+    gaps: Sequence[MeasuredGap],
+    test: NextTest,
+    out: str | Path,
+    joint: JointFinding | None = None,
+) -> dict[str, Any]:
+    """Write a report with verdict and revised model; return the verdict's document.
+
+    Parameters
+    ----------
+    title : str
+    finding : MechanismFinding
+    gaps : sequence of MeasuredGap
+        Of the held-out records.
+    test : NextTest
+    out : str or Path
+        New, empty, or an earlier report, which is replaced.
+    joint : JointFinding, optional
+        Of a joint with two encoders, ``finding`` being on its torques.
+
+    Returns
+    -------
+    dict
+        What ``verdict.json`` holds.
+
+    Raises
+    ------
+    InvalidInput
+        If ``out`` holds anything else.
+    OSError
+        If it cannot be written.
+    """
+    FOLDER.check(Path(out))
+    document = mechanism_verdict_document(title, finding, gaps, test)
+    document["revised_model"] = {"file": MODEL_FILE}
+    document["gap_sentence"] = proof_sentence(finding, gaps)
+    revised = revised_mechanism(title, finding)
+    if joint is not None:
+        revised = revised_joint(title, joint)
+        torsion = torsion_document(joint)
+        words = f"Torques: {document['sentence']} Torsion: {torsion['sentence']}"
+        document |= {"status": joint.status, "sentence": words, "torsion": torsion}
+        document["location"]["sentence"] += f" {torsion['location']}"
+    page_text = _page(finding, document, gaps, joint)
+    FOLDER.write(Path(out), page_text, document, {MODEL_FILE: model_text(revised)})
+    return document
+
+
+def _page(
+    finding: MechanismFinding,
+    document: dict[str, Any],
+    gaps: Sequence[MeasuredGap],
+    joint: JointFinding | None,
+) -> str:
+    pictures = {
+        "torsion": data_uri(torsion_picture(joint)) if joint else "",
+        "motion": data_uri(misfit_over_motion(finding)),
+        "frequency": data_uri(misfit_over_frequency(finding)),
+        "gaps": data_uri(gaps_figure(gaps)) if gaps else "",
+    }
+    rows = _effect_rows(document["effects"])
+    sizes = [row for row in rows if not row["parameter"].endswith("phase")]
+    shown = _shown(gaps)
+    pictures["overlay"] = data_uri(overlay(finding, shown)) if shown else ""
+    chosen = finding.verdict.chosen
+    compared = [evidence(finding, chosen)] if chosen else []
+    return page(
+        "pymoo_hdte.discrepancy._report",
+        "mechanism.html.j2",
+        document=document,
+        status=STATUSES[document["status"]],
+        torsion=document.get("torsion"),
+        torsion_rows=_effect_rows(document["torsion"]["effects"]) if joint else [],
+        rows=rows,
+        sizes=sizes[:_SIZES],
+        more=len(sizes) > _SIZES,
+        gaps=gaps,
+        shown=shown,
+        pictures=pictures,
+        certainty=how_sure_of_records(finding),
+        compared=[*compared, *document["alternatives"]],
+        extent_sentence=extent_sentence(gaps),
+        believed_effects=believed_in_words(document),
+        believed={name: one.value for name, one in finding.mechanism.quantities.items()},
+    )
+
+
+def _shown(gaps: Sequence[MeasuredGap]) -> MeasuredGap | None:
+    """Return the gap to be drawn over time: of a simulation that did not diverge, if any."""
+    drawn = [gap for gap in gaps if np.isfinite(gap.before) and np.isfinite(gap.after)]
+    return max(drawn, key=lambda gap: (gap.kind == "simulation", gap.before), default=None)
+
+
+def proof_sentence(finding: MechanismFinding, gaps: Sequence[MeasuredGap]) -> str:
+    """Return in words the effect of the correction on records that were not fitted."""
+    if not gaps:
+        return "No record was held out, so that nothing can be proved."
+    if not finding.accepted.candidates:
+        words = [f"{gap.quantity} by {gap.kind}: {gap.after:.3g} {gap.unit}" for gap in gaps]
+        return f"Nothing was added; the model is off by {', '.join(words)}. {extent_sentence(gaps)}"
+    words = []
+    for kind in ("simulation", "balance"):
+        for quantity in dict.fromkeys(gap.quantity for gap in gaps if gap.kind == kind):
+            of_it = [gap for gap in gaps if (gap.kind, gap.quantity) == (kind, quantity)]
+            before, after = (
+                float(np.sqrt(np.mean([getattr(gap, one) ** 2 for gap in of_it])))
+                for one in ("before", "after")
+            )
+            change, unit = _change(before, after), of_it[0].unit
+            words.append(
+                f"{quantity} by {kind} {change} from {number(before)} to {number(after)} {unit}"
+            )
+    return f"Root mean square errors, before and after: {'; '.join(words)}. {extent_sentence(gaps)}"
+
+
+def extent_sentence(gaps: Sequence[MeasuredGap]) -> str:
+    """Return in words how much of the held-out records was simulated."""
+    of_records = {gap.record: gap.extent for gap in gaps if gap.extent is not None}
+    words = [
+        f"{extent.windows} of {extent.room} windows of {extent.length:.3g} s in {record}"
+        for record, extent in of_records.items()
+    ]
+    return f"Simulated, each from its measured state: {', '.join(words)}."
+
+
+def _change(before: float, after: float) -> str:
+    if not np.isfinite(before + after):
+        return "diverges for one of the models,"
+    return f"falls by {percent(1.0 - after / before)}" if after < before else "does not fall,"
+
+
+def _effect_rows(effects: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
+    return [
+        {
+            "effect": f"{one['name'].replace('_', ' ')} ({one['port']})",
+            "parameter": name.replace("_", " "),
+            "value": parameter["value"],
+            "lower": parameter["interval95"][0],
+            "upper": parameter["interval95"][1],
+            "at_bound": parameter["at_bound"],
+            "unit": "" if parameter["unit"] == "1" else parameter["unit"],
+        }
+        for one in effects
+        for name, parameter in one["parameters"].items()
+    ]

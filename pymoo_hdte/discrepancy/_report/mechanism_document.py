@@ -1,0 +1,226 @@
+"""``verdict.json`` of measured records, and the sentences of their report."""
+
+from __future__ import annotations
+
+import platform
+from collections.abc import Sequence
+from importlib.metadata import version
+from typing import Any
+
+import numpy as np
+
+from pymoo_hdte._reports.html import number, percent
+from pymoo_hdte.discrepancy._answers.next_test_mechanism import NextTest
+from pymoo_hdte.discrepancy._answers.where.balances import locate_in_mechanism
+from pymoo_hdte.discrepancy._evidence.force_balances.candidates import turns_back
+from pymoo_hdte.discrepancy._report.document import SCHEMA_VERSION, sentence, with_believed_effects
+from pymoo_hdte.discrepancy._report.mechanism_values import effects, quantities, ripples
+from pymoo_hdte.discrepancy._selection.hypothesis import Hypothesis, label_of
+from pymoo_hdte.discrepancy._verdicts.mechanism_finding import MechanismFinding
+from pymoo_hdte.discrepancy._verdicts.validation_mechanism import (
+    MeasuredGap,
+    not_proven,
+    rests_told,
+)
+from pymoo_hdte.effects.effect import effect_named
+from pymoo_hdte.effects.sentence_blanks import in_words
+from pymoo_hdte.mechanism.quantity_units import unit_of
+from pymoo_hdte.mechanism.resampling import share_beyond
+
+
+def mechanism_verdict_document(
+    title: str, finding: MechanismFinding, gaps: Sequence[MeasuredGap], test: NextTest
+) -> dict[str, Any]:
+    """Return the verdict as plain types.
+
+    Parameters
+    ----------
+    title : str
+    finding : MechanismFinding
+    gaps : sequence of MeasuredGap
+        Of held-out records; empty where there are none.
+    test : NextTest
+    """
+    verdict = finding.verdict
+    return {
+        "schema_version": SCHEMA_VERSION,
+        "campaign": title,
+        "status": verdict.status,
+        "sentence": _sentence(finding),
+        "effects": [*effects(finding), *ripples(finding)],
+        "offered": offered(finding),
+        "alternatives": [
+            evidence(finding, one) for one in sorted(verdict.alternatives, key=_by_bic)
+        ],
+        "base": quantities(finding),
+        **with_believed_effects(
+            [
+                {"name": one.name, "port": one.port, **effect_named(one.name).numbers_of(one.law)}
+                for one in finding.believed
+            ]
+        ),
+        "band": band(finding),
+        "location": locate_in_mechanism(finding).summary(),
+        "remainder": remainder(finding),
+        "limits": limits(finding),
+        "record_remarks": record_remarks(finding),
+        "held_out": [gap.as_dict() for gap in gaps]
+        or {"reason": "no record was held out, so that nothing can be proved"},
+        "next_experiment": test.as_dict(),
+        "versions": {
+            "python": platform.python_version(),
+            **{name: version(name) for name in ("pymoo-hdte", "numpy", "scipy")},
+        },
+    }
+
+
+def _sentence(finding: MechanismFinding) -> str:
+    verdict, beyond = finding.verdict, finding.ripples.sentence
+    if verdict.status == "adequate":
+        return (
+            "Nothing is missing: the believed mechanism explains the records within its tolerances."
+        )
+    if verdict.status == "named" and verdict.chosen is None:
+        return beyond
+    return f"{sentence(verdict)} {beyond}".strip()
+
+
+def offered(finding: MechanismFinding) -> list[dict[str, Any]]:
+    """Return further effects beside the named ones for which the data are weak evidence.
+
+    They improve the fit significantly, but remove too little to be named.
+    """
+    chosen, rules = finding.verdict.chosen, finding.data.rules
+    if chosen is None or finding.accepted is not chosen.fit:
+        return []
+    found, named = [], label_of(chosen.candidates)
+    for one in sorted(finding.verdict.alternatives, key=_by_bic):
+        more = [each for each in one.candidates if each.label not in named]
+        removes = 1.0 - one.fit.chi_square / chosen.fit.chi_square
+        if len(more) == 1 and named < label_of(one.candidates):
+            gain = chosen.bic - one.bic
+            if gain > rules.bic_gain and removes > rules.offered_share:
+                found.append({"name": more[0].name, "port": more[0].port, "removes": removes})
+    return found
+
+
+def remainder(finding: MechanismFinding) -> dict[str, Any]:
+    """Return the residual of the accepted model, and its share of the misfit in words."""
+    after, noise = finding.remainder, finding.sensor_noise
+    size = ", ".join(
+        f"{one:.3g} {unit_of(finding.mechanism, name)} in the {finding.data.what(name)} "
+        f"({one / max(floor, 1e-300):.2g} times the sensors' noise)"
+        for name, one, floor in zip(finding.data.names, after, noise, strict=True)
+    )
+    named = bool(finding.accepted.candidates)
+    removed = finding.share_removed if named else 0.0
+    words = f"The model leaves {size}."
+    if named:
+        residual = "What is left is" if np.all(after <= noise) else "What nobody explains is"
+        words = (
+            f"It removes {percent(removed)} of the power of the misfit beyond the sensors' "
+            f"noise. {residual} {size}."
+        )
+    return {
+        "sentence": words,
+        "share_removed": removed,
+        "left": dict(zip(finding.data.names, after.tolist(), strict=True)),
+    }
+
+
+def band(finding: MechanismFinding) -> dict[str, Any]:
+    """Return the band that is used, Hz, the largest shares of power beyond it, and a sentence.
+
+    Of the motion of a coordinate, and of a force by an input or at a sensor, in a training record;
+    but for their means.
+    """
+    mechanism, cutoff = finding.mechanism, finding.cutoff
+    read = [port.name for port in mechanism.ports if port.read]
+    of_forces = [*(one.name for one in mechanism.inputs), *read]
+
+    def largest(names: Sequence[str]) -> float:
+        shares = (
+            share_beyond(record.channels[name], record.step, cutoff)
+            for record in finding.records
+            for name in names
+            if record.role == "train"
+        )
+        return max(shares, default=0.0)
+
+    motion, force = largest(tuple(mechanism.coordinates)), largest(of_forces)
+
+    def power(share: float) -> str:
+        return "less than 0.01 %" if share < 1e-4 else f"{number(100.0 * share, 2)} %"
+
+    much = max(motion, force) > finding.data.rules.band_share
+    return {
+        "cutoff_Hz": cutoff,
+        "share_of_motion_beyond": motion,
+        "share_of_force_beyond": force,
+        "sentence": f"Model and records are compared up to {cutoff:.3g} Hz; beyond lie "
+        f"{power(motion)} of the motion's power and {power(force)} of the forces'"
+        f"{', in which only ripple is looked for' if much else ''}.",
+    }
+
+
+def limits(finding: MechanismFinding) -> list[str]:
+    """Return the limits of these records, in sentences."""
+    found = [
+        f"The {port.name} moves in one direction only: these records cannot separate Coulomb "
+        "friction from a constant force or a sensor's offset."
+        for port in finding.mechanism.ports
+        if not port.read and not turns_back(finding.data, port.name)
+    ]
+    found += rests_told(finding)
+    found += [
+        f"What force a unit of {one.name} makes is not known: masses, springs, dampers and forces "
+        f"are told in units of {one.name}. Their ratios and the kind of effect are determined, "
+        "their sizes are not."
+        for one in finding.mechanism.inputs
+        if not one.scaled
+    ]
+    found += not_proven(finding)
+    if not any(record.role == "held_out" for record in finding.records):
+        found.append("No record was held out: the correction is not proved where it was not made.")
+    if any(finding.accepted.bound_sides[: len(finding.data.base)]):
+        names = [n for n in finding.accepted.at_bounds if n in finding.mechanism.quantities]
+        if names:
+            found.append(f"At the bound of its tolerance: {', '.join(names)}.")
+    return [*found, *finding.ripples.limits]
+
+
+def record_remarks(finding: MechanismFinding) -> list[str]:
+    """Return how the rows of records were read where they could not be taken as they are."""
+    found = [
+        f"Rows of {record.name} with values that are not finite: {record.dropped}. They are left "
+        "out at the ends and interpolated inside."
+        for record in finding.records
+        if record.dropped
+    ]
+    return found + [f"{r.name}: {remark}" for r in finding.records for remark in r.remarks]
+
+
+def _by_bic(one: Hypothesis) -> float:
+    return one.bic
+
+
+def evidence(finding: MechanismFinding, one: Hypothesis) -> dict[str, Any]:
+    """Return how a set of effects compares with the chosen one."""
+    chosen = finding.verdict.chosen
+    return {
+        "effects": [{"name": c.name, "port": c.port} for c in one.candidates],
+        "label": in_words(one.label),
+        "bic_gap": one.bic - chosen.bic if chosen else None,
+        "explained": one.explained,
+        "equivalent": one in finding.verdict.equivalent,
+        "role": _role(finding, one),
+    }
+
+
+def _role(finding: MechanismFinding, one: Hypothesis) -> str:
+    chosen = finding.verdict.chosen
+    if one is chosen:
+        return "chosen"
+    if one in finding.verdict.equivalent:
+        return "as good"
+    return "richer, hardly better" if chosen and one.bic < chosen.bic else "rejected"

@@ -1,0 +1,256 @@
+"""The torsion of a joint with two encoders in ``verdict.json``, and its part of the page."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from scipy.stats import norm
+
+from pymoo_hdte._reports.figures import AFTER, BEFORE, GREY
+from pymoo_hdte.discrepancy._answers.joint_open_questions import (
+    near_by,
+    torsion_limits,
+    torsion_test,
+)
+from pymoo_hdte.discrepancy._report.document import sentence
+from pymoo_hdte.discrepancy._report.mechanism_document import evidence, offered
+from pymoo_hdte.discrepancy._report.mechanism_values import effects, quantities
+from pymoo_hdte.discrepancy._selection.candidate import Candidate
+from pymoo_hdte.discrepancy._verdicts.joint import JointFinding
+from pymoo_hdte.discrepancy._verdicts.joint_torsion import KINEMATIC, errors_of
+from pymoo_hdte.effects.sentence_blanks import in_words
+from pymoo_hdte.mechanism import LawAt
+from pymoo_hdte.units import ARCSEC
+
+_CENTRAL = float(norm.ppf(0.975))
+
+
+def torsion_document(finding: JointFinding) -> dict[str, Any]:
+    """Return the verdict on the torsion of a joint as plain types.
+
+    Parameters
+    ----------
+    finding : JointFinding
+    """
+    torsion = finding.torsion
+    alternatives = sorted(torsion.verdict.alternatives, key=lambda one: one.bic)
+    return {
+        "gear": finding.joint.gear.name,
+        "status": torsion.verdict.status,
+        "sentence": torsion_sentence(finding),
+        "effects": _effects(finding),
+        "location": _location(finding),
+        "offered": offered(torsion),
+        "alternatives": [evidence(torsion, one) for one in alternatives],
+        "not_ruled_out": [in_words(one.label) for one in near_by(finding)],
+        "base": quantities(torsion),
+        "remainder": _remainder(finding),
+        "limits": torsion_limits(finding),
+        "held_out": [
+            {
+                "record": gap.record,
+                "before_arcsec": gap.before / ARCSEC,
+                "after_arcsec": gap.after / ARCSEC,
+                "noise_floor_arcsec": gap.noise_floor / ARCSEC,
+                "before_Nm": gap.before * finding.stiffness,
+                "after_Nm": gap.after * finding.stiffness,
+                "shrinkage": gap.shrinkage,
+            }
+            for gap in finding.gaps
+        ],
+        "proof": _proof(finding),
+        "next_experiment": torsion_test(finding),
+    }
+
+
+def torsion_sentence(finding: JointFinding) -> str:
+    """Return the verdict on the torsion in words."""
+    torsion, gear = finding.torsion, finding.joint.gear.name
+    verdict = torsion.verdict
+    lines = " ".join(
+        f"The {gear} errs with its angle, order {one.words}."
+        for one, _ in errors_of(torsion.ripples)
+    )
+    if verdict.status == "adequate":
+        return f"Beside the spring of the {gear} nothing is missing."
+    if verdict.chosen is None and verdict.status == "named":
+        return lines
+    words = sentence(verdict)
+    if verdict.status == "class" and not verdict.equivalent:
+        words = f"{' '.join(one.sentence for one in verdict.accepted.candidates)} Or, which these "
+        words += "data cannot tell from it: the readings of the two encoders are apart in time."
+    return f"{words} {lines}".strip()
+
+
+def _location(finding: JointFinding) -> str:
+    torsion, gear = finding.torsion, finding.joint.gear.name
+    if torsion.verdict.status == "adequate":
+        return f"Not in the torsion of the {gear}."
+    off, noise = (
+        float(one[0]) / finding.stiffness / ARCSEC
+        for one in (torsion.base_misfit, torsion.sensor_noise)
+    )
+    return f"In the torsion of the {gear} (off by {off:.3g} arcseconds, sensors {noise:.2g})."
+
+
+def _effects(finding: JointFinding) -> list[dict[str, Any]]:
+    """Return the named effects, angles in arcseconds, with the torsion that their laws make."""
+    torsion = finding.torsion
+    found = []
+    parts = zip(
+        torsion.accepted.candidates,
+        torsion.accepted.effects_by_candidate,
+        effects(torsion),
+        strict=True,
+    )
+    for candidate, laws, entry in parts:
+        parameters = {
+            name: _shown(value, _unit(candidate, name))
+            for name, value in entry["parameters"].items()
+        }
+        # A believed value outside its tolerance is no torque of its own.
+        size = _size(finding, laws) if laws else {}
+        found.append(entry | {"parameters": parameters, **size})
+    for one, part in errors_of(torsion.ripples):
+        amplitude, variance = part.values["amplitude"]
+        line = {"value": amplitude, "interval95": _about(amplitude, variance)}
+        found.append(
+            {
+                "name": KINEMATIC,
+                "port": one.port,
+                "sentence": f"The {one.port} errs with its angle, order {one.words}.",
+                "parameters": {
+                    "order": {"value": one.order, "interval95": _about(one.order, one.variance)}
+                    | {"unit": "1", "at_bound": False},
+                    "amplitude": _shown({**line, "at_bound": False}, "arcsec"),
+                },
+                "at_bound": [],
+                "rms_arcsec": amplitude / 2.0**0.5 / ARCSEC,
+                "rms_Nm": amplitude / 2.0**0.5 * finding.stiffness,
+            }
+        )
+    return found
+
+
+def _about(value: float, variance: float) -> list[float]:
+    half = _CENTRAL * variance**0.5
+    return [value - half, value + half]
+
+
+def _unit(candidate: Candidate, name: str) -> str:
+    """Return the unit of a parameter of a candidate.
+
+    An angle of the gear is in arcseconds, a phase is not.
+    """
+    if candidate.unit is None:
+        return "SI"
+    unit = "phase" if name.endswith("phase") else candidate.unit(name)
+    return {"rad": "arcsec", "phase": "rad"}.get(unit, unit)
+
+
+def _shown(parameter: dict[str, Any], unit: str) -> dict[str, Any]:
+    """Return a parameter, which is in SI, in its unit."""
+    factor = 1.0 / ARCSEC if unit == "arcsec" else 1.0
+    ends = [factor * one for one in parameter["interval95"]]
+    return parameter | {"value": factor * parameter["value"], "interval95": ends, "unit": unit}
+
+
+def _size(finding: JointFinding, laws: tuple[LawAt, ...]) -> dict[str, float]:
+    """Return the root mean square of what effects add to the torsion, about its mean."""
+    torsion, gear = finding.torsion, finding.joint.gear.name
+    values = dict(
+        zip((one.name for one in torsion.accepted.parameters), torsion.accepted.values, strict=True)
+    )
+    power, count = 0.0, 0
+    for balance in torsion.data.spectra:
+        at = {gear: finding.stiffness}, {gear: float(values[f"zero of {gear}"])}
+        force = balance.in_time(balance.forces(laws, *at)[0])[balance.moving.whole]
+        power, count = power + float(np.sum((force - force.mean()) ** 2)), count + len(force)
+    size = (power / count) ** 0.5
+    return {"rms_Nm": size, "rms_arcsec": size / finding.stiffness / ARCSEC}
+
+
+def _remainder(finding: JointFinding) -> dict[str, Any]:
+    torsion = finding.torsion
+    (left,), (noise,) = torsion.remainder.tolist(), torsion.sensor_noise.tolist()
+    arcseconds = left / finding.stiffness / ARCSEC
+    named = bool(torsion.accepted.candidates)
+    removed = torsion.share_removed if named else 0.0
+    words = f"The model leaves {arcseconds:.3g} arcseconds of the torsion, {left:.3g} N.m"
+    if named:
+        words = f"It removes {100.0 * removed:.3g} % of the power of the misfit and leaves "
+        words += f"{arcseconds:.3g} arcseconds of the torsion, {left:.3g} N.m"
+    words += f" over its stiffness ({left / max(noise, 1e-300):.2g} times the sensors' noise)."
+    return {
+        "sentence": words,
+        "share_removed": removed,
+        "left_Nm": left,
+        "left_arcsec": arcseconds,
+    }
+
+
+def _proof(finding: JointFinding) -> str:
+    if not finding.gaps:
+        return "No record was held out, so that nothing can be proved."
+    before, after, floor = (
+        float(np.sqrt(np.mean([getattr(gap, one) ** 2 for gap in finding.gaps]))) / ARCSEC
+        for one in ("before", "after", "noise_floor")
+    )
+    measured = float(np.sqrt(np.mean([np.var(gap.measured) for gap in finding.gaps]))) / ARCSEC
+    told = f"of {measured:.3g} arcseconds that were measured; the encoders' noise is {floor:.2g}"
+    if not finding.torsion.accepted.candidates:
+        return f"Nothing was added; the held-out torsion is off by {before:.3g} {told}."
+    how = "falls" if after < before else "does not fall,"
+    return f"The error of the held-out torsion {how} from {before:.3g} to {after:.3g} {told}."
+
+
+_POINTS = 1500
+
+
+def torsion_picture(finding: JointFinding) -> Figure:
+    """Draw the torsion over the motor's torque and the angle; below, what models leave of it.
+
+    Of the records that were fitted; and, grey, of those held out.
+    """
+    torsion, gear = finding.torsion, finding.joint.gear.name
+    figure = Figure(figsize=(8.4, 4.6), layout="constrained")
+    axes = figure.subplots(2, 2, sharex="col", sharey="row", height_ratios=(3, 2))
+    fits = [(torsion.verdict.base, BEFORE, ".", "before")]
+    if torsion.accepted.candidates:
+        fits.append((torsion.accepted, AFTER, "x", "after"))
+    left = [torsion.data.coefficients(fit.residuals) for fit, *_ in fits]
+    for record, balance in enumerate(torsion.data.spectra):
+        motion, rows = balance.ports[gear], balance.record.time
+        torque = sum(
+            one.gain.value * one.acts[finding.joint.motor] * balance.record.channels[one.name]
+            for one in torsion.mechanism.inputs
+        )
+        over = np.interp(balance.time, rows, np.asarray(torque)), motion.shaft
+        stride = slice(None, None, max(1, len(balance.time) * len(torsion.data.spectra) // _POINTS))
+        for column, x in enumerate(over):
+            axes[0, column].plot(
+                x[stride], motion.position[stride] / ARCSEC, "-", color=GREY, lw=1.2,
+                label="measured" if record == 0 else None,
+            )  # fmt: skip
+            for (_, colour, marker, label), one in zip(fits, left, strict=True):
+                angle = balance.in_time(one[record][0]) / finding.stiffness / ARCSEC
+                axes[1, column].plot(
+                    x[stride], angle[stride], marker, ms=3, color=colour, alpha=0.6,
+                    label=label if record == 0 else None,
+                )  # fmt: skip
+    axes[0, 0].set_ylabel(f"torsion of {gear} [arcsec]")
+    axes[1, 0].set_ylabel("residual [arcsec]")
+    axes[1, 0].set_xlabel("torque of the motor, at the output [N.m]")
+    axes[1, 1].set_xlabel("angle [rad]")
+    for axis in axes.flat:
+        _plain(axis)
+    for row in (0, 1):
+        axes[row, 0].legend(frameon=False, fontsize=8)
+    return figure
+
+
+def _plain(axis: Axes) -> None:
+    axis.spines[["top", "right"]].set_visible(False)

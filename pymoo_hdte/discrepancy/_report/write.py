@@ -1,0 +1,232 @@
+"""The report on a campaign: verdict, revised model and a self-contained page, all or nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from pymoo_hdte._reports.figures import data_uri
+from pymoo_hdte._reports.html import number, page, percent
+from pymoo_hdte.checks import InvalidInput
+from pymoo_hdte.discrepancy._answers.next_test_drive import Proposal
+from pymoo_hdte.discrepancy._answers.revision_drive import (
+    MODEL_FILE,
+    SHEET_FILE,
+    drive_model,
+    revised_model,
+)
+from pymoo_hdte.discrepancy._answers.where.coverage import campaign_limits
+from pymoo_hdte.discrepancy._answers.where.map import Location
+from pymoo_hdte.discrepancy._records.sensor_hints import sensor_hints
+from pymoo_hdte.discrepancy._report.certainty import how_sure
+from pymoo_hdte.discrepancy._report.document import believed_in_words, verdict_document
+from pymoo_hdte.discrepancy._report.figures import (
+    gap_by_channel,
+    gap_by_order,
+    misfit_map,
+    misfit_overview,
+    optimum_fronts,
+    overlay,
+)
+from pymoo_hdte.discrepancy._report.folder import FOLDER
+from pymoo_hdte.discrepancy._report.optimum import OptimumShift
+from pymoo_hdte.discrepancy._report.tables import (
+    STATUSES,
+    effect_rows,
+    fault_rows,
+    hypothesis_rows,
+    metric_rows,
+    noise_rows,
+    parameter_rows,
+    record_rows,
+    rows_sentence,
+)
+from pymoo_hdte.discrepancy._verdicts.drive_finding import DriveFinding
+from pymoo_hdte.discrepancy._verdicts.validation_drive import Proof
+from pymoo_hdte.drive import DriveModel
+from pymoo_hdte.drive.toml_text import model_toml, sheet_toml
+
+OptimumOf = Callable[[DriveModel, DriveModel], OptimumShift]
+"""Function that returns how the robust optimum moves from one drive model to another."""
+
+
+def write_report(
+    finding: DriveFinding,
+    location: Location,
+    proof: Proof | None,
+    proposal: Proposal,
+    optimum_shift: OptimumOf,
+    out: str | Path,
+) -> dict[str, Any]:
+    """Write a report with verdict and revised model; return the verdict's document.
+
+    Parameters
+    ----------
+    finding : DriveFinding
+    location : Location
+    proof : Proof or None
+        None where no record was held out.
+    proposal : Proposal
+    optimum_shift : callable
+        Of the fitted base and the revised model; called only where an effect was added. That of
+        `pymoo_hdte.discrepancy._robust_optimum` optimises both.
+    out : str or Path
+        New, empty, or an earlier report, which is replaced. If a data sheet cannot describe the
+        drive, there is no revised model: its two files are missing and the verdict states the
+        reason.
+
+    Returns
+    -------
+    dict
+        What ``verdict.json`` holds.
+
+    Raises
+    ------
+    InvalidInput
+        If ``out`` holds anything else.
+    OSError
+        If it cannot be written.
+    """
+    FOLDER.check(Path(out))
+    document = verdict_document(
+        finding, location, None if proof is None else proof.as_dict(), proposal
+    )
+    document["limits"] = campaign_limits(finding)
+    model_files, shift = _revision(finding, optimum_shift)
+    document["revised_model"] = {"file": MODEL_FILE if model_files else None}
+    document["robust_optimum"] = _shift_document(shift)
+    document["gap_sentence"] = gap_sentence(finding, proof)
+    if hints := sensor_hints(finding.campaign):
+        document["sensor_hints"] = hints
+    html = _page(finding, location, proof, document, shift)
+    FOLDER.write(Path(out), html, document, model_files)
+    return document
+
+
+def _revision(
+    finding: DriveFinding, optimum_shift: OptimumOf
+) -> tuple[dict[str, str], OptimumShift]:
+    """Return the files of the revised model, and its effect on the robust optimum."""
+    try:
+        model = revised_model(finding)
+        before = drive_model(finding.campaign, finding.verdict.base, "before", "the fitted base")
+    except InvalidInput as error:
+        return {}, OptimumShift((), f"The revised drive is no drive model: {error}.")
+    how_to_read = f'# Read it with load_model("{MODEL_FILE}", load_datasheet("{SHEET_FILE}")).\n'
+    files = {MODEL_FILE: how_to_read + model_toml(model), SHEET_FILE: sheet_toml(model.sheet)}
+    if not finding.verdict.accepted.candidates:
+        return files, OptimumShift((), "No effect was added, so the optimum stays where it was.")
+    return files, optimum_shift(before, model)
+
+
+def _shift_document(shift: OptimumShift) -> dict[str, Any]:
+    names = ("promised", "delivered", "reached")
+    return {
+        "sentence": shift.sentence,
+        "obstacle": shift.obstacle,
+        "choices": [
+            {
+                "preference": choice.preference,
+                "distance": choice.distance,
+                "factors_before": choice.before.tolist(),
+                "factors_after": choice.after.tolist(),
+            }
+            | {f"{name}_mean_std_arcsec": getattr(choice, name).tolist() for name in names}
+            for choice in shift.choices
+        ],
+    }
+
+
+def _page(
+    finding: DriveFinding,
+    location: Location,
+    proof: Proof | None,
+    document: dict[str, Any],
+    shift: OptimumShift,
+) -> str:
+    orders = finding.campaign.believed.error_orders
+    pictures = {
+        "overview": data_uri(misfit_overview(location)),
+        "map": data_uri(misfit_map(location)),
+    }
+    if proof is not None:
+        pictures |= {
+            "channels": data_uri(gap_by_channel(proof)),
+            "orders": data_uri(gap_by_order(proof)),
+            "overlay": data_uri(overlay(proof)),
+        }
+    if shift.choices:
+        pictures["optimum"] = data_uri(optimum_fronts(shift))
+    return page(
+        "pymoo_hdte.discrepancy._report",
+        "report.html.j2",
+        campaign=finding.campaign,
+        verdict=finding.verdict,
+        document=document,
+        location=location,
+        proof=proof,
+        status=STATUSES[finding.verdict.status],
+        effects=effect_rows(document["effects"], orders),
+        certainty=how_sure(finding),
+        next_test=document["next_experiment"]["description"],
+        pictures=pictures,
+        hypotheses=hypothesis_rows(finding.verdict, orders),
+        parameters=parameter_rows(finding),
+        metrics=metric_rows(proof),
+        records=record_rows(finding.campaign, proof),
+        rows_found=" ".join(
+            [rows_sentence(finding.rows), *document.get("sensor_hints", [])]
+        ).strip(),
+        faults=fault_rows(finding.rows),
+        all_faults=len(finding.rows.faults),
+        noise=noise_rows(finding.rows),
+        shift=shift,
+        believed_effects=believed_in_words(document),
+    )
+
+
+_SHOWN = 3
+"""Most records that a sentence names."""
+
+
+def gap_sentence(finding: DriveFinding, proof: Proof | None) -> str:
+    """Return how much the gap shrank on held-out records, in words."""
+    if proof is None:
+        return "No record was held out, so nothing can be said about conditions not fitted."
+    gap = proof.channels[proof.leading]
+    records = f"{len(proof.records)} held-out record{'s' if len(proof.records) > 1 else ''}"
+    where = f"{records}, {proof.leading.replace('_', ' ')}"
+    noise = f"noise alone {number(gap.noise_floor)} {gap.unit}"
+    if not finding.verdict.accepted.candidates:
+        return f"Nothing was added. On {where}: off by {number(gap.before)} {gap.unit}, {noise}."
+    words = f"On {where}: off by {number(gap.before)} before, {number(gap.after)} after, {noise}"
+    if proof.condemns:
+        where = "there" if gap.worse else "in all channels together"
+        return f"{words}. The revised model is worse {where}: do not use it.{_worse(proof)}"
+    if gap.shrinkage is not None:
+        words += f"; {percent(min(gap.shrinkage, 1.0))} of what the noise does not explain is gone"
+    error = proof.channels["transmission_error"]
+    if error is not gap:
+        words += (
+            f". Transmission error: {number(error.before)} before, {number(error.after)} after, "
+        )
+        words += f"noise alone {number(error.noise_floor)} {error.unit}"
+    return f"{words}.{_worse(proof)}"
+
+
+def _worse(proof: Proof) -> str:
+    """Return what the correction made worse, with its numbers; nothing where nothing is worse."""
+    gaps = {name.replace("_", " "): gap for name, gap in proof.channels.items()}
+    gaps["all channels together"] = proof.overall
+    parts = [
+        f"{name} {number(gap.before)} before, {number(gap.after)} after, in {gap.unit}"
+        for name, gap in gaps.items()
+        if gap.worse
+    ]
+    records = [name for name, gap in zip(proof.records, proof.by_record, strict=True) if gap.worse]
+    if len(records) > _SHOWN:
+        parts.append(f"transmission error of {len(records)} of {len(proof.records)} records")
+    elif records:
+        parts.append(f"transmission error of {', '.join(records)}")
+    return f" Worse than before: {'; '.join(parts)}." if parts else ""

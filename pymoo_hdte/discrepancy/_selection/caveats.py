@@ -1,0 +1,192 @@
+"""What forbids to name a set of effects plainly, in words."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import permutations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import chi2, norm
+
+from pymoo_hdte.discrepancy._selection.candidate import Candidate
+from pymoo_hdte.discrepancy._selection.excess import Vote
+from pymoo_hdte.discrepancy._selection.fitted_sets import beyond_stated
+from pymoo_hdte.discrepancy._selection.fitting import Fit
+from pymoo_hdte.discrepancy._selection.hypothesis import (
+    Hypothesis,
+    bounded_unknowns,
+    expected_values,
+    explains,
+)
+from pymoo_hdte.discrepancy._selection.rules import Rules
+from pymoo_hdte.discrepancy._selection.search import Search
+
+NOT_PROVEN = "the error on the records kept out of the fit does not shrink as it should"
+
+
+def doubts_of(search: Search, chosen: Hypothesis, vote: Vote | None) -> list[str]:
+    """Return what forbids to name a set plainly, in words; nothing if it may be named."""
+    found, fitted = [], chosen.fit
+    unsure = uncertain(fitted, search.data.rules)
+    for candidate, bounded in bounded_unknowns(fitted):
+        if bounded:
+            found.append(f"{', '.join(bounded)} of {candidate.label} ended at a bound")
+        elif candidate in unsure:
+            found += holds_zero([candidate])
+    if any(one.frees in fitted.at_bounds for one in chosen.candidates):
+        found.append("a base parameter ended at ten times or a tenth of what is believed")
+    for name in _contradicted_in_any_form(search, chosen):
+        found.append(f"{name.replace('_', ' ')} ended far beyond what is stated of it")
+    curves = [one.label for one in chosen.candidates if not one.exact]
+    if not search.enough(chosen):
+        if curves and chosen.freed:
+            found.append(f"values out of tolerance may stand for what {curves[0]} leaves")
+        found += _harmonics_of_another(chosen.candidates)
+    if vote is not None and vote.denies(search.data.rules, fitted.misfit):
+        found.append(NOT_PROVEN)
+    per_degree = fitted.chi_square / search.degrees_of_freedom
+    if per_degree > search.data.rules.contradicting_chi_square:
+        found.append(left_by(per_degree))
+    return found
+
+
+def other_forms(search: Search, chosen: Hypothesis) -> list[str]:
+    """Return in words which members stand for what their listed forms do not explain.
+
+    All together where the listed forms contradict a part of the data and only others do not.
+    """
+    members = chosen.members if len(chosen.members) > 1 else []
+    found = [
+        "+".join(one.label for one in member)
+        for member in members
+        if search.forms.only_in_another(chosen, search.without(chosen, member))
+    ]
+    if not found and not explains_as_listed(search, chosen):
+        forms = search.forms
+        if forms.explains(chosen) or forms.explains_in_another(chosen):
+            found = [chosen.label]
+    return [f"{one} has to have another form to explain what is left" for one in found]
+
+
+def explains_in_any_form(search: Search, one: Hypothesis) -> bool:
+    """Tell whether a set explains the misfit, in the listed forms of its laws or in others."""
+    return explains_as_listed(search, one) or search.forms.explains(one)
+
+
+def explains_as_listed(search: Search, one: Hypothesis) -> bool:
+    """Tell whether a set explains the misfit in the listed forms of its laws."""
+    return explains(search.data, one, search.base, search.degrees_of_freedom)
+
+
+def _harmonics_of_another(candidates: Sequence[Candidate]) -> list[str]:
+    """Return in words which effects may be no more than harmonics of the form of another.
+
+    A clearance that varies once in some angle need not do so as a cosine; its harmonics look like
+    an error of their order. Effects that fit down to the noise as listed leave no such choice.
+    """
+    return [
+        f"{higher.label} may be a harmonic of {lower.label}"
+        for lower, higher in permutations(candidates, 2)
+        if not lower.exact and lower.port == higher.port and lower.name != higher.name
+        if lower.order is not None and higher.order is not None
+        if is_harmonic(higher.order, lower.order)
+    ]
+
+
+def is_harmonic(higher: float, order: float) -> bool:
+    """Tell whether an order is a multiple of a lower one."""
+    return higher > order and bool(np.isclose(higher % order, 0.0))
+
+
+def left_by(per_degree: float) -> str:
+    """Say what a chi-square per degree of freedom means."""
+    return f"what is left is {np.sqrt(per_degree):.3g} times the noise"
+
+
+def _contradicted_in_any_form(search: Search, chosen: Hypothesis) -> list[str]:
+    """Return what is `_contradicted` by a set, and not by the listed forms of its laws alone.
+
+    A friction that falls as no listed one does is fitted best with a wrong gain. If in a free form
+    of several laws all sensors are as stated and noise is left, which is so in no form without one
+    of these laws, the gain stood for their forms. One law in any form follows too much alone.
+    """
+    rules, forms = search.data.rules, search.forms
+    found = _contradicted(chosen.fit, rules)
+    if not found or len(chosen.members) < 2:
+        return found
+    free = forms.in_free_form(chosen.fit)
+    if not forms.rest_is_noise(free) or beyond_stated(free, rules).any():
+        return found
+    fewer = [search.without(chosen, one).fit for one in chosen.members]
+    every = [*fewer, *map(forms.in_free_form, fewer)]
+    return found if any(map(forms.rest_is_noise, every)) else []
+
+
+def _contradicted(fitted: Fit, rules: Rules) -> list[str]:
+    """Return what ended at a bound far beyond its stated deviation: a sensor's zero or gain.
+
+    It then takes what the effects leave, and what they are is not known.
+    """
+    far = beyond_stated(fitted, rules)
+    return [
+        one.name
+        for one, side, away in zip(fitted.parameters, fitted.bound_sides, far, strict=True)
+        if side != 0.0 and away
+    ]
+
+
+def uncertain(
+    fitted: Fit, rules: Rules, covariance: NDArray[np.float64] | None = None
+) -> list[Candidate]:
+    """Return the candidates of a fit whose strength may be nothing.
+
+    By its own covariance, or by another one that reports state, shape (n_parameters, n_parameters).
+    """
+    return [
+        one
+        for one, place in fitted.places
+        if not strength_is_certain(fitted, one, place, rules, covariance)
+    ]
+
+
+def holds_zero(candidates: Sequence[Candidate]) -> list[str]:
+    """Say that the intervals of candidates contain zero."""
+    return [f"the interval of {one.label} contains zero" for one in candidates]
+
+
+def strength_is_certain(
+    fitted: Fit,
+    candidate: Candidate,
+    place: slice,
+    rules: Rules,
+    covariance: NDArray[np.float64] | None = None,
+) -> bool:
+    """Tell whether the strength of an effect differs from nothing, by the noise of the records.
+
+    Strengths are the unknowns that may be zero, lines with both their parts; one of them is enough:
+    friction that falls with speed may have no level. Shapes, which are not zero, do not count.
+    """
+    if not candidate.parameters:
+        return True
+    values = expected_values(fitted, rules)
+    covariance = fitted.covariance if covariance is None else covariance
+    if varies(candidate, values[place], covariance[place, place], rules):
+        return True
+    for row, parameter in enumerate(candidate.parameters, place.start):
+        if parameter.lower <= 0.0 and not parameter.line:
+            deviation = np.sqrt(covariance[row, row])
+            if abs(values[row]) > rules.certain_deviations * deviation:
+                return True
+    return all(parameter.lower > 0.0 for parameter in candidate.parameters)
+
+
+def varies(
+    law: Candidate, values: NDArray[np.float64], covariance: NDArray[np.float64], rules: Rules
+) -> bool:
+    """Tell whether any line of a law differs from nothing, by values (k,) and covariance (k, k)."""
+    limit = chi2.isf(2.0 * norm.sf(rules.certain_deviations), 2)
+    return any(
+        values[pair] @ np.linalg.solve(covariance[np.ix_(pair, pair)], values[pair]) > limit
+        for pair in law.lines
+    )

@@ -1,0 +1,304 @@
+"""Hypotheses: sets of effects fitted jointly with the base, and the misfit that each explains.
+
+An effect that explains only one part of the data must not count as the cause of the others: see
+`excess`.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pymoo_hdte.discrepancy._selection.candidate import Candidate, Layout
+from pymoo_hdte.discrepancy._selection.fitting import Evidence, Fit, fit
+from pymoo_hdte.discrepancy._selection.rules import Rules
+from pymoo_hdte.discrepancy._selection.screening import Screened
+
+
+@dataclass(frozen=True, eq=False)
+class Hypothesis:
+    """A set of effects fitted jointly with the base, with its evidence.
+
+    Attributes
+    ----------
+    fit : Fit
+    bic : float
+        Chi-square + parameters x ln(residuals).
+    explained : float
+        Share of the base's excess chi-square that it removes; 1 leaves nothing but noise.
+    removed : float
+        By how much its chi-square is less than the base's.
+    """
+
+    fit: Fit
+    bic: float
+    explained: float
+    removed: float = 0.0
+
+    @property
+    def candidates(self) -> tuple[Candidate, ...]:
+        """The effects."""
+        return self.fit.candidates
+
+    @property
+    def listed(self) -> bool:
+        """Whether a verdict may name all of them."""
+        return all(candidate.listed for candidate in self.candidates)
+
+    @property
+    def exact(self) -> bool:
+        """Whether the forms of all of them are known exactly."""
+        return all(candidate.exact for candidate in self.candidates)
+
+    @property
+    def freed(self) -> tuple[Candidate, ...]:
+        """The base parameters out of tolerance among them."""
+        return tuple(each for each in self.candidates if each.frees is not None)
+
+    @property
+    def effects(self) -> tuple[Candidate, ...]:
+        """The others."""
+        return tuple(each for each in self.candidates if each.frees is None)
+
+    @property
+    def label(self) -> str:
+        """Their labels in one word."""
+        return "+".join(candidate.label for candidate in self.candidates)
+
+    @property
+    def members(self) -> list[tuple[Candidate, ...]]:
+        """The effects one by one; base parameters out of tolerance are one member together."""
+        alone = [(each,) for each in self.effects]
+        return alone + ([self.freed] if self.freed else [])
+
+    def values_of(self, kept: Sequence[Candidate]) -> NDArray[np.float64]:
+        """Return the fitted values of the base and of some of the effects, in their order here."""
+        parts = [self.fit.values[place] for one, place in self.fit.places if one in kept]
+        return np.concatenate([self.fit.values[: self.fit.n_base], *parts])
+
+    @cached_property
+    def names(self) -> frozenset[tuple[str, str]]:
+        """Name and port of each; a value out of tolerance and the effect it stands for are one."""
+        return frozenset(candidate.says for candidate in self.candidates)
+
+
+def label_of(effects: Sequence[Candidate]) -> frozenset[str]:
+    """Return what tells a set of effects from others, whatever their order."""
+    return frozenset(one.label for one in effects)
+
+
+def hypothesis_of(fitted: Fit, of_base: float) -> Hypothesis:
+    """Return a fit with its evidence, for a given excess chi-square of the base."""
+    n_base = fitted.n_base
+    unknowns = n_base + sum(candidate.unknowns for candidate in fitted.candidates)
+    bic = fitted.chi_square + unknowns * np.log(len(fitted.residuals))
+    gain = of_base + (len(fitted.residuals) - n_base) - fitted.chi_square
+    share = gain / max(of_base, gain) if gain > 0.0 else 0.0
+    return Hypothesis(fitted, float(bic), float(share), float(gain))
+
+
+def adequate(degrees_of_freedom: int, rules: Rules) -> float:
+    """Return chi-square per degree of freedom up to which a model is adequate; 1.15 for 1400."""
+    return float(1.0 + rules.false_alarm_deviations * np.sqrt(2.0 / degrees_of_freedom))
+
+
+def down_to_noise(fitted: Fit, degrees_of_freedom: int, rules: Rules) -> bool:
+    """Tell whether a fit is `adequate`."""
+    return fitted.chi_square <= adequate(degrees_of_freedom, rules) * degrees_of_freedom
+
+
+def unexplained(data: Evidence, base: Fit, fitted: Fit) -> NDArray[np.bool_]:
+    """Tell which parts of the data that contradict the base clearly contradict a fit, too.
+
+    Shape (parts,), as `Excess` has them. If there are several records, the worst is left out: it
+    may be at a resonance, where no form is exact.
+    """
+    before, after, rules = data.excess(base), data.excess(fitted), data.rules
+    worst = after.worst
+    before, after = before.without(worst), after.without(worst)
+    contradicting = rules.contradicting_chi_square - 1.0
+    plain = after.of_parts > contradicting * after.degrees_of_freedom.sum(axis=0)
+    residual = after.of_parts > (1.0 - rules.explained_part_share) * before.of_parts
+    return np.asarray(before.significant(rules) & plain & residual)
+
+
+def bounded_unknowns(fitted: Fit) -> list[tuple[Candidate, list[str]]]:
+    """Return for each candidate of a fit which of its unknowns ended at a bound.
+
+    A level that ended at zero is a part that the effect does not have, and a corner that ended as
+    sharp as points can resolve is a sharp corner.
+    """
+    found = []
+    for candidate, place in fitted.places:
+        names = []
+        for side, parameter in zip(fitted.bound_sides[place], candidate.parameters, strict=True):
+            none = parameter.linear and parameter.lower == 0.0 and side < 0.0
+            if parameter.limited_at(side) and not none:
+                names.append(parameter.name)
+        found.append((candidate, names))
+    return found
+
+
+def is_bounded(fitted: Fit) -> bool:
+    """Tell whether any unknown of the candidates of a fit ended at a bound."""
+    return any(bounded for _, bounded in bounded_unknowns(fitted))
+
+
+def expected_values(fitted: Fit, rules: Rules) -> NDArray[np.float64]:
+    """Return the values to be expected by a fit and its bounds, those around which intervals lie.
+
+    A base parameter that no record determines ends anywhere between its bounds, often at one of
+    them: to be expected is the middle. What an effect has beyond it, as an inertia beyond the
+    believed one, moves along. Shape (n_parameters,).
+    """
+    n, variance = fitted.n_base, np.diag(fitted.covariance)
+    layout = Layout(fitted.parameters)
+    lower, upper = layout.array("lower"), layout.array("upper")
+    uniform = (upper - lower) ** 2 / 12.0
+    width = 2.0 * rules.certain_deviations * np.sqrt(variance)
+    undetermined = width > rules.undetermined_share * (upper - lower)
+    undetermined[n:] = False
+    pull = np.where(undetermined, ((lower + upper) / 2.0 - fitted.values) / uniform, 0.0)
+    moved = fitted.values + fitted.covariance @ pull
+    return np.asarray(np.clip(moved, lower, upper))
+
+
+def gains_enough(one: Hypothesis, base: Fit, rules: Rules) -> bool:
+    """Tell whether a set of effects reduces the criterion of the base enough for a name."""
+    unknowns = sum(candidate.unknowns for candidate in one.candidates)
+    gain = base.chi_square - one.fit.chi_square
+    return bool(gain - unknowns * np.log(len(base.residuals)) >= rules.bic_gain)
+
+
+def explains(data: Evidence, one: Hypothesis, base: Fit, degrees_of_freedom: int) -> bool:
+    """Tell whether a set of effects explains the misfit of the base, in all parts of the data."""
+    rules, limit = data.rules, adequate(degrees_of_freedom, data.rules)
+    share = rules.exact_share if one.exact else rules.explained_share
+    limit = max(limit, rules.exact_chi_square) if one.exact else limit
+    if not gains_enough(one, base, rules):
+        return False
+    if one.fit.chi_square <= limit * degrees_of_freedom:
+        return True
+    return one.explained >= share and not unexplained(data, base, one.fit).any()
+
+
+def misfit_of(one: Hypothesis, degrees_of_freedom: int) -> float:
+    """Return chi-square per degree of freedom that a set leaves, 1 at least: the unit of gains."""
+    return max(one.fit.chi_square / degrees_of_freedom, 1.0)
+
+
+def alike(
+    one: Hypothesis,
+    chosen: Hypothesis,
+    degrees_of_freedom: int,
+    rules: Rules,
+    overlap: bool = False,
+) -> bool:
+    """Tell whether another hypothesis is indistinguishable from the chosen one with these data.
+
+    The true form of an effect may differ from the listed one. Two sets are therefore alike if what
+    one leaves beyond the other is no more than such forms leave, unless they differ by effects of
+    exact form only, or one is a special case of the other. Where even the chosen form leaves more
+    than noise, differences of chi-square are compared with this residual. Two laws at one port
+    ``overlap`` where other forms of both are known, beside the same values out of tolerance. Where
+    an effect of one stands for several base parameters of the other, the evidence alone tells. And
+    so it does where ``one`` has a form that only stands in for a listed one: the listed form is
+    compared as well, with room for its form.
+    """
+    if one.names == chosen.names:
+        return False
+    misfit = misfit_of(chosen, degrees_of_freedom)
+    near = near_by_evidence(one, chosen, degrees_of_freedom, rules)
+    if len(one.candidates) != len(chosen.candidates):
+        return near and _stands_for_parameters(one, chosen)
+    residual = chosen.fit.chi_square - degrees_of_freedom
+    if not (near or one.exact or chosen.exact or contains(one, chosen) or contains(chosen, one)):
+        further = one.fit.chi_square - chosen.fit.chi_square
+        pairs = differing(one.candidates, chosen.candidates)
+        if any(mine.only_as_form for mine, _ in pairs):
+            return False
+        same = all(mine.beside(other) for mine, other in pairs)
+        accuracy = rules.form_share if overlap and same else rules.form_accuracy
+        exact = all(mine.exact and other.exact for mine, other in pairs)
+        near = not exact and further < accuracy**2 * (chosen.removed + residual)
+    if near or misfit <= adequate(degrees_of_freedom, rules) or (one.exact and chosen.exact):
+        return near
+    return one.fit.chi_square - degrees_of_freedom < rules.form_ratio * residual
+
+
+def near_by_evidence(
+    one: Hypothesis, chosen: Hypothesis, degrees_of_freedom: int, rules: Rules
+) -> bool:
+    """Tell whether the evidence does not tell a set from the chosen one."""
+    misfit = misfit_of(chosen, degrees_of_freedom)
+    return one.fit.evidence - chosen.fit.evidence < rules.evidence_distance * misfit
+
+
+def _stands_for_parameters(one: Hypothesis, other: Hypothesis) -> bool:
+    """Tell whether two sets with effects have as many members, and different effects.
+
+    More or fewer parameters beside the same effects are no other answer.
+    """
+    mine, theirs = label_of(one.effects), label_of(other.effects)
+    return bool(mine and theirs) and mine != theirs and len(one.members) == len(other.members)
+
+
+def leave_the_same(one: Hypothesis, other: Hypothesis, rules: Rules) -> bool:
+    """Tell whether two sets explain the data so nearly alike that the same must be missing."""
+    difference = abs(one.fit.chi_square - other.fit.chi_square)
+    return difference <= rules.trial_gain * other.fit.chi_square
+
+
+def contains(one: Hypothesis, other: Hypothesis) -> bool:
+    """Tell whether a set is nested: it differs from another only by laws that contain the other's.
+
+    Stribeck's friction without its excess is Coulomb's: it always explains as much. Beside its law
+    a set may have further values out of tolerance; beside the same laws they are no other law.
+    """
+    own, others = label_of(one.freed), label_of(other.freed)
+    if len(one.effects) != len(other.effects):
+        return False
+    pairs = differing(one.effects, other.effects)
+    wider = all(wide.port == special.port and wide.holds(special) for wide, special in pairs)
+    return wider and (own == others or (bool(pairs) and own > others > set()))
+
+
+def differing(
+    mine: Sequence[Candidate], theirs: Sequence[Candidate]
+) -> list[tuple[Candidate, Candidate]]:
+    """Return in pairs the candidates by which two sets of one size differ, by their ports."""
+    shared = Counter(_places(mine)) & Counter(_places(theirs))
+    beyond = (_beyond(each, shared) for each in (mine, theirs))
+    own, other = (sorted(left, key=lambda each: each.port) for left in beyond)
+    return list(zip(own, other, strict=True))
+
+
+def _places(candidates: Sequence[Candidate]) -> list[tuple[str, str]]:
+    return [(each.name, each.port) for each in candidates]
+
+
+def _beyond(candidates: Sequence[Candidate], shared: Counter[tuple[str, str]]) -> list[Candidate]:
+    """Return the candidates beyond those that are shared; a set may have one name twice."""
+    left, rest = Counter(shared), []
+    for place, each in zip(_places(candidates), candidates, strict=True):
+        if left[place]:
+            left[place] -= 1
+        else:
+            rest.append(each)
+    return rest
+
+
+def fit_all(
+    data: Evidence, base: Fit, chosen: Sequence[Screened], excess: float
+) -> list[Hypothesis]:
+    """Fit candidates, each jointly with the given effects; by rising BIC."""
+    found = []
+    for one in chosen:
+        fitted = fit(data, (*base.candidates, one.candidate), np.append(base.values, one.start))
+        found.append(hypothesis_of(fitted, excess))
+    return sorted(found, key=lambda one: one.bic)

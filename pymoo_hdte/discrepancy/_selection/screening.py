@@ -1,0 +1,292 @@
+"""Screening: which candidates could explain a misfit, by comparing their signatures with it.
+
+The signature of a candidate is the change of the features by a typical strength of it. The part
+that base parameters can imitate is projected out; the share of the misfit along the remainder is
+what the candidate could remove, to first order, with a free strength. This is wrong for strongly
+nonlinear effects only, so that several strengths are tried and the best candidates are then fitted
+without linearisation.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import lsq_linear
+
+from pymoo_hdte.discrepancy._selection.candidate import Candidate
+from pymoo_hdte.discrepancy._selection.fitting import Evidence, Fit
+from pymoo_hdte.discrepancy._selection.rules import Rules
+from pymoo_hdte.effects.unknowns import HARMONIC_NAMES
+
+_NONE = np.empty((0, 0))
+"""No signatures, and no moves."""
+_RANK = 1e-5
+"""Share of the largest singular value from which a direction counts."""
+
+
+@dataclass(frozen=True, eq=False)
+class Screened:
+    """A candidate, what it could remove of chi-square, and where to start its fit.
+
+    Attributes
+    ----------
+    candidate : Candidate
+    reduction : float
+        Of the whole chi-square.
+    start : tuple of float
+    by_part : tuple of float
+        The same for each part of the data alone, with parameters at bounds held there; empty for a
+        parameter out of tolerance.
+    signatures : ndarray, shape (n_starts, n_residuals)
+        Change of the residuals by each of its starts; empty for a parameter out of tolerance.
+    """
+
+    candidate: Candidate
+    reduction: float
+    start: tuple[float, ...]
+    by_part: tuple[float, ...] = ()
+    signatures: NDArray[np.float64] = field(default_factory=lambda: _NONE)
+
+
+def screen(data: Evidence, fitted: Fit, candidates: Sequence[Candidate]) -> list[Screened]:
+    """Return all candidates, the most promising first.
+
+    Beside effects, parameters that ended at a bound may leave it inward: with an effect missing the
+    gain of a sensor goes to its bound, and comes back with the effect. Without effects they stay
+    there, so that noise alone removes no more than `Rules.single_effect_gain` says.
+
+    Parameters
+    ----------
+    data : Evidence
+    fitted : Fit
+        The present model, perhaps with effects, whose misfit is to be explained.
+    candidates : sequence of Candidate
+    """
+    orthonormal, residual = _beyond_parameters(fitted)
+    response, parts = data.response(fitted), data.rows_of_parts()
+    inward = _inward(fitted, orthonormal) if fitted.candidates else _NONE
+    found = []
+    for candidate in candidates:
+        if candidate.frees is not None:
+            found.append(_freed(candidate, fitted, orthonormal, residual))
+            continue
+        signatures = np.array([response(candidate.build(start)) for start in candidate.starts])
+        found.append(_screened(candidate, signatures, orthonormal, residual, parts, inward))
+    return sorted(found, key=lambda one: -one.reduction)
+
+
+def most_hopeful(
+    data: Evidence,
+    fitted: Fit,
+    others: Sequence[Candidate],
+    known: Sequence[Screened],
+    left: float,
+    ill: Sequence[tuple[int, float]],
+) -> list[Screened]:
+    """Return the effects that may remove most of what a fit leaves, in total or in a part of it.
+
+    If to first order none does in total, the best one is tried where it is promising.
+
+    Parameters
+    ----------
+    data : Evidence
+    fitted : Fit
+    others : sequence of Candidate
+        Effects.
+    known : sequence of Screened
+        The same, as screened beside another model of these data; or nothing.
+    left : float
+        Excess chi-square of the fit.
+    ill : sequence of (int, float)
+        Parts of the data that it explains ill, and their excess.
+    """
+    rules = data.rules
+    if known:
+        others = _not_far_behind(data, fitted, known, left, ill)
+    screened = screen(data, fitted, others) if others else []
+    chosen = _hopeful(screened, [one.reduction for one in screened], left, rules)
+    if not chosen:
+        chosen = [one for one in screened[:1] if one.reduction >= rules.promising_share * left]
+    for part, of_part in ill:
+        reductions = [one.by_part[part] for one in screened]
+        more = _hopeful(screened, reductions, of_part, rules)
+        chosen += [one for one in more if one not in chosen]
+    return chosen
+
+
+def _not_far_behind(
+    data: Evidence,
+    fitted: Fit,
+    known: Sequence[Screened],
+    left: float,
+    ill: Sequence[tuple[int, float]],
+) -> list[Candidate]:
+    """Return the effects that are worth a screening, which takes a prediction for each start.
+
+    Their signatures beside another fit tell without any prediction. Effects that move a resonance
+    or take contact away change them, so that only candidates that stay far behind are left out.
+    """
+    share = data.rules.promising_share * data.rules.second_hope_share
+    orthonormal, residual = _beyond_parameters(fitted)
+    parts, inward = data.rows_of_parts(), _inward(fitted, orthonormal)
+    found = (
+        _screened(one.candidate, one.signatures, orthonormal, residual, parts, inward)
+        for one in known
+    )
+    return [
+        one.candidate
+        for one in found
+        if one.reduction >= share * left
+        or any(one.by_part[part] >= share * of_part for part, of_part in ill)
+    ]
+
+
+def _hopeful(
+    screened: Sequence[Screened], reductions: Sequence[float], left: float, rules: Rules
+) -> list[Screened]:
+    """Return the best candidates, to first order, if they remove enough of what is left."""
+    order = np.argsort([-reduction for reduction in reductions], kind="stable")
+    enough = [screened[k] for k in order if reductions[k] >= rules.second_hope_share * left]
+    return varied(enough, 1)[: rules.most_seconds]
+
+
+def varied(screened: Sequence[Screened], most: int) -> list[Screened]:
+    """Return at most the ``most`` best candidates of each name."""
+    names = [one.candidate.name for one in screened]
+    return [one for k, one in enumerate(screened) if names[:k].count(names[k]) < most]
+
+
+def reduced(
+    one: Screened, orthonormal: NDArray[np.float64], residual: NDArray[np.float64]
+) -> Screened:
+    """Return a known candidate with what it could remove of another residual (n,).
+
+    What is done by other directions, orthonormal (n, k), is projected out of its signatures.
+    """
+    return _screened(one.candidate, one.signatures, orthonormal, residual, (), _NONE)
+
+
+def _beyond_parameters(fitted: Fit) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return what parameters can do, shape (n, k), orthonormal, and what they leave, (n,)."""
+    # A parameter at its bound cannot move beyond it.
+    orthonormal, _ = np.linalg.qr(fitted.jacobian[:, fitted.bound_sides == 0.0])
+    return orthonormal, fitted.residuals - orthonormal @ (orthonormal.T @ fitted.residuals)
+
+
+def _inward(fitted: Fit, orthonormal: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return what parameters at bounds do beyond the others if they leave these, shape (k, n)."""
+    bounded = fitted.bound_sides != 0.0
+    moves = -(fitted.jacobian[:, bounded] * fitted.bound_sides[bounded])
+    return np.asarray((moves - orthonormal @ (orthonormal.T @ moves)).T)
+
+
+def _screened(
+    candidate: Candidate,
+    signatures: NDArray[np.float64],
+    orthonormal: NDArray[np.float64],
+    residual: NDArray[np.float64],
+    parts: Sequence[NDArray[np.int_]],
+    inward: NDArray[np.float64],
+) -> Screened:
+    """Return what a candidate could remove, as a whole and in each part."""
+    beyond = signatures - (signatures @ orthonormal) @ orthonormal.T
+    by_part = tuple(
+        _best_start(candidate, beyond[:, rows], residual[rows], _NONE).reduction for rows in parts
+    )
+    best = _best_start(candidate, beyond, residual, inward)
+    return replace(best, by_part=by_part, signatures=signatures)
+
+
+def _freed(
+    candidate: Candidate,
+    fitted: Fit,
+    orthonormal: NDArray[np.float64],
+    residual: NDArray[np.float64],
+) -> Screened:
+    """Return the reduction by a parameter at its bound if it could go beyond."""
+    place = [parameter.name for parameter in fitted.parameters].index(str(candidate.frees))
+    signature = fitted.jacobian[:, place] * fitted.bound_sides[place]
+    signature = signature - orthonormal @ (orthonormal.T @ signature)
+    along, size = float(-signature @ residual), float(signature @ signature)
+    return Screened(candidate, along**2 / size if along > 0.0 and size > 0.0 else 0.0, ())
+
+
+def _best_start(
+    candidate: Candidate,
+    signatures: NDArray[np.float64],
+    residual: NDArray[np.float64],
+    inward: NDArray[np.float64],
+) -> Screened:
+    """Return the reduction by the candidate, and the strengths that give it."""
+    starts = np.array(candidate.starts)
+    lower = np.array([parameter.lower for parameter in candidate.parameters])
+    upper = np.array([parameter.upper for parameter in candidate.parameters])
+    if candidate.linear:
+        found, reduction = _least_squares(signatures, residual, inward)
+        best = found @ starts
+        harmonic = [one.name.startswith(HARMONIC_NAMES[1:]) for one in candidate.parameters]
+        lines = np.hypot(*best[harmonic].reshape(-1, 2).T)
+        if lines.size and lines.max() > np.hypot(*best[:2]):
+            # A line that is weaker than its harmonic is not the fundamental of that harmonic.
+            kept = np.flatnonzero(~np.array(harmonic))
+            found, reduction = _least_squares(signatures[kept], residual, inward)
+            best = found @ starts[kept]
+    else:
+        # The first parameter is the strength; the others are shapes.
+        positive = bool(lower[0] >= 0.0)
+        strengths, gains = _one_by_one(signatures, residual, inward, positive)
+        place = int(np.argmax(gains))
+        reduction, best = float(gains[place]), starts[place].copy()
+        best[0] *= np.clip(strengths[place], 0.2, 10.0) if positive else strengths[place]
+    return Screened(candidate, reduction, tuple(np.clip(best, lower, upper).tolist()))
+
+
+def _one_by_one(
+    signatures: NDArray[np.float64],
+    residual: NDArray[np.float64],
+    inward: NDArray[np.float64],
+    positive: bool,
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the strength of each signature (k, n) alone, and the reduction by it, (k,)."""
+    if len(inward):
+        found = [_least_squares(one[None], residual, inward, positive) for one in signatures]
+        return np.array([one for (one,), _ in found]), np.array([gain for _, gain in found])
+    sizes = np.einsum("ij,ij->i", signatures, signatures)
+    along = -signatures @ residual
+    strengths = np.divide(along, sizes, out=np.zeros_like(along), where=sizes > 1e-12)
+    return strengths, np.where((strengths > 0.0) | (not positive), along * strengths, 0.0)
+
+
+def _least_squares(
+    signatures: NDArray[np.float64],
+    residual: NDArray[np.float64],
+    inward: NDArray[np.float64],
+    positive: bool = False,
+) -> tuple[NDArray[np.float64], float]:
+    """Return the strengths of signatures (k, n) with the largest reduction, and that reduction.
+
+    Those of moves ``inward`` (m, n) are positive, of signatures only where they are ``positive``.
+    """
+    moves, columns = len(inward), signatures.T
+    if moves:
+        columns = np.concatenate([inward, signatures]).T
+        sizes = np.maximum(np.linalg.norm(columns, axis=0), 1e-9)
+        left, right = np.linalg.qr(columns / sizes)
+        least = np.full(len(sizes), 0.0 if positive else -np.inf)
+        least[:moves] = 0.0
+        found = lsq_linear(right, -left.T @ residual, (least, np.inf), "bvls").x / sizes
+    else:
+        found, *_ = np.linalg.lstsq(columns, -residual, rcond=1e-10)
+    rest = residual + columns @ found
+    return found[moves:], float(residual @ residual - rest @ rest)
+
+
+def basis_of(columns: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return an orthonormal basis of columns (n, m) that need not be independent, (n, k)."""
+    sizes = np.linalg.norm(columns, axis=0)
+    kept = sizes > 0.0
+    left, values, _ = np.linalg.svd(columns[:, kept] / sizes[kept], full_matrices=False)
+    return np.asarray(left[:, values > _RANK * values.max(initial=0.0)])

@@ -1,0 +1,168 @@
+"""Fits of a set of effects from several starts, so that they do not end at a local minimum."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pymoo_hdte.discrepancy._selection.candidate import Candidate, Layout
+from pymoo_hdte.discrepancy._selection.fitting import Evidence, Fit, fit
+from pymoo_hdte.discrepancy._selection.hypothesis import Hypothesis, contains
+from pymoo_hdte.discrepancy._selection.levenberg_marquardt import SAME, turned, way
+from pymoo_hdte.discrepancy._selection.rules import Rules
+from pymoo_hdte.discrepancy._selection.screening import basis_of
+from pymoo_hdte.effects.unknowns import Parameter
+
+Vector = NDArray[np.float64]
+
+
+def best_fit(
+    data: Evidence, one: Hypothesis, starts: Sequence[Vector], found: Collection[Hypothesis]
+) -> Fit:
+    """Return the best fit of a set from its values, the believed base and other starts.
+
+    A fit ends where it arrives at an earlier one.
+
+    Parameters
+    ----------
+    data : Evidence
+    one : Hypothesis
+        The set, fitted at least so far as to rank it.
+    starts : sequence of ndarray, shape (n_parameters,)
+        In addition to its own values and those with the believed base.
+    found : collection of Hypothesis
+        Sets that it may contain: where it does no better than one of them, other shapes are tried.
+    """
+    fits = [fit(data, one.candidates, one.fit)]
+
+    def follow(further: Iterable[Vector]) -> Fit:
+        for start in further:
+            if again := _fit_from(data, fits, start):
+                fits.append(again)
+        return _least(fits)
+
+    best = follow((_from_believed(data.base, fits[0]), *starts))
+    best = follow(_other_shapes(best, _no_better(best, one, found, data.rules)))
+    return follow(_other_ends(best, _no_better(best, one, found, data.rules)))
+
+
+def _least(fits: Sequence[Fit]) -> Fit:
+    return min(fits, key=lambda each: each.chi_square)
+
+
+def _fit_from(data: Evidence, fits: Sequence[Fit], start: Vector) -> Fit | None:
+    """Return a fit from a start; None where it is not expected to end lower than the best one.
+
+    The derivatives of the best one serve for the first steps where they foretell the residuals at
+    the start: where what else changes there is no larger, or counts for nothing. So a start that
+    leads back costs a few evaluations, and one beyond a kink of a law, as of a friction whose load
+    changes sign, ends lower. Where effects have other values, what their own unknowns do counts: a
+    law that has vanished foretells nothing of a new shape. From there a fit takes its own
+    derivatives, unless what is not foretold could remove nothing of what the best one leaves.
+    """
+    best = _least(fits)
+    problem = data.objective(best.candidates)
+    to = np.clip(start, problem.lower, problem.upper)
+    begin = replace(best, values=to, jacobian=turned(problem, best.values, to, best.jacobian))
+    step = way(problem, best.values, to)
+    changes = best.jacobian * step
+    foretold = changes.sum(axis=1)
+    beyond = problem.residuals(to) - best.residuals - foretold
+    reshaped = step[best.n_base :].any()
+    by_derivatives = changes[:, best.n_base :].sum(axis=1) if reshaped else foretold
+    if beyond @ beyond <= max(by_derivatives @ by_derivatives, SAME * best.misfit):
+        same = foretold @ foretold <= SAME * best.misfit
+        return None if same else fit(data, best.candidates, begin, known=fits)
+    return fit(data, best.candidates, start, known=fits) if _could_remove(best, beyond) else None
+
+
+def _could_remove(best: Fit, change: Vector) -> bool:
+    """Tell whether a change of residuals, in any strength, could leave less than a fit does.
+
+    By more than `SAME`, beside the unknowns that are at no bound. What is not finite may.
+    """
+    if not np.isfinite(change).all():
+        return True
+    by_unknowns = basis_of(best.jacobian[:, best.bound_sides == 0.0])
+    beside = change - by_unknowns @ (by_unknowns.T @ change)
+    return bool((beside @ best.residuals) ** 2 > SAME * best.misfit * (beside @ beside))
+
+
+def other_starts(one: Hypothesis, base: Vector) -> list[Vector]:
+    """Return starts of a single effect from all its own ones, beside fitted values of the base.
+
+    An inertia that is larger by half moves a resonance past lines, so that chi-square does not
+    decrease steadily on the way there; and values of the base that hide an effect lie far off.
+    """
+    (*others, last) = one.candidates
+    if others or len(last.starts) == 1 or last.linear:
+        return []
+    return [np.append(base, start) for start in last.starts]
+
+
+def _from_believed(base: Sequence[Parameter], fitted: Fit) -> Vector:
+    """Return the believed values of the base with the fitted ones of a set's effects."""
+    believed = np.array([parameter.start for parameter in base])
+    return np.append(believed, fitted.values[len(believed) :])
+
+
+def _no_better(
+    best: Fit, one: Hypothesis, found: Iterable[Hypothesis], rules: Rules
+) -> list[tuple[Candidate, slice]]:
+    """Return the laws by which a set does no better than a special case of it.
+
+    Those with starts of several shapes, and the places of all their values but the strength.
+    """
+    special = {
+        name
+        for other in found
+        if one.names != other.names
+        and contains(one, other)
+        and other.fit.chi_square - best.chi_square < rules.evidence_distance
+        for name in other.names
+    }
+    return [
+        (member, slice(place.start + 1, place.stop))
+        for member, place in (best.places if special else ())
+        if (member.name, member.port) not in special
+        and len(member.starts) > 1
+        and not member.linear
+    ]
+
+
+def _other_shapes(best: Fit, laws: Iterable[tuple[Candidate, slice]]) -> list[Vector]:
+    """Return starts with the shapes of all starts of laws that do no better than a special case.
+
+    A part of a law that has vanished during a fit has no shape that could lead it back.
+    """
+    starts = []
+    for member, place in laws:
+        for shape in member.starts:
+            start = best.values.copy()
+            start[place] = shape[1:]
+            starts.append(start)
+    return starts
+
+
+def _other_ends(best: Fit, laws: Iterable[tuple[Candidate, slice]]) -> list[Vector]:
+    """Return starts at the other bound of shapes of such laws that ended at one.
+
+    What a law adds to its special case at one bound of a shape differs from what it adds at the
+    other, and no slope leads across where it vanishes between them: an excess of friction that
+    fades at once, or nowhere. A shape is what the starts of a law differ in. What else ended at a
+    bound may have vanished, and begins as in the first of them.
+    """
+    starts = []
+    for member, place in laws:
+        layout, sides = Layout(member.parameters[1:]), best.bound_sides[place]
+        first, *others = np.array(member.starts)[:, 1:]
+        moved = sides * np.any(others != first, axis=0)
+        ends = [layout.array("upper"), layout.array("lower"), first]
+        start = best.values.copy()
+        start[place] = np.select([moved < 0.0, moved > 0.0, sides != 0.0], ends, start[place])
+        if moved.any():
+            starts.append(start)
+    return starts

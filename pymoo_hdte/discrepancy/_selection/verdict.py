@@ -1,0 +1,294 @@
+"""The verdict: whether an effect is missing, which one it is, and how certain the answer is.
+
+The base is fitted within its tolerances first. If it is not adequate, candidates are screened, the
+best few are fitted jointly with the base, and the one with the least BIC is named, provided that it
+removes most of the excess, and at least half of it in each part of the data. Hypotheses that the
+data cannot separate from it are named with it. A second effect must remove most of the first one's
+residual, in total or in the part that the first explains worst. What stands out from all else but
+leaves more than noise is named in part.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from pymoo_hdte.discrepancy._selection import probability
+from pymoo_hdte.discrepancy._selection.candidate import Candidate
+from pymoo_hdte.discrepancy._selection.caveats import (
+    NOT_PROVEN,
+    doubts_of,
+    explains_in_any_form,
+    left_by,
+    other_forms,
+)
+from pymoo_hdte.discrepancy._selection.choice import in_one_law, replaced
+from pymoo_hdte.discrepancy._selection.equivalents import (
+    Answer,
+    answer_of,
+    chosen_of,
+    complete,
+    distinct,
+)
+from pymoo_hdte.discrepancy._selection.excess import Vote
+from pymoo_hdte.discrepancy._selection.fitted_sets import beyond_stated
+from pymoo_hdte.discrepancy._selection.fitting import Evidence, Fit, fit
+from pymoo_hdte.discrepancy._selection.hypothesis import Hypothesis, down_to_noise
+from pymoo_hdte.discrepancy._selection.rules import RULES, Rules
+from pymoo_hdte.discrepancy._selection.screening import screen
+from pymoo_hdte.discrepancy._selection.search import Search
+from pymoo_hdte.effects.sentence_blanks import listed
+
+STATUSES = ("adequate", "named", "class", "parameter", "unlisted", "partial")
+EXPLAINED = ("named", "class", "parameter", "partial")
+"""Statuses that say what is missing."""
+
+
+@dataclass(frozen=True, eq=False)
+class Verdict:
+    """What is missing.
+
+    Attributes
+    ----------
+    status : str
+        One of `STATUSES`.
+    base : Fit
+        Without any effect.
+    chosen : Hypothesis or None
+    alternatives : tuple of Hypothesis
+        Other sets that were fitted.
+    equivalent : tuple of Hypothesis
+        Those of them that explain the data, or leave the same of them, as well as the chosen one.
+    degrees_of_freedom : int
+    rules : Rules
+        Thresholds of the verdict.
+    doubts : tuple of str
+        What forbids to name the chosen effects plainly; with ``"partial"`` and ``"class"`` they are
+        certain as far as they go.
+    shown_in_held_out : bool
+        Whether the records kept out of the fit, if there are any, show what is chosen.
+    probability : float or None
+        That it is right: see `probability`. None where it names nothing, or nothing was compared.
+    in_another_form : float or None
+        Share of the misfit that another form of the named law removes, where only such a form
+        explains it.
+    renewed : Evidence or None
+        The data as they were judged, where their noise is not the one that they came with.
+    """
+
+    status: str
+    base: Fit
+    chosen: Hypothesis | None
+    alternatives: tuple[Hypothesis, ...]
+    equivalent: tuple[Hypothesis, ...]
+    degrees_of_freedom: int
+    rules: Rules = RULES
+    doubts: tuple[str, ...] = ()
+    shown_in_held_out: bool = True
+    probability: float | None = None
+    in_another_form: float | None = None
+    renewed: Evidence | None = None
+
+    @property
+    def accepted(self) -> Fit:
+        """The fit accepted by the verdict: without effects unless some are named."""
+        chosen = self.chosen
+        return chosen.fit if chosen is not None and self.status in EXPLAINED else self.base
+
+    @property
+    def leaves_more_than_noise(self) -> bool:
+        """Whether the chosen effects do not explain the data down to the noise."""
+        chosen = self.chosen
+        degrees_of_freedom, rules = self.degrees_of_freedom, self.rules
+        return chosen is not None and not down_to_noise(chosen.fit, degrees_of_freedom, rules)
+
+    def is_equivalent(self, one: Hypothesis) -> bool:
+        """Tell whether a set is of the class, or an order or form away from one and as likely."""
+        named = () if self.chosen is None else (self.chosen, *self.equivalent)
+        near = self.rules.evidence_distance
+        return one in self.equivalent or any(
+            one.names == other.names and one.bic - other.bic < near for other in named
+        )
+
+    @property
+    def comes_near(self) -> bool:
+        """Whether the chosen effects explain at least half of the misfit."""
+        chosen = self.chosen
+        return chosen is not None and chosen.explained >= self.rules.explained_part_share
+
+    def proven(
+        self, vote: Vote | None = None, worse: Sequence[str] = (), condemned: bool = False
+    ) -> Verdict:
+        """Return it as the held-out records leave it; every verdict with such records ends here.
+
+        Parameters
+        ----------
+        vote : Vote, optional
+            Theirs on the named effects, where it has not been heard yet.
+        worse : sequence of str
+            Whose prediction error grows with the named effects: see `grows`.
+        condemned : bool
+            Whether it grows where it matters most.
+
+        Returns
+        -------
+        Verdict
+            ``unlisted`` where they contradict it, and no better than ``partial`` where any error
+            of theirs grows.
+        """
+        if condemned or (vote and vote.denies(self.rules, self.accepted.misfit)):
+            doubts = (*self.doubts, NOT_PROVEN)
+            return replace(self, status="unlisted", equivalent=(), doubts=doubts, probability=None)
+        shown = self.shown_in_held_out and (vote is None or vote.counts(self.rules))
+        verdict = replace(self, shown_in_held_out=shown)
+        if not worse:
+            return verdict
+        return verdict.doubted([f"the error on records kept out of the fit grows: {listed(worse)}"])
+
+    def doubted(self, doubts: Sequence[str]) -> Verdict:
+        """Return it with further doubts, with which no status is unqualified."""
+        if not doubts:
+            return self
+        status, sure = self.status, self.probability
+        if status in ("named", "parameter"):
+            status, shares = "partial", probability.experience_of(self.rules)
+            sure = sure and sure * shares["partial"] / shares[self.status]
+        return replace(self, status=status, doubts=(*self.doubts, *doubts), probability=sure)
+
+
+def judge(
+    data: Evidence,
+    base: Fit,
+    candidates: Sequence[Candidate],
+    known: Sequence[Hypothesis] = (),
+    go_on: bool = False,
+) -> Verdict:
+    """Return the verdict on a fitted base, by the rules of its data.
+
+    If sets are ``known`` from nearly the same data, only these are compared; where the best
+    is a single effect that does not explain them in any form, the search may ``go_on``.
+    """
+    rules = data.rules
+    degrees_of_freedom = len(base.residuals) - len(base.values)
+    candidates = [*candidates, *data.out_of_tolerance(base.at_bounds)]
+    quiet = down_to_noise(base, degrees_of_freedom, rules) and not data.evident
+    # A sensor far from what is stated of it may have taken what is missing.
+    quiet = quiet and not beyond_stated(base, rules).any()
+    # Screening is slow, and known sets need none unless the base itself may be adequate.
+    searched = [one for one in candidates if not one.instead_of]
+    screened = screen(data, base, searched) if quiet or not known else []
+    gain = max((one.reduction for one in screened), default=0.0)
+    if quiet and gain < rules.single_effect_gain:
+        clean = probability.of_nothing(screened, len(base.residuals), rules)
+        return Verdict("adequate", base, None, (), (), degrees_of_freedom, rules, probability=clean)
+    if not screened and not known:
+        return Verdict("unlisted", base, None, (), (), degrees_of_freedom, rules)
+    forms = [one for one in candidates if one.only_as_form]
+    search = Search(data, base, searched, screened, forms)
+    if known:
+        search.resume(known)
+        search.leave_out_lacking()
+        chosen = chosen_of(search)
+        alone = len(chosen.members) == 1
+        if not (go_on and alone) or explains_in_any_form(search, chosen):
+            return _verdict(search, answer_of(search, chosen, ()))
+        screened = screened or screen(data, base, searched)
+        search = Search(data, base, searched, screened, forms)
+        search.resume(known, go_on=True)
+    else:
+        search.singles()
+        search = _renewed_search(search)
+    search.grow()
+    search.leave_out_lacking()
+    chosen = chosen_of(search)
+    completed = set[frozenset[tuple[str, str]]]()
+    while len(chosen.members) > 1 and chosen.names not in completed:
+        completed.add(chosen.names)
+        complete(search, chosen)
+        chosen = chosen_of(search)
+    if replaced(search, chosen, [one for one in candidates if one.instead_of]):
+        chosen = chosen_of(search)
+    verdict = _verdict(search, answer_of(search, chosen, search.screened))
+    return verdict if search.data is data else replace(verdict, renewed=search.data)
+
+
+def _renewed_search(search: Search) -> Search:
+    """Return the search with the noise of the best single effect, if that is then all there is.
+
+    With less noise than there is, further effects would be sought for what is none. A wrong effect
+    that lets much noise through may hide others in it, but hardly as much as noise in each part. An
+    effect beside which sensors are far from what is stated is not all, and a base that needs no
+    effect with that noise says nothing of this one.
+    """
+    data, first = search.data, search.found[0]
+    explained = first.listed and first.explained >= data.rules.explained_share
+    renewed = data.with_noise_of(first.fit) if explained and not search.enough(first) else None
+    if renewed is None or not _is_all(renewed, fit(renewed, first.candidates, first.fit.values)):
+        return search
+    base, candidates = fit(renewed, start=search.base.values), search.candidates
+    if down_to_noise(base, search.degrees_of_freedom, data.rules):
+        return search
+    again = Search(renewed, base, candidates, screen(renewed, base, candidates), search.forms_only)
+    again.resume(search.found, go_on=True)
+    found = again.found[0]
+    same = found.label == first.label and _is_all(renewed, found.fit)
+    return again if same and not again.held_by_sensors(found) else search
+
+
+def _is_all(data: Evidence, fitted: Fit) -> bool:
+    """Tell whether a fit leaves noise, as much as there is in each part of the data."""
+    degrees_of_freedom = len(fitted.residuals) - fitted.n_base
+    noise = down_to_noise(fitted, degrees_of_freedom, data.rules)
+    return noise and data.excess(fitted).is_noise(data.rules)
+
+
+def _verdict(search: Search, answer: Answer) -> Verdict:
+    """Return the verdict: an answer with its doubts, status and probability."""
+    data, rules, degrees_of_freedom = search.data, search.data.rules, search.degrees_of_freedom
+    chosen, told, certain, foreign, in_part = answer
+    equivalent = list(told)
+    vote = data.held_out_vote(search.base, chosen.fit)
+    shown = vote is None or vote.counts(rules)
+    doubts = doubts_of(search, chosen, vote) + other_forms(search, chosen)
+    if in_part:
+        left = left_by(chosen.fit.chi_square / degrees_of_freedom)
+        doubts += [left] if left not in doubts else []
+    if (certain and not foreign) or in_part:
+        # The rules of earning may pass over a set for which the evidence speaks: both are told.
+        equivalent += in_one_law(search, chosen)
+        equivalent += probability.likelier(chosen, equivalent, search.found, degrees_of_freedom)
+    equivalent = distinct(chosen, equivalent)
+    known = (certain or in_part) and not search.lacks_evident(chosen)
+    status = _status(chosen, known, equivalent, doubts)
+    others = tuple(equivalent) if status == "class" else ()
+    compared = (chosen, *others) if foreign else search.found
+    # A class that is not all is no more certain than a name in part.
+    like = "partial" if in_part and status == "class" else status
+    sure = probability.of_names(like, chosen, others, compared, degrees_of_freedom, rules)
+    return Verdict(
+        status,
+        search.base,
+        chosen,
+        tuple(one for one in search.found if one is not chosen),
+        others,
+        degrees_of_freedom,
+        rules,
+        tuple(doubts),
+        shown,
+        sure,
+        search.forms.share_in_another(chosen) if foreign else None,
+    )
+
+
+def _status(
+    chosen: Hypothesis, certain: bool, equivalent: Sequence[Hypothesis], doubts: Sequence[str]
+) -> str:
+    """Return the status of the best set: what it may be called."""
+    if not chosen.listed or not certain or NOT_PROVEN in doubts:
+        return "unlisted"
+    if equivalent:
+        return "class"
+    if doubts:
+        return "partial"
+    out = all(candidate.name == "parameter" for candidate in chosen.candidates)
+    return "parameter" if out else "named"

@@ -1,0 +1,1 @@
+"""The order of the steps to a verdict for each kind of machine, and its validation."""

@@ -1,0 +1,283 @@
+"""From a campaign to a verdict: extract features, fit the base, find order lines, judge."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import chi2
+
+from pymoo_hdte._one_thread import ONE_THREAD
+from pymoo_hdte.checks import InvalidInput
+from pymoo_hdte.discrepancy._evidence.order_lines.candidates import drive_candidates
+from pymoo_hdte.discrepancy._evidence.order_lines.evidence import Data, flanks_held, training_data
+from pymoo_hdte.discrepancy._evidence.order_lines.features import (
+    Features,
+    measure,
+    shown_order,
+    unexpected_lines,
+    unexpected_orders,
+)
+from pymoo_hdte.discrepancy._evidence.order_lines.prediction import coefficients_of
+from pymoo_hdte.discrepancy._evidence.order_lines.sizes import port_sizes, scales_of
+from pymoo_hdte.discrepancy._evidence.order_lines.steady_states import PREDICTION
+from pymoo_hdte.discrepancy._records.campaign import Campaign
+from pymoo_hdte.discrepancy._records.cleaning.cleaning import examined_rows
+from pymoo_hdte.discrepancy._records.records import RunningRecord
+from pymoo_hdte.discrepancy._selection.candidate import Candidate
+from pymoo_hdte.discrepancy._selection.fitting import Fit, fit
+from pymoo_hdte.discrepancy._selection.rules import RULES, Rules
+from pymoo_hdte.discrepancy._selection.verdict import EXPLAINED, Verdict, judge
+from pymoo_hdte.discrepancy._verdicts import rattling
+from pymoo_hdte.discrepancy._verdicts.drive_finding import DriveFinding
+from pymoo_hdte.discrepancy._verdicts.validation_drive import prove
+from pymoo_hdte.drive import SpeedLoop, harmonic_balance
+from pymoo_hdte.drive._solve.free_angle import torus_of
+from pymoo_hdte.effects.effect import effect_named
+from pymoo_hdte.effects.unknowns import HARMONIC_NAMES, is_among
+
+
+def expected_orders(campaign: Campaign, rules: Rules = RULES) -> list[float]:
+    """Return the orders that are always analysed: of the error, their sums, of the output turn.
+
+    Raises
+    ------
+    InvalidInput
+        For a line of the believed static error that some record cannot resolve.
+    """
+    believed = campaign.believed
+    lines = believed.error_orders
+    wanted = [1.0 / believed.ratio, 2.0 / believed.ratio, *lines]
+    wanted += [one + other for place, one in enumerate(lines) for other in lines[place:]]
+    wanted += [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0]
+    return _apart(wanted, campaign, _error_lines(campaign, rules), rules)
+
+
+@ONE_THREAD
+def examine_drive(campaign: Campaign, rules: Rules = RULES) -> DriveFinding:
+    """Return the verdict on a campaign.
+
+    In one thread: the matrices are small, so that several threads would be much slower.
+
+    Parameters
+    ----------
+    campaign : Campaign
+    rules : Rules
+        Thresholds of the verdict.
+
+    Raises
+    ------
+    InvalidInput
+        If there are fewer than `Rules.fewest_records` records to fit, a record cannot resolve the
+        lines of the believed static error, or the drive has no steady motion with the believed
+        effects.
+    """
+    if len(campaign.train) < rules.fewest_records:
+        allowed = f"at least {rules.fewest_records}, or base and effects cannot be told apart"
+        raise InvalidInput("number of train records", len(campaign.train), allowed)
+    ratio = campaign.believed.ratio
+    expected = expected_orders(campaign, rules)
+    campaign, rows = examined_rows(campaign, expected, rules)
+    features = measure(campaign, campaign.train, expected)
+    lines = unexpected_lines(features, ratio, campaign.rig, rules)
+    held = flanks_held(features, campaign.torque_scale, rules)
+    enough = held.sum() >= rules.fewest_records
+    known = campaign.believed.error_orders
+    rattles = enough and rattling.is_heard(lines, held, known, ratio, rules)
+    # Lines of a motion that does not repeat are no orders.
+    kept = np.flatnonzero(held) if rattles else range(len(lines))
+    unexpected = unexpected_orders([lines[row] for row in kept], ratio, rules)
+    if unexpected:
+        orders = _apart(unexpected, campaign, expected, rules)
+        features = measure(campaign, campaign.train, orders)
+    data = training_data(campaign, features, rules)
+    if any(effect_named(effect.name).rattles for effect in campaign.believed.effects):
+        data = data.loaded
+    elif rattles:
+        data = rattling.with_clearance(data)
+    _check_steady(data)
+    base = fit(data)
+    if harmonics := _harmonics(data, base):
+        orders = sorted([*data.features.orders.tolist(), *harmonics])
+        wider = replace(data, features=measure(campaign, data.features.records, orders, rules))
+        judged = rattling.judged(wider, fit(wider, start=base.values), _candidates)
+    if not harmonics or judged[-1].status not in EXPLAINED:
+        # Where no fit follows the harmonics, as in a record that then has no steady state, the
+        # lower orders may still be explained.
+        judged, harmonics = rattling.judged(data, base, _candidates), []
+    data, listed, verdict = judged
+    data, verdict = _judged_again(verdict, data, listed)
+    finding = DriveFinding(campaign, data, verdict, (*unexpected, *harmonics), rows)
+    if verdict.accepted is verdict.base or (proof := prove(finding)) is None:
+        return finding
+    names = [name.replace("_", " ") for name in proof.worse]
+    return replace(finding, verdict=verdict.proven(worse=names, condemned=proof.condemns))
+
+
+def _harmonics(data: Data, base: Fit) -> list[float]:
+    """Return the harmonics of strong lines that are strong, too, above the orders looked at.
+
+    Those of a line belong to its effect, and what they leave out of a fit ends in other values, as
+    in the gains of sensors. Each record is asked for what its rows show.
+    """
+    campaign, features, rules = data.campaign, data.features, data.rules
+    orders, lowest = features.orders.tolist(), highest_order(campaign, rules)
+    most = max(shown_order(record, rules) for record in features.records)
+    multiples = {
+        round(multiple * order, 9)
+        for order in _strong_lines(features, base.residuals, rules)
+        for multiple in range(2, len(HARMONIC_NAMES) + 1)
+    }
+    further = [
+        one for one in sorted(multiples) if lowest < one <= most and not is_among(orders, one)
+    ]
+    if not further:
+        return []
+    everything = measure(campaign, features.records, sorted([*orders, *further]), rules)
+    wider = replace(data, features=everything)
+    residuals = wider.objective(()).residuals(base.values)
+    strong = _strong_lines(everything, residuals, rules)
+    return [order for order in further if is_among(strong, order)]
+
+
+def _check_steady(data: Data) -> None:
+    """Refuse believed effects with which the drive has no steady motion in some record.
+
+    A fit would ignore the effects there, and judge a drive other than the believed one.
+    """
+    campaign = data.campaign
+    believed = campaign.believed
+    if not believed.effects:
+        return
+    values = {one.name: np.array([one.start]) for one in data.base}
+    conditions = data.features.conditions
+    coefficients = coefficients_of(believed, values, believed.effects, len(conditions))
+    steady = harmonic_balance(
+        coefficients,
+        input_speed=conditions.input_speed,
+        load_torque=conditions.output_torque,
+        motor=SpeedLoop(campaign.rig.proportional, campaign.rig.integral),
+        torus=torus_of(coefficients),
+        tolerance=PREDICTION.tolerance,
+    ).converged
+    if not steady.all():
+        lost = data.features.records[int(np.argmin(steady))].name
+        names = [effect.name for effect in believed.effects]
+        allowed = f"effects with which the drive has a steady motion in every record; not in {lost}"
+        raise InvalidInput("believed.effects", names, allowed)
+
+
+def _judged_again(verdict: Verdict, data: Data, listed: list[Candidate]) -> tuple[Data, Verdict]:
+    """Judge again if the named effect changes the noise.
+
+    From a single effect that then leaves more than noise the search goes on: what resonances hid
+    beside it may show.
+    """
+    chosen = verdict.chosen
+    if chosen is None or chosen.explained < data.rules.explained_share:
+        return data, verdict
+    renewed = data.with_noise_of(chosen.fit)
+    if renewed is None:
+        return data, verdict
+    known = (chosen, *verdict.alternatives)
+    base = fit(renewed, start=verdict.base.values)
+    again = judge(renewed, base, listed, known, go_on=True)
+    return (data, verdict) if again.chosen is None else (renewed, again)
+
+
+def _candidates(data: Data, base: Fit) -> list[Candidate]:
+    features = data.features
+    clear = _strong_lines(features, base.residuals, data.rules)
+    # Above the highest order there are harmonics only.
+    highest = highest_order(data.campaign, data.rules)
+    seen = [order for order in clear if order <= highest][: data.rules.most_order_lines]
+    believed, orders = data.campaign.believed, features.orders.tolist()
+    sizes = port_sizes(believed, orders, seen, scales_of(data, base), clear)
+    return drive_candidates(sizes, believed.effects)
+
+
+def highest_order(campaign: Campaign, rules: Rules) -> float:
+    """Return the order up to which lines of a campaign are analysed, cycles per input turn."""
+    shown = [shown_order(record, rules) for record in campaign.running]
+    return float(min(rules.highest_order, *shown))
+
+
+def _error_lines(campaign: Campaign, rules: Rules) -> list[float]:
+    """Return the orders of the believed static error that are analysed; all must be resolved.
+
+    A line that a record aliases to another order, or mixes with its neighbour, would be measured
+    but not predicted: an effect would seem to be missing from a drive without any. Lines of
+    amplitude zero need not be resolved, and lines above `Rules.highest_order` are not analysed.
+    """
+    believed = campaign.believed
+    coarsest = min(campaign.running, key=lambda record: shown_order(record, rules))
+    shortest = min(campaign.running, key=_travel)
+    apart = rules.line_separation
+    least = 2.0 * np.pi * apart / max(_travel(shortest), 2.0 * np.pi * believed.ratio)
+    kept: list[float] = []
+    for order, amplitude in zip(believed.error_orders, believed.error_amplitudes, strict=True):
+        if amplitude == 0.0:
+            continue
+        if order > (shown := shown_order(coarsest, rules)):
+            rate = coarsest.sample_rate * order / shown
+            allowed = (
+                f"at most {shown:.4g}, {rules.nyquist_share:g} of the Nyquist order of "
+                f"{coarsest.name}: rows at {rate:.4g} Hz or more instead of "
+                f"{coarsest.sample_rate:g} Hz, or a campaign without this record"
+            )
+            raise InvalidInput("believed.error_orders", order, allowed)
+        if order > rules.highest_order:
+            continue
+        near = min(kept, key=lambda one: abs(one - order), default=np.inf)
+        if abs(order - near) < least:
+            turns = apart / (believed.ratio * abs(order - near))
+            allowed = (
+                f"{least:.4g} or more from order {near:g}, or {shortest.name} cannot tell them "
+                f"apart: records of at least {turns:.3g} output turns, or both as one line"
+            )
+            raise InvalidInput("believed.error_orders", order, allowed)
+        kept.append(order)
+    return kept
+
+
+def _travel(record: RunningRecord) -> float:
+    return abs(float(record.input_angle[-1] - record.input_angle[0]))
+
+
+def _apart(wanted: list[float], campaign: Campaign, kept: list[float], rules: Rules) -> list[float]:
+    """Return orders that every record can resolve: those kept, then further ones as they come."""
+    least = rules.line_separation / campaign.believed.ratio
+    highest = highest_order(campaign, rules)
+    kept = list(kept)
+    for order in wanted:
+        if order <= highest and all(abs(order - other) >= least for other in kept):
+            kept.append(order)
+    return sorted(kept)
+
+
+def _strong_lines(features: Features, residuals: NDArray[np.float64], rules: Rules) -> list[float]:
+    """Return the orders at which the residual of the base exceeds the noise in any channel.
+
+    The strongest first. If there are several speeds, a line seen at one speed only is a frequency
+    and no order.
+    """
+    misfit: NDArray[np.float64] = (residuals[: features.values.size] ** 2).reshape(
+        features.values.shape
+    )
+    by_line = np.array([misfit[:, features.places(channel)].sum(axis=2) for channel in range(4)])
+    power = by_line.sum(axis=0)
+    speed = np.abs([record.input_speed for record in features.records])
+    groups = [power[speed == one].sum(axis=0) for one in np.unique(speed)]
+    total, strongest = power.sum(axis=0), np.max(groups, axis=0)
+    strong = total > _threshold(8 * len(speed), rules.order_line_chance)
+    if len(groups) > 1:
+        fewest = min(np.sum(speed == one) for one in np.unique(speed))
+        degrees_of_freedom = 8 * (len(speed) - fewest)
+        strong &= total - strongest > _threshold(degrees_of_freedom, rules.second_speed_chance)
+    ranked = [k for k in np.argsort(-total) if strong[k]]
+    return [float(features.orders[k]) for k in ranked]
+
+
+def _threshold(degrees_of_freedom: int, chance: float) -> float:
+    return float(chi2.isf(chance, degrees_of_freedom))

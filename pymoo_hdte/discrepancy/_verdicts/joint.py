@@ -1,0 +1,181 @@
+"""From records of a joint with two encoders to one verdict: on its torques and on its torsion."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from pymoo_hdte.discrepancy._evidence.force_balances.joint_halves import (
+    Joint,
+    rigid_half,
+    torsion_half,
+)
+from pymoo_hdte.discrepancy._evidence.force_balances.preconditions import check_signals
+from pymoo_hdte.discrepancy._evidence.force_balances.unexplained import fitted_values
+from pymoo_hdte.discrepancy._records.rig_model import MechanismModel
+from pymoo_hdte.discrepancy._selection.rules import RULES, Rules
+from pymoo_hdte.discrepancy._verdicts.held_out import Progress, laws_of
+from pymoo_hdte.discrepancy._verdicts.held_out_torsion import (
+    stiffness_of,
+    torsion_gaps,
+    voted,
+    without_unproved_lines,
+)
+from pymoo_hdte.discrepancy._verdicts.joint_torsion import examine_torsion, lines_of
+from pymoo_hdte.discrepancy._verdicts.mechanism import examine_mechanism
+from pymoo_hdte.discrepancy._verdicts.mechanism_finding import MechanismFinding
+from pymoo_hdte.discrepancy._verdicts.validation_mechanism import MeasuredGap
+from pymoo_hdte.drive._effects.static_error import KinematicTorsion
+from pymoo_hdte.mechanism import ErrorLine, LawAt, Mechanism, Port, Record
+
+SLOWING = ("viscous_friction", "nonlinear_drag")
+"""Frictions ahead of a gear that the delay of an encoder looks like."""
+_WORST_FIRST = ("partial", "class", "parameter", "named")
+
+
+@dataclass(frozen=True, eq=False)
+class JointFinding:
+    """The result of the analysis of a joint with two encoders.
+
+    Attributes
+    ----------
+    joint : Joint
+    torque : MechanismFinding
+        On the balance of torques of the joint as a rigid body, with its held-out simulation.
+    torsion : MechanismFinding
+        On the torsion of the gear: in N.m of its output, its ripples in rad.
+    gaps : tuple of MeasuredGap
+        Of the torsion of held-out records, rad.
+    """
+
+    joint: Joint
+    torque: MechanismFinding
+    torsion: MechanismFinding
+    gaps: tuple[MeasuredGap, ...]
+
+    @property
+    def status(self) -> str:
+        """Both verdicts in one: of `engine.verdict.STATUSES`.
+
+        One that names nothing beside another that does leaves the whole ``"partial"``.
+        """
+        both = {self.torque.verdict.status, self.torsion.verdict.status}
+        if "unlisted" in both:
+            return "unlisted" if both <= {"unlisted", "adequate"} else "partial"
+        return next((one for one in _WORST_FIRST if one in both), "adequate")
+
+    @property
+    def stiffness(self) -> float:
+        """Fitted stiffness of the gear, N.m/rad."""
+        return stiffness_of(self.torsion.accepted, self.joint.gear)
+
+
+def examine_joint(
+    joint: Joint,
+    records: Sequence[Record],
+    cutoff: float | None = None,
+    known: Sequence[LawAt] = (),
+    rules: Rules = RULES,
+    progress: Progress | None = None,
+) -> JointFinding:
+    """Return the verdict on records of a joint with two encoders.
+
+    Gravity and the friction of both sides show in the balance of torques, in which the gear's
+    torque cancels; compliance, hysteresis and errors of the gear show in its torsion, with the
+    friction ahead of it.
+
+    Parameters
+    ----------
+    joint : Joint
+        From `joint_of`.
+    records, cutoff, known, rules, progress
+        As of `examine_mechanism`.
+
+    Returns
+    -------
+    JointFinding
+
+    Raises
+    ------
+    InvalidInput
+        See `examine_mechanism`; also if no input acts on the motor.
+    """
+    check_signals(joint.mechanism, records)
+    rigid = rigid_half(joint, records, known)
+    torque = examine_mechanism(rigid.mechanism, rigid.records, cutoff, rigid.known, rules, progress)
+    torsion = examine_torsion(torsion_half(joint, records, known), joint, torque.cutoff, rules)
+    gaps = torsion_gaps(torsion)
+    verdict = voted(torsion, gaps)
+    slows = any(one.name in SLOWING for one in verdict.accepted.candidates)
+    if verdict.status == "named" and slows:
+        # The delay of one encoder behind the other explains as much.
+        verdict = replace(verdict, status="class")
+    verdict = without_unproved_lines(verdict, torsion.accepted, gaps)
+    told = replace(torsion, verdict=verdict)
+    if told.accepted is not torsion.accepted:
+        gaps = torsion_gaps(told)
+    return JointFinding(joint, torque, told, gaps)
+
+
+def revised_joint(title: str, finding: JointFinding) -> MechanismModel:
+    """Return the joint with fitted values, believed effects, and those that are named.
+
+    What the torsion shows ahead of the gear stands at the motor and no more at the load.
+
+    Parameters
+    ----------
+    title : str
+        Of the records.
+    finding : JointFinding
+    """
+    joint, torque, torsion = finding.joint, finding.torque, finding.torsion
+    whole, ahead = (fitted_values(one.mechanism, one.accepted) for one in (torque, torsion))
+    motor, load = joint.side(joint.motor), joint.side(joint.load)
+    laws = (*laws_of(torsion.accepted.effects), *lines_of(torsion.ripples))
+    errors = [one.law for one in laws if isinstance(one.law, KinematicTorsion)]
+    ours = [one for one in laws if not isinstance(one.law, KinematicTorsion)]
+    moved = {one.name for one in ours if one.port != joint.gear.name}
+    of_torque = (*laws_of(torque.accepted.effects), *torque.ripples.laws)
+    theirs = [replace(one, port=load.name) for one in of_torque if one.name not in moved]
+    lines = tuple(
+        # An error is a sum of sines of the input's angle.
+        ErrorLine(joint.motor, law.order, law.amplitude, law.phase + math.pi / 2.0)
+        for law in errors
+    )
+    gear = replace(joint.gear, error=(*joint.gear.error, *lines))
+    ports = {port.name: port for port in (*joint.mechanism.ports, gear)}
+    effects = (*finding.torque.believed, *torsion.believed)
+    believed = list(dict.fromkeys(effects))
+    for one in (*theirs, *ours, *believed):
+        ports.setdefault(one.port, motor if one.port == motor.name else load)
+    if any(one.law.loaded for one in ours):
+        ports[motor.name] = replace(ports[motor.name], load=torsion.mechanism.ports[0].load)
+    mechanism = _with_ports(joint.mechanism, list(ports.values()))
+    values = _values(finding, whole, ahead)
+    revised = mechanism.with_values(values, exactly=False)
+    return MechanismModel(
+        f"{title}, revised", revised, (*believed, *theirs, *ours), finding.torque.cutoff
+    )
+
+
+def _with_ports(one: Mechanism, ports: Sequence[Port]) -> Mechanism:
+    return replace(one, ports=ports)
+
+
+def _values(
+    finding: JointFinding, whole: dict[str, float], ahead: dict[str, float]
+) -> dict[str, float]:
+    """Return the fitted values of both sides; the load has what the motor has not."""
+    joint = finding.joint
+    found = dict(ahead)
+    motor, load = joint.side(joint.motor).name, joint.side(joint.load).name
+    of_motor, of_load = f"inertia of {joint.motor}", f"inertia of {joint.load}"
+    own = found.get(of_motor, joint.mechanism.inertias[joint.motor].value)
+    left = whole.get(of_load, sum(one.value for one in joint.mechanism.inertias.values())) - own
+    # Neither is below a tenth of the whole: a difference of two fits may be below zero.
+    found[of_load] = max(left, 0.1 * (left + own))
+    total = whole.get(f"damping of {load}")
+    if total is not None and load in joint.mechanism.port_names:
+        found[f"damping of {load}"] = max(total - found.get(f"damping of {motor}", 0.0), 0.0)
+    return found

@@ -1,0 +1,195 @@
+"""The verdict on the torsion of a gear: what its measured angles lack beside the motor's torque.
+
+The balance of the input's torques has the motor's torque on one side and spring, laws of the
+torsion and friction ahead of the gear on the other. Divided by the stiffness it is an angle.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from pymoo_hdte.discrepancy._evidence.force_balances.beyond_band.ripple import (
+    Ripple,
+    Ripples,
+    find_ripples,
+)
+from pymoo_hdte.discrepancy._evidence.force_balances.beyond_band.ripple_size import Part
+from pymoo_hdte.discrepancy._evidence.force_balances.candidates import port_sizes
+from pymoo_hdte.discrepancy._evidence.force_balances.evidence import MeasuredData, measured_data
+from pymoo_hdte.discrepancy._evidence.force_balances.joint_halves import Half, Joint
+from pymoo_hdte.discrepancy._evidence.force_balances.orders import position_orders
+from pymoo_hdte.discrepancy._evidence.force_balances.preconditions import (
+    check_sampling,
+    check_scale,
+    fine_enough,
+)
+from pymoo_hdte.discrepancy._evidence.force_balances.unexplained import (
+    fitted_values,
+    root_mean_square,
+)
+from pymoo_hdte.discrepancy._selection.candidate import Candidate, candidate_of
+from pymoo_hdte.discrepancy._selection.fitting import Fit, fit
+from pymoo_hdte.discrepancy._selection.rules import RULES, Rules
+from pymoo_hdte.discrepancy._verdicts.mechanism import examined
+from pymoo_hdte.discrepancy._verdicts.mechanism_finding import MechanismFinding
+from pymoo_hdte.drive._effects.static_error import KinematicErrorLine, KinematicTorsion
+from pymoo_hdte.effects.effect import Effect, place_of
+from pymoo_hdte.effects.ripple import PeriodicTorque
+from pymoo_hdte.mechanism import BelievedValue, Input, LawAt, Mechanism, Port, Record
+from pymoo_hdte.mechanism.effects import law_effects
+from pymoo_hdte.mechanism.port_motion import motion_at_port
+
+BEYOND_THE_GEAR = ("gravity", "linear_stiffness", "force_offset")
+"""Effects that are not looked for ahead of the gear: what varies with the position of the load
+acts on the load, and a constant torque is the zero of the torsion."""
+KINEMATIC = KinematicErrorLine.name
+ANGLE = "torsion"
+"""Name of the measured torsion as a signal of its own."""
+
+
+def examine_torsion(
+    half: Half, joint: Joint, cutoff: float, rules: Rules = RULES
+) -> MechanismFinding:
+    """Return the verdict on the torsion of a joint.
+
+    Parameters
+    ----------
+    half : Half
+        From `torsion_half`.
+    joint : Joint
+    cutoff : float
+        Hz, up to which the motion is known.
+    rules : Rules
+
+    Returns
+    -------
+    MechanismFinding
+        In N.m of the output; its ripples, beyond the cutoff, are in rad of the torsion.
+
+    Raises
+    ------
+    InvalidInput
+        See `examine_mechanism`.
+    """
+    records = fine_enough(half.records, cutoff)
+    check_sampling(half.mechanism, records, cutoff)
+    train = [record for record in records if record.role == "train"]
+    sensors = measured_data(half.mechanism, train, cutoff, half.known, rules)
+    check_scale(sensors)
+    # Noise of the encoders is a torque by the stiffness, of which only a rough value may be known.
+    name = f"stiffness of {joint.gear.name}"
+    fitted = fitted_values(half.mechanism, fit(sensors))
+    stiff = half.mechanism.with_values({n: v for n, v in fitted.items() if n == name}, False)
+    sensors = replace(
+        measured_data(stiff, train, cutoff, half.known, rules), mechanism=half.mechanism
+    )
+    data, verdict = examined(sensors, _candidates)
+    ripples = _lines_beyond(half, joint, cutoff, rules)
+    lines = lines_of(ripples)
+    if lines and verdict.status == "unlisted":
+        # While the shafts turn slowly, they are within the band as well.
+        again = examined(replace(sensors, known=(*half.known, *lines)), _candidates)
+        data, verdict = (data, verdict) if again[1].status == "unlisted" else again
+    if lines and verdict.status == "adequate":
+        verdict = replace(verdict, status="named")
+    return MechanismFinding(half.mechanism, records, cutoff, data, verdict, ripples)
+
+
+def errors_of(ripples: Ripples) -> list[tuple[Ripple, Part]]:
+    """Return the lines beyond the band that are kinematic errors, with their size in rad.
+
+    Their part that turns with the direction is friction, or the error of a fit.
+    """
+    return [
+        (one, part)
+        for one in ripples.found
+        for part in one.parts
+        if isinstance(part.law.law, PeriodicTorque)
+    ]
+
+
+def lines_of(ripples: Ripples) -> tuple[LawAt, ...]:
+    """Return the kinematic errors beyond the band as laws of the torsion."""
+    return tuple(
+        LawAt(KINEMATIC, one.port, KinematicTorsion(law.order, law.phase, law.amplitude))
+        for one, part in errors_of(ripples)
+        if isinstance(law := part.law.law, PeriodicTorque)
+    )
+
+
+def _candidates(
+    data: MeasuredData, base: Fit, seen: Mapping[str, Sequence[float]], fitted: Fit
+) -> list[Candidate]:
+    """Return the candidates for what a base leaves of the torsion.
+
+    Laws of a mesh at the gear, and laws of the motor's shaft ahead of it; orders that the travel
+    resolves, ``seen`` by port or expected of a shaft; where none is seen in what the base leaves,
+    those in what another fit leaves.
+    """
+    shaft, gear = data.mechanism.ports
+    (left,) = root_mean_square(data, base.residuals)
+    orders = seen[gear.name]
+    if fitted is not base and not orders:
+        orders = position_orders(data, fitted)[gear.name]
+    found = []
+    for port in (gear, shaft):
+        sizes = port_sizes(data, port, float(left), orders if port is gear else ())
+        if port is gear:
+            sizes = replace(sizes, between=True, expected=_low_orders(data, gear, orders))
+        for effect in law_effects():
+            if _belongs(effect, port):
+                found += [
+                    candidate_of(effect, guess, port.name, "torque", LawAt)
+                    for guess in effect.guesses(sizes)
+                ]
+    known = {place_of(one) for one in data.known}
+    return [one for one in found if not one.places & known]
+
+
+def _low_orders(data: MeasuredData, gear: Port, seen: Sequence[float]) -> tuple[float, ...]:
+    """Return the lowest orders of the output that the travel resolves, and that are not seen.
+
+    A shaft errs at whole orders by its bearings, its encoder and its splines.
+    """
+    widest = max(float(np.ptp(one.ports[gear.name].shaft)) for one in data.spectra)
+    turns, rules = widest / (2.0 * np.pi), data.rules
+    lowest, highest = rules.fewest_error_periods / turns, rules.fewest_periods / turns
+    orders = np.arange(max(1.0, np.ceil(lowest)), np.ceil(highest))
+    return tuple(one for one in orders.tolist() if one not in seen)
+
+
+def _belongs(effect: Effect, port: Port) -> bool:
+    """Tell whether an effect may be at a port: of the gear, or of the shaft ahead of it."""
+    if port.followed:
+        return "mesh" in effect.ports
+    if effect.of_reading or effect.drives or effect.name in BEYOND_THE_GEAR:
+        return False
+    return "input" in effect.ports or not effect.ports
+
+
+def _lines_beyond(half: Half, joint: Joint, cutoff: float, rules: Rules) -> Ripples:
+    """Return orders of the torsion beyond the band of the motion, amplitudes in rad.
+
+    They are sought in the measured angle itself, as ripple is in a measured torque; with the errors
+    that are believed, what is left of it winds the spring.
+    """
+    name, gear = joint.motor, half.mechanism.port(joint.gear.name)
+    port = Port(joint.gear.name, {name: 1.0}, gear=joint.kind)
+    still = dict.fromkeys((name, joint.load), np.zeros(1))
+    angle = Mechanism({name: BelievedValue(1.0)}, [port], [Input(ANGLE, {name: 1.0})])
+    records = [
+        Record(
+            one.name,
+            one.role,
+            one.time,
+            {
+                name: one.channels[name],
+                ANGLE: motion_at_port(gear, dict(one.channels), still).position,
+            },
+        )
+        for one in half.records
+    ]
+    return find_ripples(angle, records, cutoff, (), rules)

@@ -1,0 +1,304 @@
+"""Which explanation of a mechanism's records is named, and what forbids to name it plainly."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from itertools import combinations
+
+import numpy as np
+
+from pymoo_hdte.discrepancy._evidence.force_balances.evidence import MeasuredData
+from pymoo_hdte.discrepancy._evidence.force_balances.intervals import Spread
+from pymoo_hdte.discrepancy._evidence.force_balances.unexplained import share_removed
+from pymoo_hdte.discrepancy._selection.candidate import Candidate
+from pymoo_hdte.discrepancy._selection.caveats import doubts_of, holds_zero, uncertain
+from pymoo_hdte.discrepancy._selection.fitting import Fit, fit
+from pymoo_hdte.discrepancy._selection.hypothesis import (
+    Hypothesis,
+    bounded_unknowns,
+    contains,
+    down_to_noise,
+    hypothesis_of,
+    label_of,
+    unexplained,
+)
+from pymoo_hdte.discrepancy._selection.search import Search
+from pymoo_hdte.discrepancy._selection.verdict import Verdict, judge
+from pymoo_hdte.mechanism.believed import SMALLEST_SHARE
+
+_NAMING = ("named", "class", "partial")
+
+
+def judged(
+    sensors: MeasuredData,
+    data: MeasuredData,
+    candidates: Sequence[Candidate],
+    best: Hypothesis | None = None,
+) -> Verdict:
+    """Return the verdict in units of the residual, if it also holds against the sensors' noise.
+
+    Parameters
+    ----------
+    sensors, data : MeasuredData
+        With the noise of the sensors, and with the unexplained residual as noise.
+    candidates : sequence of Candidate
+    best : Hypothesis, optional
+        Effects beyond whose residual others are judged, so that they are judged themselves.
+    """
+    base, rules = fit(data), data.rules
+    searched = [one for one in candidates if not one.instead_of]
+    verdict, added = _compared(data, base, searched, best)
+    verdict = _mostly_explained(sensors, data, verdict)
+    verdict = _simplest(data, verdict)
+    verdict = _with_true_rivals(data, _within_bounds(sensors, data, verdict))
+    verdict = _with_substitutes(data, verdict, candidates)
+    before, noise = data.power(base.residuals), sensors.power(np.ones_like(base.residuals))
+    if verdict.chosen is None:
+        quiet = np.all(before <= rules.noise_power_ratio * noise)
+        return verdict if quiet else _as_unlisted(verdict, None)
+    removed = share_removed(sensors, data, base, verdict.chosen.fit)
+    freed = [one.frees for one in verdict.chosen.candidates]
+    out = any(one in verdict.chosen.fit.at_bounds for one in freed if one)
+    least = rules.explained_share if verdict.status == "parameter" else rules.main_share
+    if removed < least or out:
+        return _as_unlisted(verdict, verdict.chosen)
+    chosen = _largest_first(data, verdict.chosen)
+    verdict = replace(verdict, chosen=chosen)
+    # The best effects define the noise, so that they fit down to it in any case.
+    among = best is not None and label_of(chosen.candidates) <= label_of(best.candidates)
+    own_noise = added or among
+    little = own_noise and verdict.status == "named" and removed < rules.explained_share
+    # What a real machine leaves is coloured, and the intervals that are printed are wider by that.
+    stated = Spread(data, chosen.fit)
+    scale = stated.reach / rules.certain_deviations
+    unsure = uncertain(chosen.fit, rules, stated.covariance * np.outer(scale, scale))
+    doubts = [one for one in holds_zero(unsure) if one not in verdict.doubts]
+    return verdict.doubted([_too_little(removed)] * little + doubts)
+
+
+def _compared(
+    data: MeasuredData, base: Fit, candidates: Sequence[Candidate], best: Hypothesis | None
+) -> tuple[Verdict, bool]:
+    """Return the verdict on the sets of a search, and whether the best effects were added to them.
+
+    They are if the search finds nothing to name and missed them.
+
+    A search extends a set by what could remove most of what it leaves, to first order. That may be
+    nothing for one of two effects between which the base lies: springs that slip and a spring that
+    hardens are found together only. Some of the best effects may do, so that they are tried, too.
+    """
+    verdict = judge(data, base, candidates)
+    if verdict.status != "unlisted" or verdict.chosen is None or best is None:
+        return verdict, False
+    found = [verdict.chosen, *verdict.alternatives]
+    if label_of(best.candidates) in [label_of(one.candidates) for one in found]:
+        return verdict, False
+    some = [
+        kept for n in range(len(best.candidates)) for kept in combinations(best.candidates, n + 1)
+    ]
+    excess = base.chi_square - verdict.degrees_of_freedom
+    found += [hypothesis_of(fit(data, kept, best.values_of(kept)), excess) for kept in some]
+    return judge(data, base, candidates, sorted(found, key=lambda one: one.bic)), True
+
+
+def _largest_first(data: MeasuredData, one: Hypothesis) -> Hypothesis:
+    """Return a set with its effects in the order of their forces, the largest first.
+
+    A search finds them in another one: beside a large force that the base imitates, as damping does
+    dry friction, a small one that it does not imitate explains more.
+    """
+    fitted, places = one.fit, [place for _, place in one.fit.places]
+    base = fitted.values[: fitted.n_base]
+    forces = (data.whitened_forces(base, effects) for effects in fitted.effects_by_candidate)
+    order = np.argsort([-float(force @ force) for force in forces], kind="stable")
+    columns = np.r_[: fitted.n_base, *(places[k] for k in order)]
+    in_order = replace(
+        fitted,
+        candidates=tuple(fitted.candidates[k] for k in order),
+        parameters=tuple(fitted.parameters[k] for k in columns),
+        values=fitted.values[columns],
+        jacobian=fitted.jacobian[:, columns],
+    )
+    return replace(one, fit=in_order)
+
+
+def _mostly_explained(sensors: MeasuredData, data: MeasuredData, verdict: Verdict) -> Verdict:
+    """Return the verdict with a nearest effect that explains nearly enough for a name as partial.
+
+    What it leaves may be several effects, none of them large enough to be earned.
+    """
+    chosen, rules = verdict.chosen, data.rules
+    if chosen is None or verdict.status != "unlisted" or not chosen.listed:
+        return verdict
+    if chosen.freed:
+        return verdict
+    removed = share_removed(sensors, data, verdict.base, chosen.fit)
+    if removed < rules.partial_share or unexplained(data, verdict.base, chosen.fit).any():
+        return verdict
+    rivals = [
+        one
+        for one in verdict.alternatives
+        if len(one.candidates) == len(chosen.candidates)
+        and one.names != chosen.names
+        and _does_as_well(data, one.fit, chosen.fit)
+    ]
+    doubts = (*_doubts(data, verdict.base, chosen), _too_little(removed))
+    return _with_rivals(replace(verdict, doubts=doubts), rivals)
+
+
+def _too_little(removed: float) -> str:
+    return f"it explains {100.0 * removed:.0f} % of the misfit, less than a name takes"
+
+
+def _simplest(data: MeasuredData, verdict: Verdict) -> Verdict:
+    """Return the verdict with the model of fewest unknowns that fits nearly as well as the best.
+
+    With many samples the evidence prefers a richer law, or a second effect, for a minimal reduction
+    of a residual that is no noise.
+    """
+    chosen = verdict.chosen
+    if chosen is None or verdict.status not in _NAMING:
+        return verdict
+    near = [
+        one
+        for one in verdict.alternatives
+        if all(candidate.frees is None for candidate in one.candidates)
+        and _unknowns(one) < _unknowns(chosen)
+        and _does_as_well(data, one.fit, chosen.fit)
+    ]
+    if not near:
+        return _choosing(data, verdict, chosen)
+    return _choosing(data, verdict, min(near, key=lambda one: (_unknowns(one), one.bic)))
+
+
+def _within_bounds(sensors: MeasuredData, data: MeasuredData, verdict: Verdict) -> Verdict:
+    """Return the verdict with another set than one that ended at a bound, if there is one.
+
+    A further effect that takes it off the bound and leaves nothing is earned by that. Else, at the
+    bound of a law lies a simpler one, or one that these records do not show. What is certain is the
+    simpler one, as long as it explains most of the misfit; what it leaves is a doubt.
+    """
+    chosen = verdict.chosen
+    if chosen is None or verdict.status not in _NAMING or not _bounded(chosen.fit):
+        return verdict
+    degrees_of_freedom = verdict.degrees_of_freedom
+    larger = [
+        one
+        for one in verdict.alternatives
+        if label_of(one.candidates) > label_of(chosen.candidates)
+        and len(one.candidates) == len(chosen.candidates) + 1
+        and not _doubts(data, verdict.base, one)
+        and down_to_noise(one.fit, degrees_of_freedom, data.rules)
+    ]
+    if larger:
+        return _choosing(data, verdict, min(larger, key=lambda one: one.bic))
+    simpler = [
+        one
+        for one in verdict.alternatives
+        if one.names != chosen.names
+        and contains(chosen, one)
+        and not _bounded(one.fit)
+        and share_removed(sensors, data, verdict.base, one.fit) >= data.rules.main_share
+        and not unexplained(data, verdict.base, one.fit).any()
+    ]
+    if not simpler:
+        return verdict
+    bounded = ", ".join(_bounded(chosen.fit))
+    doubt = f"{chosen.label} leaves less, but its {bounded} ended at a bound"
+    return _choosing(data, verdict, min(simpler, key=lambda one: one.bic), doubt)
+
+
+def _choosing(data: MeasuredData, verdict: Verdict, one: Hypothesis, *doubts: str) -> Verdict:
+    """Return the verdict with another of its sets as the chosen one, and further doubts."""
+    assert verdict.chosen is not None
+    others = tuple(each for each in (verdict.chosen, *verdict.alternatives) if each is not one)
+    rivals = (
+        each
+        for each in verdict.equivalent
+        if each is not one and len(each.members) == len(one.members)
+    )
+    found = (*_doubts(data, verdict.base, one), *doubts)
+    return _with_rivals(replace(verdict, chosen=one, alternatives=others, doubts=found), rivals)
+
+
+def _with_true_rivals(data: MeasuredData, verdict: Verdict) -> Verdict:
+    """Return the verdict without hypotheses that fit a balance worse, or contain the chosen one.
+
+    A law that contains the chosen one and fits no better is not a different explanation.
+    """
+    chosen = verdict.chosen
+    if chosen is None or verdict.status != "class":
+        return verdict
+    equivalent = (
+        one
+        for one in verdict.equivalent
+        if _does_as_well(data, one.fit, chosen.fit) and not contains(one, chosen)
+    )
+    return _with_rivals(verdict, equivalent)
+
+
+def _with_substitutes(
+    data: MeasuredData, verdict: Verdict, candidates: Sequence[Candidate]
+) -> Verdict:
+    """Return the verdict with rivals that have something else in the place of an effect."""
+    chosen = verdict.chosen
+    if chosen is None or verdict.status not in _NAMING:
+        return verdict
+    rivals = list(verdict.equivalent)
+    for member in chosen.candidates:
+        kept = tuple(one for one in chosen.candidates if one is not member)
+        for other in candidates:
+            if other.replaces(member) and all(other.goes_with(one) for one in kept):
+                start = np.append(chosen.values_of(kept), other.starts[0])
+                fitted = fit(data, (*kept, other), start)
+                if _does_as_well(data, fitted, chosen.fit):
+                    excess = verdict.base.chi_square - verdict.degrees_of_freedom
+                    rivals.append(hypothesis_of(fitted, excess))
+    return _with_rivals(verdict, rivals) if len(rivals) > len(verdict.equivalent) else verdict
+
+
+def _with_rivals(verdict: Verdict, equivalent: Iterable[Hypothesis]) -> Verdict:
+    """Return the verdict with other hypotheses that explain as much, which make it a class.
+
+    Without any, doubts make it partial.
+    """
+    rivals = tuple(equivalent)
+    status = "class" if rivals else "partial" if verdict.doubts else "named"
+    return replace(verdict, status=status, equivalent=rivals)
+
+
+def _doubts(data: MeasuredData, base: Fit, chosen: Hypothesis) -> list[str]:
+    """Return what forbids to name a set plainly: of its effects, and bounds of believed values.
+
+    A value that ended at zero, or at the least that a fit knows, is a part that the machine does
+    not have.
+    """
+    fitted = chosen.fit
+    stuck = [
+        parameter.name
+        for parameter, side in zip(data.base, fitted.bound_sides, strict=False)
+        if side > 0.0
+        or (side < 0.0 and parameter.lower not in (0.0, SMALLEST_SHARE * parameter.start))
+    ]
+    found = doubts_of(Search(data, base, ()), chosen, None)
+    return found + [f"{name} ended at the bound of its tolerance" for name in stuck]
+
+
+def _does_as_well(data: MeasuredData, one: Fit, chosen: Fit) -> bool:
+    """Tell whether a fit leaves about as little as the chosen one, in every balance."""
+    most = data.rules.parsimony_ratio * data.power(chosen.residuals)
+    return bool(np.all(data.power(one.residuals) <= most))
+
+
+def _bounded(fitted: Fit) -> list[str]:
+    """Return the unknowns of effects that ended at a bound."""
+    return [name for _, names in bounded_unknowns(fitted) for name in names]
+
+
+def _unknowns(one: Hypothesis) -> int:
+    return sum(candidate.unknowns for candidate in one.candidates)
+
+
+def _as_unlisted(verdict: Verdict, nearest: Hypothesis | None) -> Verdict:
+    return replace(verdict, status="unlisted", chosen=nearest, equivalent=())

@@ -1,0 +1,97 @@
+"""What is known of the records of a mechanism once their verdict is given."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pymoo_hdte.discrepancy._evidence.force_balances.beyond_band.ripple import NO_RIPPLES, Ripples
+from pymoo_hdte.discrepancy._evidence.force_balances.evidence import MeasuredData
+from pymoo_hdte.discrepancy._evidence.force_balances.unexplained import (
+    root_mean_square,
+    share_removed,
+)
+from pymoo_hdte.discrepancy._selection.fitting import Fit
+from pymoo_hdte.discrepancy._selection.verdict import Verdict
+from pymoo_hdte.discrepancy._verdicts.held_out import SimulatedRecord
+from pymoo_hdte.mechanism import LawAt, Mechanism, Record
+
+
+@dataclass(frozen=True, eq=False)
+class MechanismFinding:
+    """The result of the analysis of measured records.
+
+    Attributes
+    ----------
+    mechanism : Mechanism
+        Without the effects that were to be found.
+    records : tuple of Record
+        All that were given, training and held out; interpolated where they were sampled less than
+        ten times in a period of the cutoff.
+    cutoff : float
+        Hz, up to which the motion is known.
+    data : MeasuredData
+        Training records; their noise is the unexplained residual.
+    verdict : Verdict
+        What is missing: its ``status`` is ``"adequate"``, ``"named"``, ``"class"``,
+        ``"parameter"``, ``"partial"`` or ``"unlisted"``.
+    ripples : Ripples
+        What varies with the position beyond the cutoff. With one, a verdict is never
+        ``"adequate"``, but ``"named"`` without a chosen hypothesis.
+    simulated : tuple of SimulatedRecord
+        The held-out records by the base and by what the training records named.
+    """
+
+    mechanism: Mechanism
+    records: tuple[Record, ...]
+    cutoff: float
+    data: MeasuredData
+    verdict: Verdict
+    ripples: Ripples = NO_RIPPLES
+    simulated: tuple[SimulatedRecord, ...] = ()
+
+    @property
+    def accepted(self) -> Fit:
+        """The fit with the effects that the verdict names, or that of the base."""
+        return self.verdict.accepted
+
+    @property
+    def believed(self) -> tuple[LawAt, ...]:
+        """Effects that the mechanism was known to have."""
+        return tuple(one for one in self.data.known if one not in self.ripples.laws)
+
+    @property
+    def sensors(self) -> MeasuredData:
+        """The data with the noise of their sensors only."""
+        return replace(self.data, deviation=tuple(one.noise for one in self.data.spectra))
+
+    @property
+    def share_removed(self) -> float:
+        """Share of the power of the misfit beyond the sensors' noise that the effects remove.
+
+        Dimensionless, 0 to 1.
+        """
+        return share_removed(self.sensors, self.data, self.verdict.base, self.accepted)
+
+    @property
+    def sensor_noise(self) -> NDArray[np.float64]:
+        """Root mean square of the sensors' noise in each balance, shape (n_balances,), N or N.m."""
+        return root_mean_square(self.sensors, np.ones_like(self.verdict.base.residuals))
+
+    @property
+    def base_misfit(self) -> NDArray[np.float64]:
+        """Root mean square of the residual of the base in each balance.
+
+        Shape (n_balances,), N or N.m.
+        """
+        return root_mean_square(self.data, self.verdict.base.residuals)
+
+    @property
+    def remainder(self) -> NDArray[np.float64]:
+        """Root mean square of the residual of the accepted model in each balance.
+
+        Shape (n_balances,), N or N.m.
+        """
+        return root_mean_square(self.data, self.accepted.residuals)

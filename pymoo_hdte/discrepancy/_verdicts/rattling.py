@@ -1,0 +1,193 @@
+"""The verdict, with or without the records in which a clearance would rattle.
+
+With a clearance a drive whose load does not hold the tooth flanks together has no steady state that
+could be fitted: such records are predicted without the clearance. Where they are fitted, they speak
+against every set that has one, and for a soft wind-up, which follows the motion within it. Where
+several plainly do not repeat with the input, they show a clearance by themselves.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pymoo_hdte.discrepancy._evidence.order_lines.evidence import Data
+from pymoo_hdte.discrepancy._selection.candidate import Candidate
+from pymoo_hdte.discrepancy._selection.fitting import Fit, fit
+from pymoo_hdte.discrepancy._selection.rules import RULES, Rules
+from pymoo_hdte.discrepancy._selection.verdict import EXPLAINED, Verdict, judge
+from pymoo_hdte.effects.effect import effect_named, known_effects
+
+SUMMED = 8
+"""Most lines whose sums and differences a steady motion is taken to have."""
+LEAKED = 0.01
+"""Share of a record's strongest line, in power, up to which a line may be what that one leaks."""
+SAME_ORDER = 0.6
+"""Cycles of an output turn up to which a line is of a steady order, which may lie between lines.
+
+An order half-way between two lines shows in both.
+"""
+
+
+def judged(
+    data: Data, base: Fit, candidates_of: Callable[[Data, Fit], list[Candidate]]
+) -> tuple[Data, list[Candidate], Verdict]:
+    """Return the verdict on some data, with the data and the candidates that it is of.
+
+    If sweeps speak for a clearance, records in which it would rattle are left out. If they speak
+    for another effect, and the verdict on all records leaves more than noise, the others are judged
+    alone, too: that verdict is taken if it names a clearance beside another effect and leaves no
+    more than noise.
+
+    Parameters
+    ----------
+    data : Data
+    base : Fit
+        Of these data, without effects.
+    candidates_of : callable
+        From data and the fit of their base to the effects that may be missing.
+    """
+    candidates = candidates_of(data, base)
+    leading = leading_sweep_effect(data, base, candidates)
+    loaded = data if leading is None else data.loaded
+    if loaded is data or leading is None:
+        return _judged_from(data, base, candidates)
+    if effect_named(leading).rattles:
+        return _judged_on(loaded, candidates_of)
+    first = _judged_from(data, base, candidates)
+    if first[-1].status == "unlisted" or first[-1].leaves_more_than_noise:
+        again = _judged_on(loaded, candidates_of)
+        if _explains_by_a_clearance(again[-1]):
+            return again
+    return first
+
+
+def _judged_on(
+    data: Data, candidates_of: Callable[[Data, Fit], list[Candidate]]
+) -> tuple[Data, list[Candidate], Verdict]:
+    """Return data, candidates and the verdict on all these data."""
+    base = fit(data)
+    return _judged_from(data, base, candidates_of(data, base))
+
+
+def _judged_from(
+    data: Data, base: Fit, candidates: list[Candidate]
+) -> tuple[Data, list[Candidate], Verdict]:
+    """Return data, with the noise that they were judged with, candidates and the verdict."""
+    verdict = judge(data, base, candidates)
+    renewed = verdict.renewed
+    return renewed if isinstance(renewed, Data) else data, candidates, verdict
+
+
+def _explains_by_a_clearance(verdict: Verdict) -> bool:
+    """Tell whether a clearance beside another effect, perhaps of a class, leaves only noise."""
+    if verdict.status not in EXPLAINED or verdict.leaves_more_than_noise:
+        return False
+    named = [one for one in (verdict.chosen, *verdict.equivalent) if one is not None]
+    several = (one.effects for one in named if len(one.effects) > 1)
+    listed = {each.name for effects in several for each in effects if each.listed}
+    return any(effect_named(name).rattles for name in listed)
+
+
+def is_heard(
+    lines: Sequence[dict[float, float]],
+    held: NDArray[np.bool_],
+    orders: Sequence[float],
+    ratio: float,
+    rules: Rules = RULES,
+) -> bool:
+    """Tell whether records show by themselves that tooth flanks part.
+
+    Flanks that part and meet again do not repeat with the input. Records whose load does not hold
+    them together then have many lines that no steady motion has: a curved law makes only sums and
+    differences of the lines that there are, however many of them.
+
+    Parameters
+    ----------
+    lines : sequence of dict
+        Of each record: see `features.unexpected_lines`.
+    held : ndarray, shape (r,)
+        Which records have a load that holds the flanks together: see `evidence.flanks_held`.
+    orders : sequence of float
+        Of the error, cycles per input turn. Lines of records with load count as well.
+    ratio : float
+    rules : Rules
+    """
+    with_load = [one for one, is_held in zip(lines, held, strict=True) if is_held]
+    without = [one for one, is_held in zip(lines, held, strict=True) if not is_held]
+    loaded = {order for one in with_load for order in one}
+    if sum(len(one) >= rules.rattling_trace for one in without) < rules.fewest_rattling:
+        return False
+    of_error, steady = (
+        _sums_of(one, rules.highest_order, ratio) for one in (orders, {*orders, *loaded})
+    )
+    free = np.array([_strong_beyond(one, steady, ratio) for one in without])
+    rough = [_strong_beyond(one, of_error, ratio) for one in with_load]
+    several = np.sum(free >= rules.rattling_trace) >= rules.fewest_rattling
+    return bool(several and max(rough, default=0) < rules.rattling_lines <= free.max())
+
+
+def _strong_beyond(lines: dict[float, float], steady: NDArray[np.float64], ratio: float) -> int:
+    """Return the number of lines at no steady order; those that a strong one leaks are left out."""
+    least = LEAKED * max(lines.values(), default=0.0)
+    strong = np.array([order for order, power in lines.items() if power >= least])
+    away = np.abs(np.subtract.outer(strong, steady)).min(axis=1)
+    return int(np.sum(away > SAME_ORDER / ratio))
+
+
+def _sums_of(orders: Collection[float], highest: float, ratio: float) -> NDArray[np.float64]:
+    """Return the sums and differences of up to `SUMMED` orders, up to the highest.
+
+    To a hundredth of a cycle of an output turn, so that they are not too many.
+    """
+    one = np.array([0.0, *orders, *(-order for order in orders)])
+    found = np.zeros(1)
+    for _ in range(SUMMED):
+        found = np.abs(np.add.outer(found, one)).ravel()
+        found = np.unique((100.0 * ratio * found[found <= highest]).round()) / (100.0 * ratio)
+    return found
+
+
+def with_clearance(data: Data) -> Data:
+    """Return the data without records that rattle, in which a clearance is evident.
+
+    The same data where too few records are left.
+    """
+    loaded = data.loaded
+    return data if loaded is data else replace(loaded, evident=clearances())
+
+
+def clearances() -> frozenset[str]:
+    """Return the names of the effects with which parts may lose contact."""
+    return frozenset(one.name for one in known_effects() if one.rattles)
+
+
+def leading_sweep_effect(data: Data, fitted: Fit, candidates: Sequence[Candidate]) -> str | None:
+    """Return the name of the effect that the torsion sweeps alone indicate, if any.
+
+    At rest a clearance is a jump at zero torque that no other law imitates, whereas a running
+    record with rattling has no steady state that would identify it.
+    """
+    base = fitted.values[None, : len(data.base)]
+    before = data.torsion_residuals(base, fitted.effects)[0]
+    stiffness, offset = np.eye(len(data.base))[[0, -1]]
+    steps = np.array([0.01 * base[0, 0], data.campaign.torque_scale * 0.05])
+    moved = np.vstack([base + steps[0] * stiffness, base + steps[1] * offset])
+    imitated = (data.torsion_residuals(moved, fitted.effects) - before).T
+    orthonormal, _ = np.linalg.qr(imitated)
+    residual = before - orthonormal @ (orthonormal.T @ before)
+    least, found = data.rules.sweep_gain, list[tuple[float, str]]()
+    for candidate in candidates:
+        for start in candidate.starts:
+            effects = (*fitted.effects, *candidate.build(start))
+            change = np.nan_to_num(data.torsion_residuals(base, effects)[0] - before)
+            change -= orthonormal @ (orthonormal.T @ change)
+            size = float(change @ change)
+            along = float(-change @ residual)
+            if size > least and along > 0.0:
+                found.append((along**2 / size, candidate.name))
+    reduction, name = max(found, default=(0.0, ""))
+    return name if reduction > least else None

@@ -1,0 +1,64 @@
+"""Errors of torque sensors that a fit left far beyond what is stated of them, and what they do.
+
+A misfit that nothing else takes up ends in the gains of the sensors. All torques then share a
+scale that nobody stated, and with them whatever is a torque by motion.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pymoo_hdte._reports.html import number
+from pymoo_hdte.discrepancy._evidence.order_lines.parameters import READING, base_unit
+from pymoo_hdte.discrepancy._selection.fitted_sets import from_stated
+from pymoo_hdte.discrepancy._selection.fitting import Fit
+from pymoo_hdte.discrepancy._selection.rules import Rules
+from pymoo_hdte.effects.unknowns import Parameter
+
+_OF_TORQUES = ("N", "kg")
+"""How units begin that hold a force: of torques, stiffness, damping and inertias."""
+
+
+def beyond_limits(fitted: Fit, rules: Rules) -> list[tuple[Parameter, float]]:
+    """Return gains and zeros that plainly contradict their stated limits, with values; SI."""
+    far = np.flatnonzero(from_stated(fitted) ** 2 >= rules.contradicting_chi_square)
+    known = [(fitted.parameters[place], float(fitted.values[place])) for place in far]
+    return [(one, value) for one, value in known if one.name in READING]
+
+
+def scale_error(fitted: Fit, rules: Rules) -> float:
+    """Return the largest gain that contradicts what is stated of it, a share; 0 without any."""
+    gains = [abs(value) for one, value in beyond_limits(fitted, rules) if _is_gain(one)]
+    return max(gains, default=0.0)
+
+
+def shares_scale(unit: str) -> bool:
+    """Tell whether a value in an SI unit grows with the torques from which it is found.
+
+    Examples
+    --------
+    >>> [shares_scale(unit) for unit in ("N.m/rad", "kg.m2", "rad", "1")]
+    [True, True, False, False]
+    """
+    return unit.startswith(_OF_TORQUES)
+
+
+def sensor_caveats(fitted: Fit, rules: Rules) -> list[str]:
+    """Return a sentence for each sensor whose gain or zero contradicts what is stated of it."""
+    return [_caveat(one, value) for one, value in beyond_limits(fitted, rules)]
+
+
+def _caveat(sensor: Parameter, value: float) -> str:
+    place, _, kind = sensor.name.rpartition("_torque_")
+    size, unit, shares = 1.0, base_unit(sensor.name), "the mean torques share"
+    if _is_gain(sensor):
+        size, unit, shares = 100.0, "%", "torques, stiffness and inertias share"
+    off, stated = (f"{number(size * one, 2)} {unit}" for one in (value, sensor.prior))
+    return (
+        f"The fitted {kind} of the {place} torque sensor is off by {off} (you stated +-{stated}): "
+        f"check the sensor; {shares} this error."
+    )
+
+
+def _is_gain(sensor: Parameter) -> bool:
+    return sensor.name.endswith("_gain")

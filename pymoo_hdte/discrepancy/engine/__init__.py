@@ -1,1 +1,0 @@
-"""Candidates, fits and the rules of a verdict; knows no machine."""

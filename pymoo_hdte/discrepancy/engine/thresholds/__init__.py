@@ -1,1 +1,0 @@
-"""Thresholds of `Rules` by what they are of, and the fields in which each tells its derivation."""

@@ -1,1 +1,0 @@
-"""Joints with encoders on both sides of their gear: balance of torques, and torsion."""

@@ -1,1 +1,0 @@
-"""Measured records of any lumped mechanism: missing effects of its model, named and validated."""

@@ -1,0 +1,38 @@
+"""Effects of a drive beside the laws at its ports, one file each or a few that belong together."""
+
+from pymoo_hdte import effects as effects_at_ports
+from pymoo_hdte.drive._effects.base import (
+    DriveEffect,
+    DriveSizes,
+    LawAtPort,
+    Session,
+    drive_effects,
+    effect_from_fields,
+)
+from pymoo_hdte.drive._effects.encoder import ENCODER_LINE, Eccentricity
+from pymoo_hdte.drive._effects.encoder_zero import NewZero, ThermalDrift
+from pymoo_hdte.drive._effects.mesh_stiffness import MeshStiffnessVariation
+from pymoo_hdte.drive._effects.presliding import PreslidingFriction
+from pymoo_hdte.drive._effects.shafts import CoupledInertia, DampingReference, LoadInertia
+from pymoo_hdte.drive._effects.static_error import KinematicErrorLine, KinematicReaction
+
+__all__ = [
+    "ENCODER_LINE",
+    "CoupledInertia",
+    "DampingReference",
+    "DriveEffect",
+    "DriveSizes",
+    "Eccentricity",
+    "KinematicErrorLine",
+    "KinematicReaction",
+    "LawAtPort",
+    "LoadInertia",
+    "MeshStiffnessVariation",
+    "NewZero",
+    "PreslidingFriction",
+    "Session",
+    "ThermalDrift",
+    "drive_effects",
+    "effect_from_fields",
+    "effects_at_ports",
+]

@@ -1,0 +1,149 @@
+"""One response around designs: its expansion, values at common samples, and its extremes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import cached_property
+from itertools import product
+
+import numpy as np
+
+# Its statistics load when they are first used.
+import scipy
+from numpy.typing import NDArray
+
+from pymoo_hdte.surrogate._sparse.moments import SparseMoments, deviation
+
+Array = NDArray[np.float64]
+
+SAMPLES = 4096
+"""Samples of the scatter: four scrambled Sobol sequences."""
+PARTS = 4
+MOST_CORNERS = 256
+"""Corners of the box of the scatter at which a search for the extreme begins, at most."""
+_SWEEPS = 8
+_LINE = 33
+"""Points on a line through the box."""
+
+
+class CommonSamples:
+    """Samples of the scatter that serve all designs, and the expansion's polynomials there.
+
+    Parameters
+    ----------
+    moments : SparseMoments
+    seed : int
+        Of the scrambling.
+
+    Attributes
+    ----------
+    scatter : ndarray, shape (4096, d)
+        Values of s on every axis.
+    """
+
+    def __init__(self, moments: SparseMoments, seed: int) -> None:
+        self.moments = moments
+        axes = moments.axes
+        seeds = np.random.default_rng(seed).spawn(PARTS)
+        shares = [
+            scipy.stats.qmc.Sobol(len(axes), rng=one).random(SAMPLES // PARTS) for one in seeds
+        ]
+        p = np.concatenate(shares)
+        self.scatter = np.column_stack([axis.sample(p[:, j]) for j, axis in enumerate(axes)])
+        ends = np.array([axis.scatter_ends for axis in axes])
+        self.ends = ends
+        self._corners = self._some_corners(ends, np.random.default_rng(seed))
+
+    @staticmethod
+    def _some_corners(ends: Array, random_state: np.random.Generator) -> Array:
+        moving = np.flatnonzero(ends[:, 0] < ends[:, 1])
+        if 2 ** len(moving) <= MOST_CORNERS:
+            sides = np.array(list(product((0, 1), repeat=len(moving))), dtype=int)
+        else:
+            sides = random_state.integers(0, 2, (MOST_CORNERS, len(moving)))
+        corners = np.tile(ends[:, 0], (len(sides), 1))
+        corners[:, moving] = ends[moving, sides]
+        return corners
+
+    @cached_property
+    def basis(self) -> Array:
+        """The polynomials at the samples, shape (4096, q)."""
+        return self.moments.basis(self.scatter)
+
+    @cached_property
+    def starts(self) -> tuple[Array, Array]:
+        """Corners and some samples within the box, shape (k, d), and the polynomials there."""
+        inside = np.clip(self.scatter[:64], self.ends[:, 0], self.ends[:, 1])
+        points = np.concatenate([self._corners, inside])
+        return points, self.moments.basis(points)
+
+
+class Around:
+    """One response around n designs.
+
+    Parameters
+    ----------
+    common : CommonSamples
+    expansion : ndarray, shape (n, q)
+        Of the response, from `SparseMoments.expansion`.
+    part : slice
+        Which of the samples to use.
+    """
+
+    def __init__(self, common: CommonSamples, expansion: Array, part: slice = slice(None)) -> None:
+        self._common, self.expansion, self._part = common, expansion, part
+        self.mean, self.std = expansion[:, 0], deviation(expansion)
+
+    @property
+    def size(self) -> int:
+        """The number q of terms."""
+        return self.expansion.shape[1]
+
+    @cached_property
+    def samples(self) -> tuple[Array, Array]:
+        """Values at the samples, shape (n, k), and the polynomials there, shape (k, q)."""
+        basis = self._common.basis[self._part]
+        return self.expansion @ basis.T, basis
+
+    def quarters(self) -> Iterator[Around]:
+        """Yield the same with each independent part of the samples."""
+        step = SAMPLES // PARTS
+        for start in range(0, SAMPLES, step):
+            yield Around(self._common, self.expansion, slice(start, start + step))
+
+    def extreme(self, side: float) -> tuple[Array, Array]:
+        """Return the largest value in the box, shape (n,), and the polynomials there, (n, q).
+
+        The smallest for ``side`` -1. From the best of the corners and of some points inside, by
+        searches along one axis after the other.
+        """
+        points, basis = self._common.starts
+        best = np.argmax(side * self.expansion @ basis.T, axis=1)
+        found = points[best]
+        ends = self._common.ends
+        moving = np.flatnonzero(ends[:, 0] < ends[:, 1])
+        line = 0.5 - 0.5 * np.cos(np.pi * np.arange(_LINE) / (_LINE - 1))
+        width = ends[:, 1] - ends[:, 0]
+        for sweep in range(_SWEEPS):
+            for j in moving.tolist():
+                # The first sweep looks along the whole line, later ones ever nearer.
+                steps = (line - 0.5) * 2.0 * 0.25**sweep * width[j]
+                if not sweep:
+                    tried = np.tile(ends[j, 0] + line * width[j], (len(found), 1))
+                    tried = np.column_stack([tried, found[:, j]])
+                else:
+                    tried = np.clip(found[:, j, None] + steps, *ends[j])
+                found = self._best_on_line(found, j, tried, side)
+        at = self._common.moments.basis(found)
+        return np.einsum("nq,nq->n", self.expansion, at), at
+
+    def _best_on_line(self, found: Array, axis: int, tried: Array, side: float) -> Array:
+        moments = self._common.moments
+        count = tried.shape[1]
+        points = np.repeat(found, count, axis=0)
+        points[:, axis] = tried.reshape(-1)
+        values = moments.basis(points).reshape(len(found), count, -1)
+        best = np.argmax(side * np.einsum("nkq,nq->nk", values, self.expansion), axis=1)
+        found = found.copy()
+        found[:, axis] = tried[np.arange(len(found)), best]
+        return found

@@ -1,0 +1,214 @@
+"""What enters a simulator: designs with their scatter, and noise, independent or dependent."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+# Its statistics load when they are first used.
+import scipy
+from numpy.typing import NDArray
+
+from pymoo_hdte.checks import InvalidInput, one_of, real_number
+from pymoo_hdte.problems._simulator.distributions import joint_distribution
+from pymoo_hdte.surrogate._sparse.axes import Axis, Scatter, noise_axis, standard_normal
+from pymoo_hdte.surrogate._sparse.measures import Distribution, Measure
+
+MOST_INPUTS = 20
+SCALES = ("linear", "log")
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Design:
+    """A design variable: its bounds, and how a built part deviates from the design.
+
+    Parameters
+    ----------
+    lower, upper : float
+        Bounds of the design in the variable's unit.
+    tolerance : float or distribution
+        Relative deviation: a number t stands for uniform in -t..t of the design, a distribution of
+        `chaospy` or a frozen one of `scipy.stats` is that of the relative deviation.
+    deviation : float or distribution
+        Absolute deviation in the variable's unit, a number and a distribution alike. Not together
+        with ``tolerance``; with neither the variable does not scatter.
+    scale : {"linear", "log"}
+        ``"log"`` lets the surrogate be a polynomial of the logarithm. It takes fewer runs where the
+        bounds differ by a factor of 3 and more and the response is like a power of the variable.
+
+    Raises
+    ------
+    InvalidInput
+        If bounds are not finite and in order, both kinds of deviation are given or one is not
+        allowed, the scatter is relative and the bounds do not have one sign, or the logarithm is
+        asked for where the variable is not positive or deviates absolutely.
+
+    Examples
+    --------
+    >>> width = Design(0.02, 0.05, tolerance=0.02)
+    >>> width.lower, width.upper
+    (0.02, 0.05)
+    """
+
+    lower: float
+    upper: float
+    tolerance: Any = 0.0
+    deviation: Any = 0.0
+    scale: str = "linear"
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "lower", real_number("lower", self.lower))
+        object.__setattr__(self, "upper", real_number("upper", self.upper, above=self.lower))
+        one_of("scale", self.scale, SCALES)
+        relative = _scatters("tolerance", self.tolerance, below=1.0)
+        absolute = _scatters("deviation", self.deviation)
+        if relative and absolute:
+            raise InvalidInput("deviation", self.deviation, "0 where a tolerance is given")
+        if relative and self.lower <= 0.0 <= self.upper:
+            allowed = "bounds of one sign where the scatter is relative: at 0 there would be none"
+            raise InvalidInput("bounds", (self.lower, self.upper), allowed)
+        if self.scale == "log" and (self.lower <= 0.0 or absolute):
+            allowed = "'linear' unless lower is above 0 and the deviation relative"
+            raise InvalidInput("scale", self.scale, allowed)
+
+    def axis(self, name: str) -> Axis:
+        """Return the variable as the surrogate sees it.
+
+        Parameters
+        ----------
+        name : str
+            Of the variable.
+
+        Returns
+        -------
+        Axis
+
+        Raises
+        ------
+        InvalidInput
+            If the distribution of the deviation is none, or a tolerance reaches -1.
+        """
+        relative = _scatters("tolerance", self.tolerance, below=1.0)
+        given = self.tolerance if relative else self.deviation
+        scatter = None
+        if relative or _scatters("deviation", given):
+            scatter = _scatter(f"deviation of {name!r}", given)
+            if relative and scatter.distribution.lower <= -1.0:
+                lowest = scatter.distribution.lower
+                raise InvalidInput(f"smallest relative deviation of {name!r}", lowest, "above -1")
+        bounds = (self.lower, self.upper)
+        return Axis(name, scatter, bounds, relative, logarithmic=self.scale == "log")
+
+
+def _scatters(field: str, given: Any, below: float = np.inf) -> bool:
+    if hasattr(given, "pdf"):
+        return True
+    return real_number(field, given, at_least=0.0, below=below) > 0.0
+
+
+def _scatter(field: str, given: Any) -> Scatter:
+    if not hasattr(given, "pdf"):
+        given = scipy.stats.uniform(-float(given), 2.0 * float(given))
+    distribution = Distribution(field, given)
+    return Scatter(distribution, Measure.of(field, distribution))
+
+
+class Inputs:
+    """All inputs of a simulator, as independent axes in -1..1 and as named values.
+
+    Parameters
+    ----------
+    designs : mapping of str to Design
+    noise : mapping
+        From a name to its distribution, or from a tuple of names to a joint distribution of
+        `chaospy`. Dependent variables are functions of independent standard normal ones (inverse
+        Rosenblatt transformation), in which the surrogate is a polynomial: of degree one for
+        `chaospy.MvNormal`. Its moments are exact, and its error is part of the estimated one.
+
+    Attributes
+    ----------
+    designs, noise : dict
+        As given.
+    axes : list of Axis
+        The designs first, in their order.
+    names : tuple of str
+        Of the simulator's inputs, in the order of the axes.
+
+    Raises
+    ------
+    InvalidInput
+        If there is no design, a name is none or repeated, there are more than 20 inputs, or a
+        distribution is not allowed.
+    """
+
+    def __init__(self, designs: Mapping[str, Design], noise: Mapping[Any, Any]) -> None:
+        if not isinstance(designs, Mapping) or not designs:
+            raise InvalidInput("designs", designs, "a mapping of one or more names to a Design")
+        if not isinstance(noise, Mapping):
+            raise InvalidInput("noise", noise, "a mapping of names to distributions")
+        self.designs, self.noise = dict(designs), dict(noise)
+        self.axes: list[Axis] = []
+        names: list[str] = []
+        for name, design in designs.items():
+            if not isinstance(design, Design):
+                raise InvalidInput(f"designs[{name!r}]", design, "a Design")
+            names.append(name)
+            self.axes.append(design.axis(name))
+        self._joint: list[tuple[int, Any]] = []
+        for key, given in noise.items():
+            group = key if isinstance(key, tuple) else (key,)
+            self._add_noise(group, given, len(names))
+            names += group
+        words = all(isinstance(name, str) and name for name in names)
+        if not words or len(set(names)) < len(names) or len(names) > MOST_INPUTS:
+            allowed = f"at most {MOST_INPUTS} different words"
+            raise InvalidInput("names of the inputs", tuple(names), allowed)
+        self.names = tuple(names)
+
+    def _add_noise(self, group: Sequence[str], given: Any, first: int) -> None:
+        if len(group) == 1:
+            self.axes.append(noise_axis(group[0], _noise(group[0], given)))
+            return
+        given = joint_distribution(f"noise[{group!r}]", given, len(group))
+        if not given.stochastic_dependent:
+            for place, name in enumerate(group):
+                self._add_noise((name,), given[place], first + place)
+            return
+        self.axes += [Axis(name, standard_normal()) for name in group]
+        self._joint.append((first, given))
+
+    @property
+    def designed(self) -> tuple[str, ...]:
+        """Names of the designs."""
+        return tuple(axis.name for axis in self.axes if axis.designed)
+
+    def values(self, cube: Array) -> Array:
+        """Return the simulator's inputs in their units at points of -1..1, both shape (n, d)."""
+        columns = [axis.physical(z) for axis, z in zip(self.axes, cube.T, strict=True)]
+        for first, joint in self._joint:
+            place = slice(first, first + len(joint))
+            columns[place] = list(
+                np.asarray(joint.inv(scipy.special.ndtr(np.array(columns[place]))))
+            )
+        return np.column_stack(columns)
+
+    def reach(self) -> dict[str, tuple[float, float]]:
+        """Return smallest and largest value at which the simulator will be called, by name.
+
+        Of dependent noise, those along the lines through its centre.
+        """
+        ends = np.vstack([np.diag(np.full(len(self.axes), side)) for side in (-1.0, 1.0)])
+        found = self.values(ends)
+        lows, highs = found.min(axis=0).tolist(), found.max(axis=0).tolist()
+        return dict(zip(self.names, zip(lows, highs, strict=True), strict=True))
+
+
+def _noise(name: str, given: Any) -> Scatter:
+    field = f"noise[{name!r}]"
+    distribution = Distribution(field, given)
+    return Scatter(distribution, Measure.of(field, distribution))

@@ -1,0 +1,290 @@
+"""A robust problem on the adaptive surrogate of a simulator."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from pymoo.core.problem import Problem
+
+from pymoo_hdte.checks import InvalidInput, finite_array
+from pymoo_hdte.problems._simulator.around import Around, CommonSamples
+from pymoo_hdte.problems._simulator.asked import asked_of, by_moments, place_of
+from pymoo_hdte.problems._simulator.inputs import Inputs
+from pymoo_hdte.problems._simulator.statistics import RobustConstraint, Statistic
+from pymoo_hdte.problems._simulator.stored import read_problem, write_problem
+from pymoo_hdte.surrogate._sparse.adaptive import AdaptiveFit
+from pymoo_hdte.surrogate._sparse.draws import draw_designs
+from pymoo_hdte.surrogate.box import Box
+from pymoo_hdte.surrogate.sensitivity import SobolIndices
+
+Array = NDArray[np.float64]
+
+_JUDGED = 64
+"""Designs over which the accuracy of an objective is the median."""
+_AT_ONCE = 256
+"""Designs whose samples are held in memory at once."""
+
+
+class SimulatorProblem(Problem):
+    """Statistics of uncertain responses as objectives and constraints; `robust_problem` makes it.
+
+    An ordinary vectorised `Problem` of pymoo. Ask for ``dF`` and ``dG`` in ``return_values_of`` to
+    get gradients, shape (n, n_obj, n_var), exact for the surrogate, and for ``F_band`` to get the
+    estimated half-width of the error of F, NaN for a `WorstCase`.
+
+    Parameters
+    ----------
+    inputs : Inputs
+        Designs and noise.
+    fit : AdaptiveFit
+        Surrogate of all responses and its estimated errors.
+    responses : tuple of str
+        Names of the responses.
+    objectives : sequence of Statistic
+        To be minimised.
+    constraints : sequence of RobustConstraint
+        To be met.
+    n_runs : int
+        Runs of the simulator that were made.
+
+    Attributes
+    ----------
+    n_runs : int
+        Runs of the simulator behind the surrogate, those at points it does not use among them.
+    accuracy : ndarray, shape (n_obj,)
+        Estimated error of each objective as a share of the scatter of its response: the median over
+        the design box. Of a `FailureProbability` it is the error itself, of a `WorstCase` NaN.
+    response_errors : dict of str to float
+        Estimated error of each response as a share of its scatter, the larger one of mean and
+        deviation; large perhaps for a response that no objective and no constraint names.
+    failed : ndarray, shape (k, d)
+        Inputs in their units at which the simulator failed; the fit goes on without them.
+    var_names, obj_names, input_names : tuple of str
+        In the order of X, in that of F, and of all inputs of the simulator, the designs first.
+    design_box : Box
+        The search space.
+    responses, objectives, constraints
+        As given.
+
+    Examples
+    --------
+    >>> problem = robust_problem(
+    ...     lambda x: x**2, {"x": Design(1.0, 2.0, tolerance=0.1)}, progress=False
+    ... )
+    >>> problem.n_runs < 100, problem.obj_names
+    (True, ('mean', 'std'))
+    """
+
+    def __init__(
+        self,
+        inputs: Inputs,
+        fit: AdaptiveFit,
+        responses: tuple[str, ...],
+        objectives: Sequence[Statistic],
+        constraints: Sequence[RobustConstraint],
+        n_runs: int,
+    ) -> None:
+        self._inputs = inputs
+        bounds = np.array([axis.design for axis in inputs.axes if axis.designed])
+        self.design_box = Box(inputs.designed, *bounds.T)
+        self.objectives, self.constraints = tuple(objectives), tuple(constraints)
+        self.responses, self.n_runs, self._fit = responses, n_runs, fit
+        self._asked = asked_of(objectives, constraints, responses)
+        super().__init__(
+            n_var=len(bounds),
+            n_obj=len(objectives),
+            n_ieq_constr=len(constraints),
+            xl=bounds[:, 0].copy(),
+            xu=bounds[:, 1].copy(),
+        )
+        self.var_names, self.input_names = inputs.designed, inputs.names
+        self.obj_names = tuple(one.name for one in objectives)
+        self._common = CommonSamples(fit.moments, seed=1)
+        self.failed = inputs.values(fit.failed) if len(fit.failed) else fit.failed
+        self.accuracy = self._accuracy()
+        errors = fit.errors.max(axis=0).tolist()
+        self.response_errors = dict(zip(responses, errors, strict=True))
+
+    @property
+    def degrees(self) -> dict[str, int]:
+        """Degree of the surrogate in each input, by name."""
+        return dict(zip(self.input_names, self._fit.polynomial.degrees, strict=True))
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write the problem to ``path``, replacing it in one step (``docs/file_format.md``).
+
+        Raises
+        ------
+        InvalidInput
+            If a distribution or a statistic is a user's own, or the file would be too large.
+        OSError
+            If the file cannot be written.
+        """
+        parts = self.responses, self.objectives, self.constraints, self.n_runs
+        write_problem(path, self._inputs, self._fit, *parts)
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> SimulatorProblem:
+        """Return the problem that `save` wrote; it needs the simulator no more.
+
+        Parameters
+        ----------
+        path : str or path-like
+            Of the file.
+
+        Returns
+        -------
+        SimulatorProblem
+
+        Raises
+        ------
+        InvalidInput
+            If the file is damaged, incomplete, of another format or of a later version.
+        OSError
+            If the file cannot be read.
+        """
+        return cls(*read_problem(path))
+
+    def band(self, designs: ArrayLike) -> Array:
+        """Return the half-width of the estimated error of F, shape (n, n_obj), in its units.
+
+        Parameters
+        ----------
+        designs : array_like, shape (n, n_var)
+            In the variables' units.
+
+        Raises
+        ------
+        ExtrapolationError
+            If a design lies outside the box.
+        InvalidInput
+            If ``designs`` is no array of numbers of shape (n, n_var).
+        """
+        X = self.design_box.settle(designs)
+        blocks = range(0, len(X), _AT_ONCE)
+        parts = [self._band(self._around(X[start : start + _AT_ONCE])) for start in blocks]
+        return np.concatenate(parts) if parts else np.empty((0, self.n_obj))
+
+    def predict(self, values: ArrayLike) -> Array:
+        """Return the surrogate of all responses, shape (n, r), in their units.
+
+        Parameters
+        ----------
+        values : array_like, shape (n, d)
+            All inputs in the order of ``input_names`` and in their units, within their reach; not
+            for noise that is dependent or in its normal coordinate.
+
+        Raises
+        ------
+        InvalidInput
+            If ``values`` is no array of finite numbers of shape (n, d).
+        """
+        points = finite_array("values", values, (None, len(self.input_names)))
+        columns = [axis.cube(v) for axis, v in zip(self._inputs.axes, points.T, strict=True)]
+        return self._fit.polynomial(np.column_stack(columns))
+
+    def sobol_indices(self, design: ArrayLike, response: str | None = None) -> SobolIndices:
+        """Return how the variance of a response around a design divides among its inputs.
+
+        From the squared coefficients of the expansion (Sudret, Reliability Engineering and System
+        Safety 93, 2008). Dependent noise is divided by the independent normal variables that make
+        it, in the order of their names.
+
+        Parameters
+        ----------
+        design : array_like, shape (n_var,)
+            In the variables' units.
+        response : str, optional
+            Its name, where there are several.
+
+        Returns
+        -------
+        SobolIndices
+            Exact for the surrogate.
+
+        Raises
+        ------
+        ExtrapolationError
+            If the design lies outside the box.
+        InvalidInput
+            If there is no such response, or the design has another shape.
+        """
+        place = place_of(Statistic(response=response), self.responses)
+        point = self.design_box.settle(finite_array("design", design, (self.n_var,))[None])
+        moments = self._fit.moments
+        expansion = moments.expansion(point)[0, place]
+        variance, first, total = moments.divided_variance(expansion)
+        return SobolIndices(self.input_names, float(expansion[0]), variance, first, total)
+
+    def _around(self, X: Array) -> list[Around]:
+        """Return the expansion of each response around the designs."""
+        expansion = self._fit.moments.expansion(X)
+        return [Around(self._common, expansion[:, k]) for k in range(len(self.responses))]
+
+    def _band(self, around: list[Around]) -> Array:
+        columns = []
+        for statistic, _, _, place in self._asked[: self.n_obj]:
+            scatter = np.maximum(around[place].std, self._fit.smallest_scatter[place])
+            errors = self._fit.mean_error[place] * scatter, self._fit.std_error[place] * scatter
+            columns.append(statistic.half_width(*errors, around[place]))
+        return np.column_stack(columns)
+
+    def _accuracy(self) -> Array:
+        designs = draw_designs(self._inputs.axes, _JUDGED, np.random.default_rng(1))
+        around = self._around(designs)
+        shares = self._band(around)
+        for column, (statistic, _, _, place) in enumerate(self._asked[: self.n_obj]):
+            if statistic.relative_to_scatter:
+                least = self._fit.smallest_scatter[place]
+                shares[:, column] /= np.maximum(around[place].std, least)
+        return np.median(shares, axis=0)
+
+    def _evaluate(self, x: Array, out: dict[str, Any], *args: Any, **kwargs: Any) -> None:
+        """Fill F and G, and dF, dG and F_band if asked for.
+
+        Raises
+        ------
+        ExtrapolationError
+            If a design is outside the box or NaN.
+        InvalidInput
+            If the gradient of a statistic is asked for that has none.
+        """
+        x = self.design_box.settle(x)
+        slopes: list[str] = [key for key in ("dF", "dG") if key in out]
+        blocks = range(0, len(x), _AT_ONCE)
+        quick = None if slopes else by_moments(self._asked, self._fit.moments, x)
+        if quick is not None:
+            parts = [{"F": quick[:, : self.n_obj], "G": quick[:, self.n_obj :]}]
+        else:
+            parts = [self._block(x[start : start + _AT_ONCE], slopes) for start in blocks]
+        for key in ["F", "G", *slopes]:
+            if key[-1] == "F" or self.n_ieq_constr:
+                out[key] = np.concatenate([part[key] for part in parts])
+        if "F_band" in out:
+            out["F_band"] = self.band(x)
+
+    def _block(self, x: Array, slopes: list[str]) -> dict[str, Array]:
+        around = self._around(x)
+        values, gradients = [], []
+        for statistic, sign, bound, place in self._asked:
+            value, slope = statistic.value(around[place])
+            values.append(sign * value - bound)
+            if slopes:
+                gradients.append(sign * self._gradient(x, statistic, slope, place))
+        F, G = np.split(np.column_stack(values), [self.n_obj], axis=1)
+        found = {"F": F, "G": G}
+        if slopes:
+            dF, dG = np.split(np.stack(gradients, axis=1), [self.n_obj], axis=1)
+            found |= {"dF": dF, "dG": dG}
+        return found
+
+    def _gradient(self, x: Array, statistic: Statistic, slope: Array, place: int) -> Array:
+        if not statistic.has_gradient:
+            raise InvalidInput("dF or dG", statistic, "statistics that have a gradient")
+        weights = np.zeros((len(x), len(self.responses), slope.shape[1]))
+        weights[:, place] = slope
+        return self._fit.moments.pulled_back(x, weights)[:, place]

@@ -1,0 +1,211 @@
+"""Runs of a user's simulator: by name, one by one or all at once, tried again, kept on disk."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from tqdm import tqdm
+
+from pymoo_hdte.checks import InvalidInput
+from pymoo_hdte.problems._simulator.children import TOO_LONG, Failure
+from pymoo_hdte.problems._simulator.run_file import RunFile
+from pymoo_hdte.problems._simulator.workers import Workers
+
+Array = NDArray[np.float64]
+
+
+SMALLEST, LARGEST = 1e-100, 1e100
+"""Sizes of responses, in any unit, the squares of which keep their digits."""
+
+
+class SimulatorFailed(RuntimeError):
+    """The simulator fails where no surrogate can do without it; the message names the place.
+
+    Examples
+    --------
+    >>> def broken(x):
+    ...     raise RuntimeError("no licence")
+    ...
+    >>> try:
+    ...     _ = robust_problem(broken, {"x": Design(0.0, 1.0, deviation=0.1)}, progress=False)
+    ... except SimulatorFailed as error:
+    ...     print("failed")
+    ...
+    failed
+    """
+
+
+class Simulator:
+    """A user's function as one of arrays, shape (n, d) to (n, r), NaN where it failed.
+
+    Parameters
+    ----------
+    function : callable
+        Takes the inputs by name. Returns a number, a mapping of names to numbers, or a sequence of
+        numbers; with ``vectorised`` arrays of shape (n,) in their place.
+    names : tuple of str
+        Of the inputs.
+    vectorised : bool
+        Whether it takes and returns arrays of shape (n,).
+    workers : Workers
+        That make the runs, unless it is vectorised.
+    tries : int
+        How often a run is made before it counts as failed.
+    file : RunFile or None
+        Of finished runs.
+    progress : tqdm
+        A bar to move.
+
+    Raises
+    ------
+    InvalidInput
+        If a run of the file, made again, gives something else, or all that are made again fail.
+
+    Attributes
+    ----------
+    responses : tuple of str
+        Names of what it returns; empty before the first run.
+    """
+
+    def __init__(
+        self,
+        function: Callable[..., Any],
+        names: tuple[str, ...],
+        vectorised: bool,
+        workers: Workers,
+        tries: int,
+        file: RunFile | None,
+        progress: tqdm,
+    ) -> None:
+        self.function, self.names, self.vectorised = function, names, vectorised
+        self.workers, self.tries = workers, tries
+        self.file, self.progress = file, progress
+        self.responses = file.responses if file else ()
+        self._ran = self._sized = False
+        self._last: Failure | None = None
+        self._given_up: set[tuple[float, ...]] = set()
+        if file and file.goes_on:
+            file.retry_within(workers.time_limit)
+            self._given_up |= set(file.failures)
+        elif file:
+            file.check(self.again)
+
+    def again(self, row: tuple[float, ...]) -> Any:
+        """Return what a run made anew gives, whatever the file has; None if it fails."""
+        for _ in range(self.tries):
+            ((_, gave),) = self._run([row])
+            if self._good(gave):
+                return gave
+        return None
+
+    def __call__(self, values: Array) -> Array:
+        """Return the responses at inputs in their units, shape (n, r), NaN where a run failed.
+
+        Raises
+        ------
+        SimulatorFailed
+            If all of these runs fail, and no run before did not.
+        InvalidInput
+            If what it returns is no set of numbers, or another one than before.
+        """
+        rows = [tuple(row) for row in values.tolist()]
+        kept = self.file.runs if self.file else {}
+        found: dict[tuple[float, ...], Any] = {row: kept.get(row) for row in rows}
+        for _ in range(self.tries):
+            missing = [
+                row for row in found if row not in self._given_up and not self._good(found[row])
+            ]
+            for row, gave in self._run(missing) if missing else ():
+                found[row] = gave
+                if self.file and self._good(gave):
+                    self.file.keep(row, gave, self.responses)
+        self.progress.update(len(rows))
+        self._ran = self._ran or any(self._good(found[row]) for row in rows)
+        self._give_up([row for row in found if not self._good(found[row])])
+        if not self._ran:
+            where = ", ".join(f"{n} = {v:g}" for n, v in zip(self.names, rows[0], strict=True))
+            message = f"the simulator failed in all of {len(rows)} runs, the first at {where}"
+            message += f": {self._last.text}" if self._last else ""
+            raise SimulatorFailed(message) from (self._last.error if self._last else None)
+        bad = [np.nan] * len(self.responses)
+        table = np.array([found[row] if self._good(found[row]) else bad for row in rows])
+        if not self._sized:
+            self._check_sizes(table)
+        return table
+
+    def _give_up(self, rows: Sequence[tuple[float, ...]]) -> None:
+        """Note runs that have failed as often as they are tried: a killed study goes on without.
+
+        Not where nothing has run so far: what is amiss there will be mended.
+        """
+        for row in rows:
+            if self.file and self._ran and row not in self.file.failures:
+                why = self._last.text if self._last else "not a number"
+                self.file.keep_failure(row, why)
+            self._given_up.add(row)
+
+    def _check_sizes(self, table: Array) -> None:
+        """Refuse the first runs if squares of their responses would lose digits."""
+        self._sized = True
+        for name, size in zip(self.responses, np.nanmax(np.abs(table), axis=0), strict=True):
+            if size and not (size > SMALLEST and size < LARGEST):
+                allowed = f"0 or {SMALLEST:g} to {LARGEST:g}: choose another unit"
+                raise InvalidInput(f"size of {name!r}", float(size), allowed)
+
+    def _good(self, gave: Any) -> bool:
+        if gave is None:
+            return False
+        return bool(np.all(np.isfinite(gave)))
+
+    def _run(self, rows: Sequence[tuple[float, ...]]) -> Iterable[tuple[tuple[float, ...], Any]]:
+        if self.vectorised:
+            columns = dict(zip(self.names, np.array(rows).T, strict=True))
+            table = self._table(self.function(**columns), len(rows))
+            yield from zip(rows, table.tolist(), strict=True)
+        else:
+            yield from self._on_workers(rows)
+
+    def _on_workers(
+        self, rows: Sequence[tuple[float, ...]]
+    ) -> Iterable[tuple[tuple[float, ...], Any]]:
+        """Yield runs as they end, so that a finished one is kept whatever happens to the others."""
+        try:
+            for row in rows:
+                inputs = dict(zip(self.names, row, strict=True))
+                # Not by a function of ours: processes beside workers would import our package.
+                self.workers.start(row, partial(self.function, **inputs))
+            for _ in rows:
+                row, gave = self.workers.next()  # type: ignore[assignment]
+                if isinstance(gave, Failure):
+                    self._last = gave
+                    # Another try would last as long again.
+                    if gave.kind == TOO_LONG:
+                        self._give_up([row])
+                    yield row, None
+                else:
+                    yield row, self._table(gave, None)[0].tolist()
+        finally:
+            self.workers.cancel()
+
+    def _table(self, gave: Any, count: int | None) -> Array:
+        """Return what the simulator gave as (n, r), and learn the names of its responses."""
+        if isinstance(gave, Mapping):
+            names, parts = tuple(gave), list(gave.values())
+        elif isinstance(gave, tuple | list) or (count is None and np.ndim(gave) == 1):
+            names, parts = tuple(f"response_{k + 1}" for k in range(len(gave))), list(gave)
+        else:
+            names, parts = ("response",), [gave]
+        shape = (1,) if count is None else (count,)
+        try:
+            arrays = [np.asarray(part, dtype=float).reshape(shape) for part in parts]
+        except (TypeError, ValueError):
+            wanted = "numbers" if count is None else f"arrays of shape ({count},)"
+            raise InvalidInput("what the simulator returns", gave, wanted) from None
+        if self.responses and names != self.responses:
+            raise InvalidInput("names of the responses", names, str(self.responses))
+        self.responses = names
+        return np.column_stack(arrays)

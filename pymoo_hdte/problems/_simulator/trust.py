@@ -1,0 +1,138 @@
+"""Whether a surrogate may be trusted: otherwise the reason, and where it may not."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pymoo_hdte.checks import InvalidInput
+from pymoo_hdte.problems._simulator.inputs import Inputs
+from pymoo_hdte.surrogate._sparse.adaptive import AdaptiveFit
+from pymoo_hdte.surrogate._sparse.draws import draw_around, draw_designs
+from pymoo_hdte.surrogate.trust import region_of
+
+Array = NDArray[np.float64]
+
+MOST_FAILED = 0.2
+"""Largest share of failed runs that are left out: what they would have given is extrapolated."""
+_LIKE_THE_WORST = 0.3
+"""Share of the largest error above which a point belongs to the region of the error."""
+_OF_ACCURACY = 0.1
+"""Share of the accuracy asked for up to which runs may differ, by rounding or iteration."""
+_REPEATED = 3
+"""Runs at one point. Two of a random simulator may agree by chance, three hardly."""
+_LOOKED_AT = 1024
+"""Designs, with two draws of the scatter each, at which the sign of a response is looked at."""
+
+Refusal = tuple[str, float, str, dict[str, tuple[float, float]]]
+
+
+def failing(inputs: Inputs, fit: AdaptiveFit) -> Refusal | None:
+    """Return where the simulator fails, if it does so too often to leave the runs out, or None."""
+    share = len(fit.failed) / fit.n_runs
+    if share <= MOST_FAILED:
+        return None
+    region = region_of(inputs.names, inputs.values(fit.failed), reach(inputs))
+    return "share of runs that failed", share, f"at most {MOST_FAILED:g}", region
+
+
+def largest_error(fit: AdaptiveFit, places: Sequence[int]) -> tuple[float, int, int]:
+    """Return the largest error of some responses, whether of mean (0) or std (1), and of which."""
+    errors = fit.errors[:, list(places)]
+    which, place = np.unravel_index(np.argmax(errors), errors.shape)
+    return float(errors[which, place]), int(which), places[int(place)]
+
+
+def inaccurate(
+    inputs: Inputs,
+    fit: AdaptiveFit,
+    accuracy: float,
+    responses: tuple[str, ...],
+    places: Sequence[int],
+) -> Refusal | None:
+    """Return why and where the surrogate of some responses is less accurate than asked for."""
+    error, which, place = largest_error(fit, places)
+    if error <= accuracy:
+        return None
+    moment = ("mean", "standard deviation")[which]
+    share = np.abs(fit.held_out_error[:, place])
+    worst = fit.held_out_points[share > _LIKE_THE_WORST * np.nanmax(share)]
+    region = region_of(inputs.names, inputs.values(worst), reach(inputs))
+    field = f"error of the {moment} of {responses[place]!r} after {fit.n_runs} runs"
+    allowed = (
+        f"at most {accuracy:g} of the scatter, to be had by more runs (budget), narrower ranges or "
+        "scale='log' for one over decades, or a larger accuracy"
+    )
+    return field, float(f"{error:.3g}"), allowed, region
+
+
+def random(
+    inputs: Inputs,
+    fit: AdaptiveFit,
+    accuracy: float,
+    responses: tuple[str, ...],
+    again: Callable[[tuple[float, ...]], Sequence[float] | None],
+) -> InvalidInput | None:
+    """Return the error of a simulator that gives two values for the same inputs, or None.
+
+    Looked at where a surrogate is refused, by three runs at one point: what differs by less than a
+    tenth of the accuracy asked for, as a share of what the surrogate spreads, is not the cause.
+    """
+    if not len(fit.held_out_points):
+        return None
+    point = tuple(inputs.values(fit.held_out_points[:1])[0].tolist())
+    runs = [gave for _ in range(_REPEATED) if (gave := again(point)) is not None]
+    if not runs:
+        return None
+    spread = np.std(fit.polynomial(fit.held_out_points), axis=0)
+    for name, low, high, size in zip(
+        responses, np.min(runs, axis=0), np.max(runs, axis=0), spread, strict=True
+    ):
+        if high - low > _OF_ACCURACY * accuracy * size:
+            return InvalidInput(
+                f"{name!r} of runs with the same inputs",
+                f"{low:.6g} to {high:.6g}",
+                "one value: the simulator must not be random; fix its seed, or return "
+                "the mean of enough runs",
+            )
+    return None
+
+
+def positive_places(positive: Sequence[str] | bool, responses: tuple[str, ...]) -> list[int]:
+    """Return the positions of the responses that cannot be negative.
+
+    Raises
+    ------
+    InvalidInput
+        If there is no response of such a name.
+    """
+    if isinstance(positive, bool):
+        return list(range(len(responses))) if positive else []
+    for name in positive:
+        if name not in responses:
+            raise InvalidInput("positive", name, f"one of {responses}")
+    return [responses.index(name) for name in positive]
+
+
+def negative_somewhere(inputs: Inputs, fit: AdaptiveFit, places: list[int]) -> Refusal | None:
+    """Return why and where a positive response becomes negative, or None."""
+    if not places:
+        return None
+    random_state = np.random.default_rng(0)
+    designs = draw_designs(inputs.axes, _LOOKED_AT, random_state)
+    draws, _ = draw_around(inputs.axes, designs, 2, random_state)
+    points = draws.reshape(-1, len(inputs.axes))
+    values = fit.polynomial(points)[:, places]
+    if values.min() >= 0.0:
+        return None
+    bad = np.flatnonzero((values < 0.0).any(axis=1))
+    region = region_of(inputs.names, inputs.values(points[bad]), reach(inputs))
+    field = f"surrogate after {fit.n_runs} runs of a positive response"
+    return field, float(values.min()), "at least 0", region
+
+
+def reach(inputs: Inputs) -> Array:
+    """Return the smallest and largest value of every input, shape (2, d)."""
+    return np.array(list(inputs.reach().values())).T

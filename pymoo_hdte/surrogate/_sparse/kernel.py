@@ -1,0 +1,101 @@
+"""A prior of polynomials in many variables: sizes and decays of their coefficients, axis by axis.
+
+The response is a polynomial with independent normal coefficients. The variance of a coefficient is
+a product over the axes: 1 for degree 0, and s e_k q^(k - 1) for degree k, with a size s, a decay q
+and a share e_k of even degrees of every axis. The covariance of two points then is a product over
+the axes as well, whatever the number of terms (Wahba, Spline Models for Observational Data, 1990,
+chapter 10). Axes of little effect, smooth ones and even or odd ones are learnt from the runs.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.polynomial.legendre import leggauss
+from numpy.typing import NDArray
+
+from pymoo_hdte.surrogate._sparse.measures import Measure, OrthonormalPolynomials
+
+Array = NDArray[np.float64]
+
+PARAMETERS = 3
+"""Of an axis: the logarithm of s, and the logits of q and of the share of even degrees."""
+START = (np.log(0.1), 0.0, 0.0)
+"""Where parameters start, and the middle of what they are expected to be."""
+EXPECTED = (4.0, 2.0, 2.0)
+"""How far they are expected from it, one standard deviation; set by hand, wide."""
+ENDS = ((-16.0, 4.0), (-6.0, 6.0), (-8.0, 8.0))
+_LEAST = 1e-10
+"""Size below which a factor of the covariance is not divided by."""
+
+
+class EvenPolynomials:
+    """Polynomials that are orthonormal when spread evenly over -1..1, the same for every axis.
+
+    Parameters
+    ----------
+    degree : int
+        Highest degree k.
+    """
+
+    def __init__(self, degree: int) -> None:
+        self.degree = degree
+        nodes, weights = leggauss(degree + 4)
+        self._family = OrthonormalPolynomials(Measure(nodes, 0.5 * weights), degree)
+
+    def __call__(self, points: Array) -> list[Array]:
+        """Return p_1 .. p_k of every axis at points of shape (n, d), each of shape (k, n)."""
+        return [self._family(z)[1:] for z in points.T]
+
+    def to_chebyshev(self) -> Array:
+        """Return the triangular matrix, shape (k + 1, k + 1), of p_j in T_0 .. T_k: column j."""
+        size = self.degree + 1
+        angles = (2 * np.arange(size) + 1) * np.pi / (2 * size)
+        values = self._family(np.cos(angles))
+        matrix = 2.0 / size * np.cos(np.outer(np.arange(size), angles)) @ values.T
+        matrix[0] *= 0.5
+        return np.triu(matrix)
+
+
+def variances(parameters: Array, degree: int) -> tuple[Array, Array]:
+    """Return the variances of degrees 1 .. k of every axis, and their slopes in its parameters.
+
+    Parameters
+    ----------
+    parameters : ndarray, shape (d, 3)
+    degree : int
+        The highest degree k.
+
+    Returns
+    -------
+    variance : ndarray, shape (d, k)
+    slope : ndarray, shape (3, d, k)
+    """
+    k = np.arange(degree)
+    size = np.exp(parameters[:, 0])[:, None]
+    decay, share = (1.0 / (1.0 + np.exp(-parameters[:, j])) for j in (1, 2))
+    sign = np.where(k % 2 == 1, 1.0, -1.0)
+    of_parity = 1.0 + sign * (2.0 * share[:, None] - 1.0)
+    plain = size * decay[:, None] ** k
+    variance = plain * of_parity
+    of_decay = variance * k * (1.0 - decay[:, None])
+    of_share = plain * sign * 2.0 * (share * (1.0 - share))[:, None]
+    return variance, np.array([variance, of_decay, of_share])
+
+
+def factors(features: list[Array], others: list[Array], variance: Array) -> list[Array]:
+    """Return the covariance's factor of every axis between two sets of points, (n, m) each."""
+    found = []
+    for one, other, of_axis in zip(features, others, variance, strict=True):
+        factor = 1.0 + (one.T * of_axis) @ other
+        small = np.abs(factor) < _LEAST
+        factor[small] = _LEAST
+        found.append(factor)
+    return found
+
+
+def covariance(features: list[Array], others: list[Array], variance: Array) -> Array:
+    """Return the covariance between two sets of points, shape (n, m)."""
+    product, *rest = factors(features, others, variance)
+    for factor in rest:
+        product *= factor
+    return product

@@ -1,0 +1,157 @@
+"""The most probable polynomial of one response under the prior of its kernel, given some runs.
+
+Sizes, decays and parities of the axes are those of the largest marginal likelihood. What a run left
+out would have been predicted as follows in closed form (Rasmussen and Williams, Gaussian Processes
+for Machine Learning, 2006, sections 5.4.1 and 5.4.2).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+# Its linear algebra and optimisers load when they are first used.
+import scipy
+from numpy.typing import NDArray
+from scipy.linalg import cho_solve, cholesky, solve_triangular
+
+from pymoo_hdte.surrogate._sparse.kernel import (
+    ENDS,
+    EXPECTED,
+    START,
+    covariance,
+    factors,
+    variances,
+)
+
+Array = NDArray[np.float64]
+
+NUGGET = 1e-10
+"""Variance of an error of the runs, as a share of the response's: keeps the solution stable."""
+MOST_LEARNT = 300
+"""Runs from which the parameters are learnt at most; the polynomial is of all."""
+_ITERATIONS = 60
+
+
+class Regression:
+    """The posterior of one response.
+
+    Parameters
+    ----------
+    features : list of ndarray, each of shape (k, n)
+        The polynomials of every axis at the runs.
+    values : ndarray, shape (n,)
+        The response there, in its unit.
+    relevance : ndarray, shape (n,)
+        How much every run counts in ``surprise``.
+    parameters : ndarray, shape (d, 3), optional
+        Where to start learning them.
+
+    Attributes
+    ----------
+    parameters : ndarray, shape (d, 3)
+    variance : ndarray, shape (d, k)
+        Prior variances by axis and degree.
+    left_out : ndarray, shape (n,)
+        Every run minus what the others predict there, in the response's unit.
+    surprise : float
+        Root mean square of that over the standard deviation of the prediction.
+    """
+
+    def __init__(
+        self,
+        features: list[Array],
+        values: Array,
+        relevance: Array,
+        parameters: Array | None = None,
+    ) -> None:
+        self.centre = float(values.mean())
+        self.unit = float(values.std()) or 1.0
+        self._features = features
+        standard = (values - self.centre) / self.unit
+        start = np.tile(START, (len(features), 1)) if parameters is None else parameters
+        self.parameters = _learnt(features, standard, start)
+        self.variance, _ = variances(self.parameters, len(features[0]))
+        matrix = _with_nugget(covariance(features, features, self.variance))
+        self._lower = cholesky(matrix, lower=True)
+        self._inverse = cho_solve((self._lower, True), np.eye(len(values)))
+        self.weights = self._inverse @ standard
+        self.size = float(standard @ self.weights) / len(values)
+        diagonal = np.diag(self._inverse)
+        left_out = self.weights / diagonal
+        expected = np.sqrt(max(self.size, np.finfo(float).tiny) / diagonal)
+        self.left_out = self.unit * left_out
+        squares = (left_out / expected) ** 2
+        self.surprise = float(np.sqrt(np.average(squares, weights=relevance)))
+
+    def predict(self, features: list[Array]) -> Array:
+        """Return the mean, shape (m,), at points of these features, in the response's unit."""
+        across = covariance(features, self._features, self.variance)
+        return self.centre + self.unit * (across @ self.weights)
+
+    def spread(self, features: list[Array], functionals: Array) -> Array:
+        """Return the standard deviation of sums over points, shape (f,), in the response's unit.
+
+        Parameters
+        ----------
+        features : list of ndarray, each of shape (k, m)
+            The polynomials at the points.
+        functionals : ndarray, shape (f, m)
+            The weights of every sum.
+        """
+        inside = covariance(features, features, self.variance)
+        across = covariance(self._features, features, self.variance)
+        prior = np.einsum("fm,mn,fn->f", functionals, inside, functionals, optimize=True)
+        known = solve_triangular(self._lower, across @ functionals.T, lower=True)
+        left = np.maximum(prior - np.sum(known**2, axis=0), 0.0)
+        return self.unit * np.sqrt(self.size * left)
+
+
+def _with_nugget(matrix: Array) -> Array:
+    matrix[np.diag_indices(len(matrix))] += NUGGET * np.trace(matrix) / len(matrix)
+    return matrix
+
+
+def _learnt(features: list[Array], standard: Array, start: Array) -> Array:
+    """Return the most probable parameters: by the marginal likelihood and what is expected."""
+    count = min(len(standard), MOST_LEARNT)
+    features, standard = [one[:, :count] for one in features], standard[:count]
+    bounds = [end for _ in features for end in ENDS]
+
+    def loss(flat: Array) -> tuple[float, Array]:
+        value, slope = _misfit(features, standard, flat.reshape(start.shape))
+        off = (flat.reshape(start.shape) - START) / EXPECTED
+        return value + 0.5 * float(np.sum(off**2)), (slope + off / EXPECTED).ravel()
+
+    options = {"maxiter": _ITERATIONS, "maxcor": 20}
+    found = scipy.optimize.minimize(
+        loss, start.ravel(), jac=True, method="L-BFGS-B", bounds=bounds, options=options
+    )
+    return np.array(found.x).reshape(start.shape)
+
+
+def _misfit(features: list[Array], standard: Array, parameters: Array) -> tuple[float, Array]:
+    """Return the negative logarithm of the marginal likelihood and its slope, shape (d, 3)."""
+    variance, slopes = variances(parameters, len(features[0]))
+    of_axes = factors(features, features, variance)
+    product = np.prod(of_axes, axis=0) if len(of_axes) < 3 else _product(of_axes)
+    try:
+        lower = cholesky(_with_nugget(product.copy()), lower=True)
+    except np.linalg.LinAlgError:
+        return 1e10, np.zeros_like(parameters)
+    inverse = cho_solve((lower, True), np.eye(len(standard)))
+    weights = inverse @ standard
+    size = max(float(standard @ weights) / len(standard), np.finfo(float).tiny)
+    value = 0.5 * len(standard) * np.log(size) + float(np.log(np.diag(lower)).sum())
+    outer = 0.5 * (inverse - np.outer(weights, weights) / size) * product
+    gradient = np.empty_like(parameters)
+    for j, (feature, factor) in enumerate(zip(features, of_axes, strict=True)):
+        by_degree = np.einsum("kn,kn->k", feature @ (outer / factor), feature)
+        gradient[j] = slopes[:, j] @ by_degree
+    return value, gradient
+
+
+def _product(of_axes: list[Array]) -> Array:
+    product = of_axes[0].copy()
+    for factor in of_axes[1:]:
+        product *= factor
+    return product

@@ -1,0 +1,78 @@
+"""Lines that a record cannot tell from an analysed order are read there, as they are measured."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from virtual_rig_cases import BELIEVED, PHASES, RIG, SHORT, effect, true_rig
+
+from experiments.studies.virtual_rig.rig import run_campaign
+from experiments.studies.virtual_rig.runs import Condition
+from pymoo_hdte.discrepancy._evidence.order_lines.features import measure
+from pymoo_hdte.discrepancy._evidence.order_lines.parameters import base_parameters
+from pymoo_hdte.discrepancy._evidence.order_lines.prediction import predict
+from pymoo_hdte.discrepancy._plan.imagined import imagined_campaign, possible_tests
+from pymoo_hdte.discrepancy._plan.limits import PlanLimits
+from pymoo_hdte.drive._effects import MeshStiffnessVariation
+from pymoo_hdte.units import REVOLUTION_PER_MINUTE
+
+DEPTH, PHASE, SECOND = 0.05, 0.7, 0.2
+QUIET = replace(RIG, angle_noise=1e-12, input_torque_noise=1e-9, output_torque_noise=1e-6,
+                angle_quantisation=0.0, repeatability=0.0, input_torque_gain=0.0,
+                input_torque_zero=0.0, output_torque_gain=0.0, output_torque_zero=0.0)  # fmt: skip
+BEATS = (2.0 / 101.0, 200.0 / 101.0)
+"""Where a record of one output turn has the orders 0.02 and 1.98."""
+
+
+@pytest.mark.parametrize(("way", "turns"), [(1.0, 1), (-1.0, 1), (1.0, 15)])
+def test_the_beat_of_the_error_with_a_varying_stiffness_is_predicted_where_it_is_measured(
+    monkeypatch, way, turns
+):
+    """Errors of order 2.02 under a stiffness of order 2, against an independent integrator.
+
+    In fifteen turns of the output a beat at 0.02 turns by 0.3 of a cycle against 2/101.
+    """
+    once = Condition.duration
+    monkeypatch.setattr(Condition, "duration", lambda self, ratio: turns * once(self, ratio))
+    conditions = [replace(one, speed_rpm=way * one.speed_rpm) for one in SHORT]
+    wave = effect("mesh", depth=DEPTH, depth_phase=PHASE, depth_second=SECOND, depth_clip=1.0)
+    rng = np.random.default_rng(3)
+    campaign = run_campaign(true_rig(wave), BELIEVED, QUIET, rng, tuple(conditions))
+    orders = [1.0 / 101.0, BEATS[0], 1.0, BEATS[1], 2.0, 2.02, 4.0]
+    features = measure(campaign, campaign.running, orders)
+    values = {
+        one.name: np.array([one.start]) for one in base_parameters(BELIEVED, QUIET, PHASES, 0.0)
+    }
+    laws = [
+        MeshStiffnessVariation(DEPTH, PHASE, 2.0),
+        MeshStiffnessVariation(DEPTH / 5.0, SECOND, 4.0),
+    ]
+    predicted = predict(BELIEVED, QUIET, features.conditions, orders, values, laws)
+    for order in (*BEATS, 2.0):
+        real, imaginary = features.places(0)[orders.index(order)]
+        measured = features.values[:, real] + 1j * features.values[:, imaginary]
+        assert predicted.phasors[0, :, 0, orders.index(order)] == pytest.approx(measured, rel=0.05)
+
+
+def test_a_planned_campaign_shows_a_beat_as_it_is_predicted():
+    """In ten output turns, of which a later reading must not make another beat."""
+    limits = PlanLimits(
+        rig=QUIET,
+        speeds=(2000.0 * REVOLUTION_PER_MINUTE,),
+        loads=(40.0,),
+        sample_rate=1000.0,
+        most_records=4,
+        output_turns=10,
+    )
+    wave = [MeshStiffnessVariation(DEPTH, PHASE, 2.0)]
+    tests = possible_tests(limits)
+    campaign = imagined_campaign(BELIEVED, limits, tests, np.random.default_rng(3), wave)
+    orders = [1.0 / 101.0, BEATS[0], 1.0, 2.0, 2.02, 4.0]
+    features = measure(campaign, campaign.running, orders)
+    phases = np.random.default_rng(3).uniform(-np.pi, np.pi, 3).tolist()
+    base = base_parameters(BELIEVED, QUIET, phases, 0.0)
+    values = {one.name: np.array([one.start]) for one in base}
+    predicted = predict(BELIEVED, QUIET, features.conditions, orders, values, wave)
+    real, imaginary = features.places(0)[1]
+    measured = features.values[:, real] + 1j * features.values[:, imaginary]
+    assert predicted.phasors[0, :, 0, 1] == pytest.approx(measured, rel=0.05)

@@ -1,0 +1,263 @@
+"""Campaigns on which the verdict was once wrong, with what they hide: each has to end right.
+
+For each mend one nightly test takes it out and sees a row go wrong.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+import pytest
+import verdict_cases as mends
+from night import others_at_night
+from verdict_cases import case_campaign
+
+from pymoo_hdte.discrepancy import analyse
+from pymoo_hdte.discrepancy._selection.caveats import NOT_PROVEN
+from pymoo_hdte.units import ARCSEC
+
+DEVIATIONS = 3.0
+"""Standard deviations: of some twenty values one lies outside its 95 % interval by chance."""
+COULOMB, DRAG = "coulomb_friction:input", "nonlinear_drag:input"
+LINE, ECCENTRICITY = "kinematic_error:mesh@4", "eccentricity:sensor@0.009901"
+INERTIA = "load_inertia/coupled:output"
+WAVES = "mesh_stiffness_variation:mesh@2"
+CUBIC, SOFT = "hardening_stiffness:mesh", "soft_windup:mesh"
+OFF = ("stiffness", "input_inertia", "input_damping", "load_inertia")
+
+
+@dataclass(frozen=True)
+class Row:
+    """What must be said of a campaign.
+
+    Attributes
+    ----------
+    status : str
+    labels : tuple of str
+        What is named.
+    values : mapping
+        True value by label and unknown; of two unknowns that are parts of a line, its amplitude.
+    rivals : tuple of str
+        What must be offered beside it.
+    faults : tuple of str
+        Kinds of faulty rows that are hidden; the noise is as stated unless it is among them.
+    """
+
+    status: str
+    labels: tuple[str, ...] = ()
+    values: Mapping[tuple[str, str], float] = field(default_factory=dict)
+    rivals: tuple[str, ...] = ()
+    faults: tuple[str, ...] = ()
+
+
+ROWS = {
+    "coulomb": Row("named", (COULOMB,), {(COULOMB, "level"): 0.0710}),
+    "load-dependent-order": Row("unlisted"),
+    "nothing-encoder-jump": Row("adequate", faults=("jump",)),
+    "nothing-encoder-spikes": Row("adequate", faults=("spike",) * 3),
+    "coulomb-gap": Row("named", (COULOMB,), {(COULOMB, "level"): 0.0511}, faults=("gap",)),
+    # The misfit hid in the zero of a sensor, at ten times what is stated of it.
+    "coulomb-gap-2": Row("named", (COULOMB,), {(COULOMB, "level"): 0.0332}, faults=("gap",)),
+    # The error that does not repeat, three times what is stated, too, leaves more than noise.
+    "coulomb-noise-x3": Row(
+        "class",
+        (COULOMB,),
+        rivals=tuple(f"position_dependent_friction:input@{order}" for order in (1, 2)),
+        faults=("noise",),
+    ),
+    "coulomb-one-load": Row(
+        "class", (COULOMB,), {(COULOMB, "level"): 0.0526}, ("coulomb_friction:output",)
+    ),
+    "cubic-drag": Row("named", (DRAG,), {(DRAG, "level"): 0.01725, (DRAG, "exponent"): 3.0}),
+    "drag-coulomb": Row(
+        "named",
+        (COULOMB, DRAG),
+        {(COULOMB, "level"): 0.0627, (DRAG, "level"): 0.0251, (DRAG, "exponent"): 3.0},
+    ),
+    "hardening-soft-windup": Row("named", (CUBIC, SOFT), {(SOFT, "softening"): 0.30}),
+    "kinematic-eccentricity": Row(
+        "class",
+        (ECCENTRICITY, LINE),
+        {(LINE, "amplitude"): 1.52 * ARCSEC, (ECCENTRICITY, "amplitude"): 8.47 * ARCSEC},
+        ("kinematic_error:mesh@0.009901",),
+    ),
+    # The value out of tolerance and the effect of its name are one answer, not two.
+    "load-inertia-servo": Row("partial", (INERTIA,)),
+    # A zero and a clearance that made the held-out records worse.
+    "order-grows-with-load-a": Row("unlisted"),
+    "order-grows-with-load-b": Row("unlisted"),
+    "load-dependent-friction": Row(
+        "named",
+        ("load_dependent_friction:input",),
+        {("load_dependent_friction:input", "share"): 0.139},
+    ),
+    "nothing-all-values-off": Row("parameter", tuple(f"parameter:{name}" for name in OFF)),
+    "stiffness-off": Row("parameter", ("parameter:stiffness",)),
+    # The output torque alone seems to grow, by 2.1 deviations of its noise.
+    "rig-05": Row("named", ("soft_windup:mesh",)),
+    "rig-11": Row("named", (COULOMB, WAVES), {(COULOMB, "level"): 0.0599}),
+    "amplitude-off": Row("parameter", ("parameter:error_amplitude_1",)),
+}
+NOW = ("load-dependent-order",)
+"""The row in which an effect is found and not named; shorter tests name effects elsewhere."""
+ROUNDED = 0.005 * ARCSEC
+"""The truth of lines is told to this."""
+
+
+def said(analysis):
+    """Return status, labels and rivals of a verdict, in each order that is not told from it."""
+    verdict = analysis.verdict
+    accepted = () if verdict.accepted is verdict.base else verdict.accepted.candidates
+    labels = {one.label for one in accepted}
+    rivals = {one.label for other in near(verdict) for one in other.candidates}
+    return verdict.status, labels, rivals
+
+
+def near(verdict):
+    """Return the sets that the report calls alike."""
+    return [one for one in verdict.alternatives if verdict.is_equivalent(one)]
+
+
+def member_with(verdict, label):
+    """Return the accepted fit, or that of a set that is alike, which has an effect."""
+    fits = [verdict.accepted, *(one.fit for one in near(verdict))]
+    return next(one for one in fits if label in [each.label for each in one.candidates])
+
+
+def fitted_value(fitted, label, unknown):
+    """Return an unknown of an effect, or the amplitude of its line, with its deviation."""
+    ((first, names),) = [
+        (place.start, [parameter.name for parameter in candidate.parameters])
+        for candidate, place in fitted.places
+        if candidate.label == label
+    ]
+    if unknown in names:
+        place = first + names.index(unknown)
+        return fitted.values[place], np.sqrt(fitted.covariance[place, place])
+    pair = [first + names.index(f"{unknown}_{part}") for part in ("cosine", "sine")]
+    size = np.hypot(*fitted.values[pair])
+    direction = fitted.values[pair] / size
+    return size, np.sqrt(direction @ fitted.covariance[np.ix_(pair, pair)] @ direction)
+
+
+def base_value(analysis, name):
+    """Return a fitted base parameter relative to what is believed, with its deviation."""
+    fitted = analysis.verdict.accepted
+    place = [parameter.name for parameter in fitted.parameters].index(name)
+    believed = analysis.finding.data.base[place].start
+    return fitted.values[place] / believed, np.sqrt(fitted.covariance[place, place]) / believed
+
+
+@pytest.mark.parametrize("name", others_at_night(ROWS, *NOW))
+def test_the_verdict_is_right(name):
+    check(name, analyse(case_campaign(name)))
+
+
+def check(name, analysis):
+    """Hold a verdict against its row."""
+    row, verdict = ROWS[name], analysis.verdict
+    status, labels, rivals = said(analysis)
+    assert status == row.status
+    if row.rivals:
+        # Sets that explain the same to the last digits: which of them comes first says nothing.
+        assert {*row.labels, *row.rivals} <= labels | rivals
+    else:
+        assert labels == set(row.labels)
+    for (label, unknown), truth in row.values.items():
+        value, deviation = fitted_value(member_with(verdict, label), label, unknown)
+        rounded = ROUNDED if unknown == "amplitude" else 0.0
+        assert abs(value - truth) < DEVIATIONS * deviation + rounded, (label, unknown)
+    rows = analysis.finding.rows
+    found = [one.kind for one in rows.faults] + ["noise"] * any(one.replaced for one in rows.noise)
+    assert found == list(row.faults)
+    if name in ALSO:
+        ALSO[name](analysis)
+
+
+def also_of_an_order_in_no_list(analysis):
+    assert NOT_PROVEN in analysis.verdict.doubts
+
+
+def also_of_noise(analysis):
+    # The sensors' noise is three times the stated one.
+    sensors = [one for one in analysis.finding.rows.noise if one.replaced]
+    for one in sensors:
+        assert one.used == pytest.approx(3.0 * one.stated, rel=0.15), one.name
+
+
+def also_of_all_values_off(analysis):
+    for name in OFF:
+        value, deviation = base_value(analysis, name)
+        assert 0.1 < abs(value - 1.0) < 0.25 + DEVIATIONS * deviation, name
+
+
+def also_of_stiffness(analysis):
+    value, deviation = base_value(analysis, "stiffness")
+    assert value == pytest.approx(1.25, abs=DEVIATIONS * deviation)
+    found = analysis.locate()
+    assert found.flagged[:, 0, 0].any()
+    assert "transmission error" not in found.trusted
+    assert "wherever it was measured" not in found.trusted
+
+
+def also_of_hardening(analysis):
+    # 18.5 % of the stiffness at 40 N.m; of which stiffness, 5 % apart here, is not told.
+    value, _ = fitted_value(analysis.verdict.accepted, CUBIC, "coefficient")
+    stiffness = analysis.campaign.believed.stiffness
+    assert value * (40.0 / stiffness) ** 2 / stiffness == pytest.approx(0.185, rel=0.1)
+
+
+def also_of_rig_11(analysis):
+    # The minimum: noise of 1438 degrees of freedom, beats of orders 2 and 2.02 left none.
+    assert analysis.verdict.accepted.chi_square == pytest.approx(1441.0, abs=0.1)
+
+
+def also_of_the_amplitude(analysis):
+    value, deviation = base_value(analysis, "error_amplitude_1")
+    assert value == pytest.approx(1.6, abs=DEVIATIONS * deviation)
+    (candidate,) = analysis.verdict.accepted.candidates
+    assert "amplitude of order 2 of the static error" in candidate.sentence
+
+
+ALSO: dict[str, Callable] = {
+    "load-dependent-order": also_of_an_order_in_no_list,
+    "coulomb-noise-x3": also_of_noise,
+    "nothing-all-values-off": also_of_all_values_off,
+    "stiffness-off": also_of_stiffness,
+    "hardening-soft-windup": also_of_hardening,
+    "rig-11": also_of_rig_11,
+    "amplitude-off": also_of_the_amplitude,
+}
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize(
+    ("name", "mend"),
+    [
+        ("coulomb", mends.ranking_fits_decide),
+        ("rig-11", mends.ranking_fits_decide),
+        ("coulomb-one-load", mends.one_step),
+        ("coulomb-gap", mends.rows_are_believed),
+        ("coulomb-noise-x3", mends.rows_are_believed),
+        ("nothing-encoder-spikes", mends.rows_are_believed),
+        ("nothing-encoder-jump", mends.rows_are_believed),
+        ("load-dependent-order", mends.no_proof),
+        ("load-dependent-order", mends.no_doubts),
+        ("cubic-drag", mends.quadratic_drag_only),
+        ("drag-coulomb", mends.one_effect_at_a_port),
+        ("hardening-soft-windup", mends.one_effect_at_a_port),
+        ("load-dependent-friction", mends.no_friction_that_grows_with_load),
+        ("nothing-all-values-off", mends.one_parameter_at_a_time),
+        ("stiffness-off", mends.freed_values_are_believed),
+        ("amplitude-off", mends.amplitudes_are_never_wrong),
+        ("rig-11", mends.one_step),
+        ("kinematic-eccentricity", mends.one_effect),
+    ],
+    ids=lambda one: one if isinstance(one, str) else one.__name__,
+)
+def test_without_its_mend_the_verdict_is_wrong(name, mend, monkeypatch):
+    campaign = case_campaign(name)
+    mend(monkeypatch)
+    with pytest.raises(AssertionError) as wrong:
+        check(name, analyse(campaign))
+    print(wrong.value)
