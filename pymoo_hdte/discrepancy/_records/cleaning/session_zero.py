@@ -252,7 +252,7 @@ def _encoder_change(
         where = slice(place, len(records))
     else:
         found = _outlier(records, means.values, means.loads, means.weights, rules)
-        # Without load the torsion stays where a loop of its hysteresis left it: no sensor has moved.
+        # Without load the torsion stays where a hysteresis left it: no sensor has moved.
         if found is None or not records[found[0]].load_torque:
             return None
         place, size = found
