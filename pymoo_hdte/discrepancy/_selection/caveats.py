@@ -118,8 +118,9 @@ def _freed_at_bounds(chosen: Hypothesis) -> dict[str, float]:
     """Return the base values that a set frees and that ended at a bound."""
     fitted = chosen.fit
     freed = {one.frees for one in chosen.candidates} & set(fitted.at_bounds)
-    base = zip(fitted.parameters[: fitted.n_base], fitted.values, strict=False)
-    return {one.name: float(value) for one, value in base if one.name in freed}
+    # Parameters of effects follow those of the base, and may have the same names.
+    named = reversed([*zip(fitted.parameters, fitted.values, strict=True)])
+    return {one.name: float(value) for one, value in named if one.name in freed}
 
 
 def _contradicted_in_any_form(search: Search, chosen: Hypothesis) -> list[str]:

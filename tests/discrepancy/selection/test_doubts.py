@@ -164,6 +164,7 @@ def law(name, *, bounded=False, chi_square=1000.0):
         candidates=(only,),
         chi_square=chi_square,
         bound_sides=np.array([1.0 if bounded else 0.0]),
+        values=np.ones(1),
         places=[(only, slice(0, 1))],
     )
     return Hypothesis(fitted, bic=chi_square, explained=1.0)
