@@ -62,23 +62,7 @@ def open_by_motion(finding: JointFinding) -> list[str]:
 
 def open_by_twins(finding: JointFinding) -> list[str]:
     """Return what looks alike in the torsion: friction and delay, errors and ripple of an order."""
-    return [*_delay(finding), *_in_both(finding), *_beyond_band(finding)]
-
-
-def _beyond_band(finding: JointFinding) -> list[str]:
-    """Return the limits of the search beyond the band, which speaks of forces and ripple."""
-    gear = finding.joint.gear.name
-    words = {
-        f"The force at the {gear}": f"The torsion of the {gear}",
-        f"Ripple at the {gear}": f"An error of the {gear}",
-        "makes the forces of the held-out records": "makes the torsion of the held-out records",
-        "its ripple": "its error",
-        "a torque cannot": "an error cannot",
-    }
-    found = list(finding.torsion.ripples.limits)
-    for theirs, ours in words.items():
-        found = [one.replace(theirs, ours) for one in found]
-    return found
+    return [*_delay(finding), *_in_both(finding), *finding.torsion.ripples.limits]
 
 
 def _in_both(finding: JointFinding) -> list[str]:
