@@ -93,7 +93,7 @@ def _analysed(options: argparse.Namespace, believed: ModelFiles, say: Say) -> di
 def _measured(folder: Path, data: Path | None, progress: Callable[[int, int], None]) -> Any:
     """Read a campaign of a drive, or a rig of any other mechanism."""
     from pymoo_hdte.discrepancy import read_campaign, read_rig
-    from pymoo_hdte.discrepancy._records.campaign_format import CAMPAIGN_FILE
+    from pymoo_hdte.discrepancy._records.campaign_keys import CAMPAIGN_FILE
     from pymoo_hdte.discrepancy._records.rig_files import RIG_FILE
 
     if folder.name == CAMPAIGN_FILE and folder.is_file():

@@ -80,7 +80,7 @@ def test_ctrl_c_during_early_imports(module, tmp_path):
 
 def test_ctrl_c_after_the_folder_is_held_leaves_nothing(tmp_path):
     arguments = ["discrepancy", "none", "--out", "new/out"]
-    module = "pymoo_hdte.discrepancy._records.campaign_format"
+    module = "pymoo_hdte.discrepancy._records.campaign_keys"
     done = interrupted("pymoo_hdte.cli", arguments, module, tmp_path)
     assert (done.returncode, done.stderr.count("\n")) == (INTERRUPTED, 1)
     assert not list(tmp_path.iterdir())

@@ -6,21 +6,19 @@ import matplotlib
 import numpy as np
 import pytest
 from PIL import Image
-from places import PAGES, README, ROOT, WORDS
+from places import PAGES, ROOT, WORDS
 from pymoo.problems import get_problem
 
 from experiments.runner.campaign import Campaign
 from experiments.runner.registry import Context
-from experiments.runner.result import MISSED, significant
+from experiments.runner.result import MISSED
 from experiments.studies.suites import data as suites
 from experiments.studies.suites.bbob.published import CITED
 from experiments.studies.suites.bbob_tables import reached
 from experiments.studies.suites.demands import demands
-from experiments.studies.suites.jobs import MEASURES
 from experiments.studies.suites.own_time import own_time_table
 from experiments.studies.suites.parts import part_tests
 from experiments.studies.suites.protocol import BUDGETS
-from experiments.studies.suites.reduced import without_all
 from experiments.studies.suites.rule import steps
 from experiments.studies.suites.suite_tables import feasible_runs, in_short
 from experiments.studies.suites.suite_tables import ranks as suite_ranks
@@ -45,7 +43,6 @@ class TestNumbersOfTheSuites:
     def test_the_held_out_table_is_that_of_the_stored_outcome(self, outcome):
         for row in in_short(outcome).rows:
             line = " | ".join("—" if cell is None else str(cell) for cell in row)
-            assert f"| {line} |" in README
             assert f"| {line} |" in PAGES
         for place, cited in CITED.items():
             ahead = reached(outcome, *place) - cited
@@ -106,10 +103,6 @@ class TestNumbersOfTheSuites:
 
     def test_the_two_qualities(self, outcome):
         names = ["CompactSwarm", "with quality=spread"]
-        for measure in ("hypervolume", "igd_plus"):
-            means = outcome.medians("IMOP", 25_000, measure, names).mean(axis=0)
-            said = "{:.3f} with it and {:.3f}" if measure == "hypervolume" else "{:.3f} and {:.3f}"
-            assert said.format(*means) in WORDS
         medians = [
             outcome.medians("IMOP", budget, "hypervolume", names)
             for budget in (500, 2000, 10_000, 25_000)
@@ -145,15 +138,6 @@ class TestNumbersOfTheSuites:
 
     def test_what_the_parts_are_shown_to_bring(self, outcome):
         found = {(one.part, one.where[:4], one.evaluations): one for one in part_tests(outcome)}
-        for part, where, evaluations in (
-            *(("without ModelStep", "bbob", n) for n in (500, 2000, 10_000)),
-            *(("with 50 particles", "bbob", n) for n in (500, 10_000)),
-            ("without NeighbourDifference", "bbob", 10_000),
-            ("with one leader", "MW a", 10_000),
-            ("without mutation", "MW a", 10_000),
-        ):
-            one = found[part, where, evaluations]
-            assert f"{one.whole:.3f} with, {one.less:.3f} without" in WORDS
         assert {one.part for one in found.values() if one.helps} == {
             "without ModelStep",
             "with 50 particles",
@@ -165,14 +149,6 @@ class TestNumbersOfTheSuites:
 
     def test_what_the_rule_came_to(self, outcome):
         found = steps(outcome)
-        for step in found:
-            gains = {}
-            for one in step.tests:
-                gain = f"{one.gain:+.3f} ({significant(one.test.p, 2)})"
-                gains.setdefault(one.where[:3], []).append(gain)
-            places = (", ".join(gains.get(one, ["—"])) for one in ("MW ", "LZ0", "ZDT", "bbo"))
-            said = "leaves" if step.leaves else "stays"
-            assert f"| {step.part} | {' | '.join(places)} | {said} |" in PAGES
         left = {step.part for step in found if step.leaves}
         swarm = CompactSwarm().setup(get_problem("zdt1"), termination=("n_eval", 100))
         moves = {type(move).__name__ for move in swarm.moves}
@@ -180,33 +156,14 @@ class TestNumbersOfTheSuites:
         assert {step.part for step in found} - left == {"learned shares", "Exchange"}
         assert moves == {"Exchange", "NeighbourDifference", "ModelStep"}
 
-    def test_what_leaving_may_have_cost(self, outcome):
-        place = 1 + MEASURES.index("solutions")
-        said = []
-        for name in (without_all(["Attraction", "tolerance", "guests"]), "CompactSwarm"):
-            counts = [
-                count
-                for problem in outcome.problems("MW", 10_000, name)
-                for count in outcome.runs(problem, name, 10_000, place, name)
-            ]
-            said.append(f"{sum(count > 0 for count in counts)} of {len(counts)}")
-        assert (
-            f"guests the swarm was feasible in {said[0]} runs on MW; with `Difference` left out"
-            in WORDS
-        )
-        assert f"which is the present swarm, in {said[1]}." in WORDS
-
     def test_own_time(self):
         rows = {(row[0], row[1]): row[3:] for row in own_time_table().rows}
-        small = [rows[name, "CompactSwarm"] for name in ("ZDT1", "DTLZ2")]
-        large = [rows[name, "CompactSwarm, 100 particles"] for name in ("ZDT1", "DTLZ2")]
+        ours = [rows[name, "CompactSwarm"] for name in ("ZDT1", "DTLZ2")]
         assert (
-            f"costs `CompactSwarm` {small[0][1]:.2f} times NSGA-II's own time on ZDT1 and "
-            f"{small[1][1]:.2f} times on DTLZ2"
+            f"costs `CompactSwarm` {ours[0][1]:.2f} times NSGA-II's own time on ZDT1 and "
+            f"{ours[1][1]:.2f} times on DTLZ2"
         ) in WORDS
-        assert f"takes {small[0][0]:.2f} and {small[1][0]:.2f} of NSGA-II's" in WORDS
-        assert f"with 100 particles it takes {large[0][0]:.2f} and {large[1][0]:.2f}." in WORDS
-        assert min(one[0] for one in (*small, *large)) > 0.5
+        assert min(one[0] for one in ours) > 0.5
 
     @pytest.mark.parametrize("suite", ["MW", "DAS-CMOP"])
     def test_constraints(self, outcome, suite):
@@ -215,7 +172,7 @@ class TestNumbersOfTheSuites:
         ours, runs = feasible["CompactSwarm"]
         assert (
             f"{suite}: feasible in {ours} of {runs} runs (NSGA-II {feasible['NSGA-II'][0]}, C-TAEA "
-            f"{feasible['C-TAEA'][0]}), average rank by hypervolume {found['CompactSwarm']:.2f} "
+            f"{feasible['C-TAEA'][0]}) | average rank by hypervolume {found['CompactSwarm']:.2f} "
             f"(`ElitistSwarm` {found['ElitistSwarm']:.2f}, C-TAEA {found['C-TAEA']:.2f}, NSGA-II "
             f"{found['NSGA-II']:.2f})"
         ) in WORDS

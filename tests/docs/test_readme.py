@@ -137,7 +137,7 @@ def test_the_campaign_to_try_holds_the_effect_that_is_named(tmp_path, monkeypatc
 
 
 def test_the_readme_is_short():
-    assert len(README.splitlines()) <= 150
+    assert len(README.splitlines()) <= 100
 
 
 @pytest.mark.nightly

@@ -13,7 +13,7 @@ SHARED = ROOT.parent / "shared"
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 PAGES = "\n\n".join(
     (DOCS / f"{name}.md").read_text(encoding="utf-8")
-    for name in ("model_and_measurements", "command_line", "paper", "which_algorithm")
+    for name in ("model_and_measurements", "command_line", "paper", "which_algorithm", "faq")
 )
 """Pages that the README leaves the details to."""
 WORDS = " ".join((README + PAGES).split())

@@ -19,7 +19,7 @@ from pymoo_hdte.discrepancy._records.believed_model import (
     single_tolerances,
 )
 from pymoo_hdte.discrepancy._records.campaign import Campaign
-from pymoo_hdte.discrepancy._records.campaign_format import (
+from pymoo_hdte.discrepancy._records.campaign_keys import (
     BELIEVED,
     CAMPAIGN_FILE,
     COLUMNS,

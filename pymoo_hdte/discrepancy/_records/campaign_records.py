@@ -17,7 +17,7 @@ from pymoo_hdte._io.layout import Channel, TableLayout, layout_from_fields, with
 from pymoo_hdte._io.tables import Columns, read_columns
 from pymoo_hdte._io.text_lines import Seen
 from pymoo_hdte.checks import InvalidInput
-from pymoo_hdte.discrepancy._records.campaign_format import (
+from pymoo_hdte.discrepancy._records.campaign_keys import (
     CAMPAIGN_FILE,
     ENDING,
     LAYOUT,

@@ -252,7 +252,8 @@ def _encoder_change(
         where = slice(place, len(records))
     else:
         found = _outlier(records, means.values, means.loads, means.weights, rules)
-        if found is None:
+        # Without load the torsion stays where a loop of its hysteresis left it: no sensor has moved.
+        if found is None or not records[found[0]].load_torque:
             return None
         place, size = found
         where = slice(place, place + 1)
