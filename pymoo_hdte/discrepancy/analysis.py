@@ -20,6 +20,7 @@ from pymoo_hdte.discrepancy._records.campaign import Campaign
 from pymoo_hdte.discrepancy._records.rig_files import MeasuredMechanism
 from pymoo_hdte.discrepancy._records.rig_model import MechanismModel
 from pymoo_hdte.discrepancy._report.folder import check_report_folder
+from pymoo_hdte.discrepancy._report.words import doubts
 from pymoo_hdte.discrepancy._selection.rules import RULES, Rules
 from pymoo_hdte.discrepancy._selection.verdict import Verdict
 from pymoo_hdte.discrepancy._verdicts.drive import examine_drive
@@ -141,6 +142,11 @@ class DriveAnalysis:
         """What is missing: ``status``, the ``chosen`` effects, and ``alternatives``."""
         return self.finding.verdict
 
+    @property
+    def doubts(self) -> tuple[str, ...]:
+        """The reasons of the verdict in words: what forbids to name its effects plainly."""
+        return tuple(doubts(self.verdict, self.campaign.believed.error_orders))
+
     def locate(self) -> Location:
         """Return where the believed model is wrong: by record, channel and order, and in words."""
         return self._location
@@ -233,6 +239,11 @@ class MechanismAnalysis:
     def verdict(self) -> Verdict:
         """What is missing: ``status``, the ``chosen`` effects, and ``alternatives``."""
         return self.finding.verdict
+
+    @property
+    def doubts(self) -> tuple[str, ...]:
+        """The reasons of the verdict in words: what forbids to name its effects plainly."""
+        return tuple(doubts(self.verdict))
 
     def locate(self) -> MechanismLocation:
         """Return in which force balance the believed model is wrong, and by how much."""

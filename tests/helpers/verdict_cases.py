@@ -55,16 +55,16 @@ def ranking_fits_decide(patch):
 
 def no_proof(patch):
     """The held-out records have no say."""
-    doubts_of = verdict.doubts_of
+    reasons_of = verdict.reasons_of
 
     patch.setattr(
-        verdict, "doubts_of", lambda search, chosen, vote: doubts_of(search, chosen, None)
+        verdict, "reasons_of", lambda search, chosen, vote: reasons_of(search, chosen, None)
     )
 
 
 def no_doubts(patch):
     """Neither the held-out records nor bounds and intervals have a say."""
-    patch.setattr(verdict, "doubts_of", lambda search, chosen, vote: [])
+    patch.setattr(verdict, "reasons_of", lambda search, chosen, vote: [])
 
 
 def one_parameter_at_a_time(patch):

@@ -27,6 +27,7 @@ from experiments.studies.measured.rigs import MEASURED
 from pymoo_hdte._io.text_table import csv_text
 from pymoo_hdte.discrepancy import DriveAnalysis, analyse, read_campaign
 from pymoo_hdte.discrepancy._report.tables import STATUSES as SHOWN
+from pymoo_hdte.discrepancy._report.words import in_a_sentence
 from pymoo_hdte.discrepancy._selection.candidate import Candidate
 from pymoo_hdte.effects.sentence_blanks import in_words
 
@@ -95,7 +96,7 @@ def verdict_row(name: str, analysis: DriveAnalysis) -> list[str]:
     effects = "" if accepted is verdict.base else _labels(accepted.candidates)
     rivals = " or ".join(_labels(one.candidates) for one in verdict.equivalent)
     fits = [one.chi_square / verdict.degrees_of_freedom for one in (verdict.base, accepted)]
-    words = [name, verdict.status, effects, rivals, "; ".join(verdict.doubts)]
+    words = [name, verdict.status, effects, rivals, "; ".join(map(in_a_sentence, verdict.reasons))]
     gaps = [float("nan")] * 5
     if proof is not None:
         error = proof.channels["transmission_error"]

@@ -8,11 +8,8 @@ from numpy.typing import NDArray
 from pymoo_hdte.discrepancy._evidence.force_balances.candidates import turns_back
 from pymoo_hdte.discrepancy._evidence.force_balances.unexplained import fitted_values, share_removed
 from pymoo_hdte.discrepancy._selection.hypothesis import Hypothesis
-from pymoo_hdte.discrepancy._selection.verdict import NOT_PROVEN
 from pymoo_hdte.discrepancy._verdicts.joint import SLOWING, JointFinding
 from pymoo_hdte.discrepancy._verdicts.joint_torsion import errors_of
-from pymoo_hdte.discrepancy._verdicts.validation_mechanism import rests_told
-from pymoo_hdte.effects.sentence_blanks import in_words
 from pymoo_hdte.mechanism.balances import quantity_names
 from pymoo_hdte.units import ARCSEC
 
@@ -44,8 +41,8 @@ def near_by(finding: JointFinding) -> list[Hypothesis]:
     return found[:_MOST_TOLD]
 
 
-def torsion_limits(finding: JointFinding) -> list[str]:
-    """Return what the records cannot tell of the torsion, in sentences."""
+def open_by_motion(finding: JointFinding) -> list[str]:
+    """Return what the motion of the joint leaves open, with what may be wrong of its encoders."""
     torsion, gear = finding.torsion, finding.joint.gear.name
     shaft = torsion.mechanism.ports[0].name
     found = [
@@ -60,31 +57,12 @@ def torsion_limits(finding: JointFinding) -> list[str]:
         )
     elif not turns_back(torsion.data, gear):
         found.append("The torque only rises or only falls: hysteresis of the gear does not show.")
-    near = near_by(finding)
-    if torsion.verdict.accepted is torsion.verdict.base and near:
-        words = "; or ".join(in_words(one.label) for one in near)
-        told = f"What was fitted would also be explained by {words}"
-        if NOT_PROVEN in torsion.verdict.doubts:
-            told += f"; but {NOT_PROVEN} with the best of them"
-        found.append(f"{told}: none is named.")
-    found += rests_told(torsion)
-    return [*found, *_delay(finding), *_in_both(finding), *_beyond_band(finding)]
-
-
-def _beyond_band(finding: JointFinding) -> list[str]:
-    """Return the limits of the search beyond the band, which speaks of forces and ripple."""
-    gear = finding.joint.gear.name
-    words = {
-        f"The force at the {gear}": f"The torsion of the {gear}",
-        f"Ripple at the {gear}": f"An error of the {gear}",
-        "makes the forces of the held-out records": "makes the torsion of the held-out records",
-        "its ripple": "its error",
-        "a torque cannot": "an error cannot",
-    }
-    found = list(finding.torsion.ripples.limits)
-    for theirs, ours in words.items():
-        found = [one.replace(theirs, ours) for one in found]
     return found
+
+
+def open_by_twins(finding: JointFinding) -> list[str]:
+    """Return what looks alike in the torsion: friction and delay, errors and ripple of an order."""
+    return [*_delay(finding), *_in_both(finding), *finding.torsion.ripples.limits]
 
 
 def _in_both(finding: JointFinding) -> list[str]:

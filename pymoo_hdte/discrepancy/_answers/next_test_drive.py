@@ -76,12 +76,6 @@ def next_experiment(finding: DriveFinding) -> Proposal:
     finding : DriveFinding
         Of `analysis.examine_drive`.
     """
-    proposal, orders = _proposed(finding), finding.campaign.believed.error_orders
-    return replace(proposal, description=labels_by_order(proposal.description, orders))
-
-
-def _proposed(finding: DriveFinding) -> Proposal:
-    """Return the test with labels of candidates in its description."""
     verdict, grid = finding.verdict, Grid.of(finding)
     if verdict.chosen is None:
         return _most_uncertain(grid, grid.model(verdict.base))
@@ -101,7 +95,7 @@ def _proposed(finding: DriveFinding) -> Proposal:
     separations = np.array([separation(model, hypothesis) for hypothesis in hypotheses])
     told = np.flatnonzero(separations.max(axis=1) >= least)
     if not len(told):
-        return _no_test(model.label, hypotheses, separations, verdict)
+        return _no_test(grid, model.label, hypotheses, separations, verdict)
     # One test for all rivals where there is one, or else for the nearest that a test separates.
     together = separations[told].min(axis=0)
     if together.max() < least:
@@ -114,27 +108,37 @@ def _proposed(finding: DriveFinding) -> Proposal:
     # What two models of a class share is not what a test is to tell apart.
     sets = [chosen.candidates, rivals[closest].candidates]
     one, other = labels_apart(sets) if same else labels
-    said = _aim(verdict, one, other, same)
+    said = _aim(verdict, _in_words(grid, one), _in_words(grid, other), same)
     proposed = _proposal(grid, test, said, labels, float(separations[closest, test]))
     never = [k for k in range(len(hypotheses)) if separations[k].max() < least]
     if not never:
         return proposed
-    left_over = _inseparable(model.label, [hypotheses[k] for k in never])
+    left_over = _inseparable(grid, model.label, [hypotheses[k] for k in never])
     return replace(proposed, description=f"{proposed.description} {left_over}")
 
 
-def _inseparable(label: str, rivals: Sequence[Model]) -> str:
-    others = " or from ".join(rival.label for rival in rivals)
-    return f"What separates {label} from {others}? No test within the limits does."
+def _in_words(grid: Grid, label: str) -> str:
+    """Return the label of a set of effects in words, lines of the static error by their order."""
+    return labels_by_order(label, grid.data.campaign.believed.error_orders)
+
+
+def _inseparable(grid: Grid, label: str, rivals: Sequence[Model]) -> str:
+    others = " or from ".join(_in_words(grid, rival.label) for rival in rivals)
+    return f"What separates {_in_words(grid, label)} from {others}? No test within the limits does."
 
 
 def _no_test(
-    label: str, rivals: Sequence[Model], separations: NDArray[np.float64], verdict: Verdict
+    grid: Grid,
+    label: str,
+    rivals: Sequence[Model],
+    separations: NDArray[np.float64],
+    verdict: Verdict,
 ) -> Proposal:
     """Say that all tests leave it to chance which of the models is right."""
-    said = _inseparable(label, rivals)
+    said = _inseparable(grid, label, rivals)
     if verdict.status == "unlisted":
-        said = f"Neither {label} nor {rivals[0].label} explains the data. {said}"
+        neither = f"{_in_words(grid, label)} nor {_in_words(grid, rivals[0].label)}"
+        said = f"Neither {neither} explains the data. {said}"
     labels = label, rivals[0].label
     return Proposal(said, "none", None, None, labels, float(separations[0].max()))
 
@@ -207,8 +211,9 @@ def _encoder_twin(grid: Grid, chosen: Fit, model: Model) -> Proposal | None:
         test = int(np.argmax(expected))
         _, speed, load, _ = grid.condition(test)
         text = (
-            f"{candidate.label} and {twin} predict nearly the same in every record: turn the disc "
-            f"of the output encoder by {180.0 / turns:.3g} degrees on its shaft and repeat a "
+            f"{_in_words(grid, candidate.label)} and {_in_words(grid, twin)} predict nearly the "
+            "same in every record: turn the disc of the output encoder by "
+            f"{180.0 / turns:.3g} degrees on its shaft and repeat a "
             f"record at {speed:.4g} r/min with {load:.3g} N.m. A line of the encoder turns "
             "with it; one of the drive stays."
         )
@@ -240,9 +245,10 @@ def _zero_twin(grid: Grid, finding: DriveFinding, chosen: Fit, model: Model) -> 
         twin = "zero error of the input torque sensor"
         what = "" if placed[1].breakaway == level else "The level of "
         text = (
-            f"{what}{candidate.label} and a {twin} of {level:.2g} N.m predict the same as long as "
-            f"the input turns one way: repeat the record at {speed:.4g} r/min with {load:.3g} N.m "
-            "in reverse, or tare the sensor with the motor uncoupled."
+            f"{what}{_in_words(grid, candidate.label)} and a {twin} of {level:.2g} N.m predict the "
+            "same as long as the input turns one way: repeat the record at "
+            f"{speed:.4g} r/min with {load:.3g} N.m in reverse, or tare the sensor with the motor "
+            "uncoupled."
         )
         labels = (candidate.label, twin)
         return Proposal(text, "running", -speed, 0.0 - load, labels, float(expected[test]))

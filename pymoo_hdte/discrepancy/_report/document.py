@@ -15,6 +15,7 @@ from pymoo_hdte.discrepancy._answers.where.map import Location
 from pymoo_hdte.discrepancy._answers.where.relevance import relevance
 from pymoo_hdte.discrepancy._evidence.order_lines.evidence import PARTS
 from pymoo_hdte.discrepancy._evidence.order_lines.parameters import base_unit, labels_by_order
+from pymoo_hdte.discrepancy._report.words import doubts
 from pymoo_hdte.discrepancy._selection.candidate import Candidate, labels_apart
 from pymoo_hdte.discrepancy._selection.fitting import Fit
 from pymoo_hdte.discrepancy._selection.hypothesis import (
@@ -63,7 +64,8 @@ def verdict_document(
         "status": verdict.status,
         "sentence": sentence(verdict, orders),
         "probability": verdict.probability,
-        "doubts": [labels_by_order(one, orders) for one in verdict.doubts],
+        "doubts": doubts(verdict, orders),
+        "reasons": [reason.as_dict() for reason in verdict.reasons],
         "effects": effects_of(verdict),
         "relevance": None if matters is None else matters.as_dict(),
         "alternatives": _alternatives(verdict),
@@ -123,9 +125,9 @@ def sentence(verdict: Verdict, error_orders: Sequence[float] = ()) -> str:
         return f"{missing}. The nearest is {labels_by_order(chosen.label, error_orders)}."
     if verdict.status == "class" and verdict.equivalent:
         what = f"{what} {_or_else([chosen, *verdict.equivalent], error_orders)}"
-    if verdict.doubts:
-        doubts = labels_by_order("; ".join(verdict.doubts), error_orders)
-        return f"{what} That is not all, or not quite right: {doubts}."
+    if verdict.reasons:
+        against = "; ".join(doubts(verdict, error_orders))
+        return f"{what} That is not all, or not quite right: {against}."
     return what
 
 

@@ -15,11 +15,12 @@ from pymoo_hdte.discrepancy._answers.where.balances import locate_in_mechanism
 from pymoo_hdte.discrepancy._evidence.force_balances.candidates import turns_back
 from pymoo_hdte.discrepancy._report.document import SCHEMA_VERSION, sentence, with_believed_effects
 from pymoo_hdte.discrepancy._report.mechanism_values import effects, quantities, ripples
+from pymoo_hdte.discrepancy._report.words import in_a_sentence
 from pymoo_hdte.discrepancy._selection.hypothesis import Hypothesis, label_of
+from pymoo_hdte.discrepancy._selection.reason import NOT_VALIDATED, Reason
 from pymoo_hdte.discrepancy._verdicts.mechanism_finding import MechanismFinding
 from pymoo_hdte.discrepancy._verdicts.validation_mechanism import (
     MeasuredGap,
-    not_proven,
     rests_told,
 )
 from pymoo_hdte.effects.effect import effect_named
@@ -47,6 +48,7 @@ def mechanism_verdict_document(
         "campaign": title,
         "status": verdict.status,
         "sentence": _sentence(finding),
+        "reasons": [reason.as_dict() for reason in verdict.reasons],
         "effects": [*effects(finding), *ripples(finding)],
         "offered": offered(finding),
         "alternatives": [
@@ -179,7 +181,7 @@ def limits(finding: MechanismFinding) -> list[str]:
         for one in finding.mechanism.inputs
         if not one.scaled
     ]
-    found += not_proven(finding)
+    found += _not_validated(finding)
     if not any(record.role == "held_out" for record in finding.records):
         found.append("No record was held out: the correction is not proved where it was not made.")
     if any(finding.accepted.bound_sides[: len(finding.data.base)]):
@@ -187,6 +189,21 @@ def limits(finding: MechanismFinding) -> list[str]:
         if names:
             found.append(f"At the bound of its tolerance: {', '.join(names)}.")
     return [*found, *finding.ripples.limits]
+
+
+def _not_validated(finding: MechanismFinding) -> list[str]:
+    """Return a sentence on what the held-out records forbid to name, if they do."""
+    chosen = finding.verdict.chosen
+    if chosen is None or not finding.verdict.has_reason(NOT_VALIDATED):
+        return []
+    sizes = []
+    for name in finding.mechanism.coordinates:
+        before, after, _ = np.mean([one.powers(name) for one in finding.simulated], axis=0) ** 0.5
+        sizes.append(f"{name} by simulation {before:.3g} without it, {after:.3g} with it")
+    return [
+        f"{in_words(chosen.label)} would explain the records that were fitted, but "
+        f"{in_a_sentence(Reason(NOT_VALIDATED))}: {', '.join(sizes)} (root mean square, SI)."
+    ]
 
 
 def record_remarks(finding: MechanismFinding) -> list[str]:

@@ -12,15 +12,19 @@ from scipy.stats import norm
 from pymoo_hdte._reports.figures import AFTER, BEFORE, GREY
 from pymoo_hdte.discrepancy._answers.joint_open_questions import (
     near_by,
-    torsion_limits,
+    open_by_motion,
+    open_by_twins,
     torsion_test,
 )
 from pymoo_hdte.discrepancy._report.document import sentence
 from pymoo_hdte.discrepancy._report.mechanism_document import evidence, offered
 from pymoo_hdte.discrepancy._report.mechanism_values import effects, quantities
+from pymoo_hdte.discrepancy._report.words import in_a_sentence
 from pymoo_hdte.discrepancy._selection.candidate import Candidate
+from pymoo_hdte.discrepancy._selection.reason import NOT_VALIDATED, Reason
 from pymoo_hdte.discrepancy._verdicts.joint import JointFinding
 from pymoo_hdte.discrepancy._verdicts.joint_torsion import KINEMATIC, errors_of
+from pymoo_hdte.discrepancy._verdicts.validation_mechanism import rests_told
 from pymoo_hdte.effects.sentence_blanks import in_words
 from pymoo_hdte.mechanism import LawAt
 from pymoo_hdte.units import ARCSEC
@@ -41,6 +45,7 @@ def torsion_document(finding: JointFinding) -> dict[str, Any]:
         "gear": finding.joint.gear.name,
         "status": torsion.verdict.status,
         "sentence": torsion_sentence(finding),
+        "reasons": [reason.as_dict() for reason in torsion.verdict.reasons],
         "effects": _effects(finding),
         "location": _location(finding),
         "offered": offered(torsion),
@@ -64,6 +69,24 @@ def torsion_document(finding: JointFinding) -> dict[str, Any]:
         "proof": _proof(finding),
         "next_experiment": torsion_test(finding),
     }
+
+
+def torsion_limits(finding: JointFinding) -> list[str]:
+    """Return what the records cannot tell of the torsion, in sentences."""
+    of_names, of_rest = _unnamed(finding), rests_told(finding.torsion)
+    return [*open_by_motion(finding), *of_names, *of_rest, *open_by_twins(finding)]
+
+
+def _unnamed(finding: JointFinding) -> list[str]:
+    """Return which effects explain the torsion that was fitted, where none of them is named."""
+    verdict, near = finding.torsion.verdict, near_by(finding)
+    if verdict.accepted is not verdict.base or not near:
+        return []
+    words = "; or ".join(in_words(one.label) for one in near)
+    told = f"What was fitted would also be explained by {words}"
+    if verdict.has_reason(NOT_VALIDATED):
+        told += f"; but {in_a_sentence(Reason(NOT_VALIDATED))} with the best of them"
+    return [f"{told}: none is named."]
 
 
 def torsion_sentence(finding: JointFinding) -> str:

@@ -1,4 +1,4 @@
-"""What forbids to name a set of effects plainly, in words."""
+"""What forbids to name a set of effects plainly."""
 
 from __future__ import annotations
 
@@ -19,40 +19,50 @@ from pymoo_hdte.discrepancy._selection.hypothesis import (
     expected_values,
     explains,
 )
+from pymoo_hdte.discrepancy._selection.reason import (
+    ABOVE_NOISE,
+    AT_BOUND,
+    FREED_AT_BOUND,
+    HARMONIC_OF_ANOTHER,
+    NEEDS_ANOTHER_FORM,
+    NOT_VALIDATED,
+    SENSOR_AT_BOUND,
+    STANDS_FOR_FORM,
+    ZERO_IN_INTERVAL,
+    Reason,
+)
 from pymoo_hdte.discrepancy._selection.rules import Rules
 from pymoo_hdte.discrepancy._selection.search import Search
 
-NOT_PROVEN = "the error on the records kept out of the fit does not shrink as it should"
 
-
-def doubts_of(search: Search, chosen: Hypothesis, vote: Vote | None) -> list[str]:
-    """Return what forbids to name a set plainly, in words; nothing if it may be named."""
+def reasons_of(search: Search, chosen: Hypothesis, vote: Vote | None) -> list[Reason]:
+    """Return what forbids to name a set plainly; nothing if it may be named."""
     found, fitted = [], chosen.fit
     unsure = uncertain(fitted, search.data.rules)
     for candidate, bounded in bounded_unknowns(fitted):
         if bounded:
-            found.append(f"{', '.join(bounded)} of {candidate.label} ended at a bound")
+            found.append(Reason.of(AT_BOUND, candidate.label, bounded))
         elif candidate in unsure:
             found += holds_zero([candidate])
-    if any(one.frees in fitted.at_bounds for one in chosen.candidates):
-        found.append("a base parameter ended at ten times or a tenth of what is believed")
+    if freed := _freed_at_bounds(chosen):
+        found.append(Reason.of(FREED_AT_BOUND, numbers=freed))
     for name in _contradicted_in_any_form(search, chosen):
-        found.append(f"{name.replace('_', ' ')} ended far beyond what is stated of it")
+        found.append(Reason(SENSOR_AT_BOUND, name))
     curves = [one.label for one in chosen.candidates if not one.exact]
     if not search.enough(chosen):
         if curves and chosen.freed:
-            found.append(f"values out of tolerance may stand for what {curves[0]} leaves")
+            found.append(Reason(STANDS_FOR_FORM, curves[0]))
         found += _harmonics_of_another(chosen.candidates)
     if vote is not None and vote.denies(search.data.rules, fitted.misfit):
-        found.append(NOT_PROVEN)
+        found.append(Reason(NOT_VALIDATED))
     per_degree = fitted.chi_square / search.degrees_of_freedom
     if per_degree > search.data.rules.contradicting_chi_square:
-        found.append(left_by(per_degree))
+        found.append(above_noise(per_degree))
     return found
 
 
-def other_forms(search: Search, chosen: Hypothesis) -> list[str]:
-    """Return in words which members stand for what their listed forms do not explain.
+def other_forms(search: Search, chosen: Hypothesis) -> list[Reason]:
+    """Return which members stand for what their listed forms do not explain.
 
     All together where the listed forms contradict a part of the data and only others do not.
     """
@@ -66,7 +76,7 @@ def other_forms(search: Search, chosen: Hypothesis) -> list[str]:
         forms = search.forms
         if forms.explains(chosen) or forms.explains_in_another(chosen):
             found = [chosen.label]
-    return [f"{one} has to have another form to explain what is left" for one in found]
+    return [Reason(NEEDS_ANOTHER_FORM, label) for label in found]
 
 
 def explains_in_any_form(search: Search, one: Hypothesis) -> bool:
@@ -79,14 +89,14 @@ def explains_as_listed(search: Search, one: Hypothesis) -> bool:
     return explains(search.data, one, search.base, search.degrees_of_freedom)
 
 
-def _harmonics_of_another(candidates: Sequence[Candidate]) -> list[str]:
-    """Return in words which effects may be no more than harmonics of the form of another.
+def _harmonics_of_another(candidates: Sequence[Candidate]) -> list[Reason]:
+    """Return which effects may be no more than harmonics of the form of another.
 
     A clearance that varies once in some angle need not do so as a cosine; its harmonics look like
     an error of their order. Effects that fit down to the noise as listed leave no such choice.
     """
     return [
-        f"{higher.label} may be a harmonic of {lower.label}"
+        Reason.of(HARMONIC_OF_ANOTHER, higher.label, {lower.label: higher.order / lower.order})
         for lower, higher in permutations(candidates, 2)
         if not lower.exact and lower.port == higher.port and lower.name != higher.name
         if lower.order is not None and higher.order is not None
@@ -99,9 +109,18 @@ def is_harmonic(higher: float, order: float) -> bool:
     return higher > order and bool(np.isclose(higher % order, 0.0))
 
 
-def left_by(per_degree: float) -> str:
-    """Say what a chi-square per degree of freedom means."""
-    return f"what is left is {np.sqrt(per_degree):.3g} times the noise"
+def above_noise(per_degree: float) -> Reason:
+    """Return what a chi-square per degree of freedom means."""
+    return Reason.of(ABOVE_NOISE, numbers={"times_noise": np.sqrt(per_degree)})
+
+
+def _freed_at_bounds(chosen: Hypothesis) -> dict[str, float]:
+    """Return the base values that a set frees and that ended at a bound."""
+    fitted = chosen.fit
+    freed = {one.frees for one in chosen.candidates} & set(fitted.at_bounds)
+    # Parameters of effects follow those of the base, and may have the same names.
+    named = reversed([*zip(fitted.parameters, fitted.values, strict=True)])
+    return {one.name: float(value) for one, value in named if one.name in freed}
 
 
 def _contradicted_in_any_form(search: Search, chosen: Hypothesis) -> list[str]:
@@ -150,9 +169,9 @@ def uncertain(
     ]
 
 
-def holds_zero(candidates: Sequence[Candidate]) -> list[str]:
-    """Say that the intervals of candidates contain zero."""
-    return [f"the interval of {one.label} contains zero" for one in candidates]
+def holds_zero(candidates: Sequence[Candidate]) -> list[Reason]:
+    """Return that the intervals of candidates contain zero."""
+    return [Reason(ZERO_IN_INTERVAL, one.label) for one in candidates]
 
 
 def strength_is_certain(

@@ -12,8 +12,8 @@ import numpy as np
 
 from pymoo_hdte.discrepancy._selection.candidate import Candidate
 from pymoo_hdte.discrepancy._selection.caveats import (
-    doubts_of,
     explains_in_any_form,
+    reasons_of,
     varies,
 )
 from pymoo_hdte.discrepancy._selection.choice import (
@@ -161,12 +161,14 @@ def with_one_more(search: Search, chosen: Hypothesis) -> list[Hypothesis]:
     ]
     # Where forms are not known, only what is listed was compared.
     any_form = search.forms.known(chosen.effects)
-    if not (larger and any_form) or not doubts_of(search, chosen, None):
+    if not (larger and any_form) or not reasons_of(search, chosen, None):
         return []
     found = [
         one
         for one in map(search.finished, larger)
-        if search.enough(one) and confirmed(search, one) is one and not doubts_of(search, one, None)
+        if search.enough(one)
+        and confirmed(search, one) is one
+        and not reasons_of(search, one, None)
     ]
     found.sort(key=lambda one: one.bic)
     return [one for one in found if near_by_evidence(one, found[0], freedom, rules)]

@@ -127,20 +127,22 @@ def unexplained(data: Evidence, base: Fit, fitted: Fit) -> NDArray[np.bool_]:
     return np.asarray(before.significant(rules) & plain & residual)
 
 
-def bounded_unknowns(fitted: Fit) -> list[tuple[Candidate, list[str]]]:
-    """Return for each candidate of a fit which of its unknowns ended at a bound.
+def bounded_unknowns(fitted: Fit) -> list[tuple[Candidate, dict[str, float]]]:
+    """Return for each candidate of a fit its unknowns that ended at a bound, with their values.
 
     A level that ended at zero is a part that the effect does not have, and a corner that ended as
     sharp as points can resolve is a sharp corner.
     """
     found = []
     for candidate, place in fitted.places:
-        names = []
-        for side, parameter in zip(fitted.bound_sides[place], candidate.parameters, strict=True):
+        values = {}
+        rows = range(place.start, place.stop)
+        for row, parameter in zip(rows, candidate.parameters, strict=True):
+            side = fitted.bound_sides[row]
             none = parameter.linear and parameter.lower == 0.0 and side < 0.0
             if parameter.limited_at(side) and not none:
-                names.append(parameter.name)
-        found.append((candidate, names))
+                values[parameter.name] = float(fitted.values[row])
+        found.append((candidate, values))
     return found
 
 

@@ -10,17 +10,16 @@ leaves more than noise is named in part.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from pymoo_hdte.discrepancy._selection import probability
 from pymoo_hdte.discrepancy._selection.candidate import Candidate
 from pymoo_hdte.discrepancy._selection.caveats import (
-    NOT_PROVEN,
-    doubts_of,
+    above_noise,
     explains_in_any_form,
-    left_by,
     other_forms,
+    reasons_of,
 )
 from pymoo_hdte.discrepancy._selection.choice import in_one_law, replaced
 from pymoo_hdte.discrepancy._selection.equivalents import (
@@ -34,10 +33,14 @@ from pymoo_hdte.discrepancy._selection.excess import Vote
 from pymoo_hdte.discrepancy._selection.fitted_sets import beyond_stated
 from pymoo_hdte.discrepancy._selection.fitting import Evidence, Fit, fit
 from pymoo_hdte.discrepancy._selection.hypothesis import Hypothesis, down_to_noise
+from pymoo_hdte.discrepancy._selection.reason import (
+    HELD_OUT_ERROR_GROWS,
+    NOT_VALIDATED,
+    Reason,
+)
 from pymoo_hdte.discrepancy._selection.rules import RULES, Rules
 from pymoo_hdte.discrepancy._selection.screening import screen
 from pymoo_hdte.discrepancy._selection.search import Search
-from pymoo_hdte.effects.sentence_blanks import listed
 
 STATUSES = ("adequate", "named", "class", "parameter", "unlisted", "partial")
 EXPLAINED = ("named", "class", "parameter", "partial")
@@ -62,9 +65,9 @@ class Verdict:
     degrees_of_freedom : int
     rules : Rules
         Thresholds of the verdict.
-    doubts : tuple of str
+    reasons : tuple of Reason
         What forbids to name the chosen effects plainly; with ``"partial"`` and ``"class"`` they are
-        certain as far as they go.
+        certain as far as they go. In words they are ``doubts`` of an analysis.
     shown_in_held_out : bool
         Whether the records kept out of the fit, if there are any, show what is chosen.
     probability : float or None
@@ -83,7 +86,7 @@ class Verdict:
     equivalent: tuple[Hypothesis, ...]
     degrees_of_freedom: int
     rules: Rules = RULES
-    doubts: tuple[str, ...] = ()
+    reasons: tuple[Reason, ...] = ()
     shown_in_held_out: bool = True
     probability: float | None = None
     in_another_form: float | None = None
@@ -110,6 +113,10 @@ class Verdict:
             one.names == other.names and one.bic - other.bic < near for other in named
         )
 
+    def has_reason(self, code: str) -> bool:
+        """Tell whether any of its reasons has a code."""
+        return any(reason.code == code for reason in self.reasons)
+
     @property
     def comes_near(self) -> bool:
         """Whether the chosen effects explain at least half of the misfit."""
@@ -117,7 +124,10 @@ class Verdict:
         return chosen is not None and chosen.explained >= self.rules.explained_part_share
 
     def proven(
-        self, vote: Vote | None = None, worse: Sequence[str] = (), condemned: bool = False
+        self,
+        vote: Vote | None = None,
+        worse: Mapping[str, float] | None = None,
+        condemned: bool = False,
     ) -> Verdict:
         """Return it as the held-out records leave it; every verdict with such records ends here.
 
@@ -125,8 +135,8 @@ class Verdict:
         ----------
         vote : Vote, optional
             Theirs on the named effects, where it has not been heard yet.
-        worse : sequence of str
-            Whose prediction error grows with the named effects: see `grows`.
+        worse : mapping of str to float, optional
+            Prediction errors that grow with the named effects, after over before: see `grows`.
         condemned : bool
             Whether it grows where it matters most.
 
@@ -137,23 +147,25 @@ class Verdict:
             of theirs grows.
         """
         if condemned or (vote and vote.denies(self.rules, self.accepted.misfit)):
-            doubts = (*self.doubts, NOT_PROVEN)
-            return replace(self, status="unlisted", equivalent=(), doubts=doubts, probability=None)
+            reasons = (*self.reasons, Reason(NOT_VALIDATED))
+            return replace(
+                self, status="unlisted", equivalent=(), reasons=reasons, probability=None
+            )
         shown = self.shown_in_held_out and (vote is None or vote.counts(self.rules))
         verdict = replace(self, shown_in_held_out=shown)
         if not worse:
             return verdict
-        return verdict.doubted([f"the error on records kept out of the fit grows: {listed(worse)}"])
+        return verdict.doubted([Reason.of(HELD_OUT_ERROR_GROWS, numbers=worse)])
 
-    def doubted(self, doubts: Sequence[str]) -> Verdict:
-        """Return it with further doubts, with which no status is unqualified."""
-        if not doubts:
+    def doubted(self, reasons: Sequence[Reason]) -> Verdict:
+        """Return it with further reasons, with which no status is unqualified."""
+        if not reasons:
             return self
         status, sure = self.status, self.probability
         if status in ("named", "parameter"):
             status, shares = "partial", probability.experience_of(self.rules)
             sure = sure and sure * shares["partial"] / shares[self.status]
-        return replace(self, status=status, doubts=(*self.doubts, *doubts), probability=sure)
+        return replace(self, status=status, reasons=(*self.reasons, *reasons), probability=sure)
 
 
 def judge(
@@ -243,23 +255,23 @@ def _is_all(data: Evidence, fitted: Fit) -> bool:
 
 
 def _verdict(search: Search, answer: Answer) -> Verdict:
-    """Return the verdict: an answer with its doubts, status and probability."""
+    """Return the verdict: an answer with its reasons, status and probability."""
     data, rules, degrees_of_freedom = search.data, search.data.rules, search.degrees_of_freedom
     chosen, told, certain, foreign, in_part = answer
     equivalent = list(told)
     vote = data.held_out_vote(search.base, chosen.fit)
     shown = vote is None or vote.counts(rules)
-    doubts = doubts_of(search, chosen, vote) + other_forms(search, chosen)
+    reasons = reasons_of(search, chosen, vote) + other_forms(search, chosen)
     if in_part:
-        left = left_by(chosen.fit.chi_square / degrees_of_freedom)
-        doubts += [left] if left not in doubts else []
+        left = above_noise(chosen.fit.chi_square / degrees_of_freedom)
+        reasons += [left] if left not in reasons else []
     if (certain and not foreign) or in_part:
         # The rules of earning may pass over a set for which the evidence speaks: both are told.
         equivalent += in_one_law(search, chosen)
         equivalent += probability.likelier(chosen, equivalent, search.found, degrees_of_freedom)
     equivalent = distinct(chosen, equivalent)
     known = (certain or in_part) and not search.lacks_evident(chosen)
-    status = _status(chosen, known, equivalent, doubts)
+    status = _status(chosen, known, equivalent, reasons)
     others = tuple(equivalent) if status == "class" else ()
     compared = (chosen, *others) if foreign else search.found
     # A class that is not all is no more certain than a name in part.
@@ -273,7 +285,7 @@ def _verdict(search: Search, answer: Answer) -> Verdict:
         others,
         degrees_of_freedom,
         rules,
-        tuple(doubts),
+        tuple(reasons),
         shown,
         sure,
         search.forms.share_in_another(chosen) if foreign else None,
@@ -281,14 +293,17 @@ def _verdict(search: Search, answer: Answer) -> Verdict:
 
 
 def _status(
-    chosen: Hypothesis, certain: bool, equivalent: Sequence[Hypothesis], doubts: Sequence[str]
+    chosen: Hypothesis,
+    certain: bool,
+    equivalent: Sequence[Hypothesis],
+    reasons: Sequence[Reason],
 ) -> str:
     """Return the status of the best set: what it may be called."""
-    if not chosen.listed or not certain or NOT_PROVEN in doubts:
+    if not chosen.listed or not certain or Reason(NOT_VALIDATED) in reasons:
         return "unlisted"
     if equivalent:
         return "class"
-    if doubts:
+    if reasons:
         return "partial"
     out = all(candidate.name == "parameter" for candidate in chosen.candidates)
     return "parameter" if out else "named"

@@ -111,8 +111,8 @@ def examine_drive(campaign: Campaign, rules: Rules = RULES) -> DriveFinding:
     finding = DriveFinding(campaign, data, verdict, (*unexpected, *harmonics), rows)
     if verdict.accepted is verdict.base or (proof := prove(finding)) is None:
         return finding
-    names = [name.replace("_", " ") for name in proof.worse]
-    return replace(finding, verdict=verdict.proven(worse=names, condemned=proof.condemns))
+    worse = {name.replace("_", " "): growth for name, growth in proof.growths.items()}
+    return replace(finding, verdict=verdict.proven(worse=worse, condemned=proof.condemns))
 
 
 def _harmonics(data: Data, base: Fit) -> list[float]:

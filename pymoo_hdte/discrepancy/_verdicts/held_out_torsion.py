@@ -199,6 +199,6 @@ def without_unproved_lines(verdict: Verdict, fitted: Fit, gaps: Sequence[Measure
         chosen=others[0] if others else None,
         alternatives=tuple(others[1:]),
         equivalent=(),
-        doubts=(),
+        reasons=(),
         probability=None,
     )

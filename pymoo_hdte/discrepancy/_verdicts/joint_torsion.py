@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from pymoo_hdte.discrepancy._evidence.force_balances.beyond_band.ripple import (
+    OF_TORSION,
     Ripple,
     Ripples,
     find_ripples,
@@ -192,4 +193,4 @@ def _lines_beyond(half: Half, joint: Joint, cutoff: float, rules: Rules) -> Ripp
         )
         for one in half.records
     ]
-    return find_ripples(angle, records, cutoff, (), rules)
+    return find_ripples(angle, records, cutoff, (), rules, OF_TORSION)

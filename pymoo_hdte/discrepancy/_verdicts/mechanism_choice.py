@@ -12,7 +12,7 @@ from pymoo_hdte.discrepancy._evidence.force_balances.evidence import MeasuredDat
 from pymoo_hdte.discrepancy._evidence.force_balances.intervals import Spread
 from pymoo_hdte.discrepancy._evidence.force_balances.unexplained import share_removed
 from pymoo_hdte.discrepancy._selection.candidate import Candidate
-from pymoo_hdte.discrepancy._selection.caveats import doubts_of, holds_zero, uncertain
+from pymoo_hdte.discrepancy._selection.caveats import holds_zero, reasons_of, uncertain
 from pymoo_hdte.discrepancy._selection.fitting import Fit, fit
 from pymoo_hdte.discrepancy._selection.hypothesis import (
     Hypothesis,
@@ -22,6 +22,12 @@ from pymoo_hdte.discrepancy._selection.hypothesis import (
     hypothesis_of,
     label_of,
     unexplained,
+)
+from pymoo_hdte.discrepancy._selection.reason import (
+    AT_TOLERANCE,
+    EXPLAINS_TOO_LITTLE,
+    RICHER_AT_BOUND,
+    Reason,
 )
 from pymoo_hdte.discrepancy._selection.search import Search
 from pymoo_hdte.discrepancy._selection.verdict import Verdict, judge
@@ -73,8 +79,8 @@ def judged(
     stated = Spread(data, chosen.fit)
     scale = stated.reach / rules.certain_deviations
     unsure = uncertain(chosen.fit, rules, stated.covariance * np.outer(scale, scale))
-    doubts = [one for one in holds_zero(unsure) if one not in verdict.doubts]
-    return verdict.doubted([_too_little(removed)] * little + doubts)
+    of_zeros = [reason for reason in holds_zero(unsure) if reason not in verdict.reasons]
+    return verdict.doubted([_too_little(removed)] * little + of_zeros)
 
 
 def _compared(
@@ -143,12 +149,12 @@ def _mostly_explained(sensors: MeasuredData, data: MeasuredData, verdict: Verdic
         and one.names != chosen.names
         and _does_as_well(data, one.fit, chosen.fit)
     ]
-    doubts = (*_doubts(data, verdict.base, chosen), _too_little(removed))
-    return _with_rivals(replace(verdict, doubts=doubts), rivals)
+    reasons = (*_reasons(data, verdict.base, chosen), _too_little(removed))
+    return _with_rivals(replace(verdict, reasons=reasons), rivals)
 
 
-def _too_little(removed: float) -> str:
-    return f"it explains {100.0 * removed:.0f} % of the misfit, less than a name takes"
+def _too_little(removed: float) -> Reason:
+    return Reason.of(EXPLAINS_TOO_LITTLE, numbers={"share": removed})
 
 
 def _simplest(data: MeasuredData, verdict: Verdict) -> Verdict:
@@ -188,7 +194,7 @@ def _within_bounds(sensors: MeasuredData, data: MeasuredData, verdict: Verdict) 
         for one in verdict.alternatives
         if label_of(one.candidates) > label_of(chosen.candidates)
         and len(one.candidates) == len(chosen.candidates) + 1
-        and not _doubts(data, verdict.base, one)
+        and not _reasons(data, verdict.base, one)
         and down_to_noise(one.fit, degrees_of_freedom, data.rules)
     ]
     if larger:
@@ -204,13 +210,12 @@ def _within_bounds(sensors: MeasuredData, data: MeasuredData, verdict: Verdict) 
     ]
     if not simpler:
         return verdict
-    bounded = ", ".join(_bounded(chosen.fit))
-    doubt = f"{chosen.label} leaves less, but its {bounded} ended at a bound"
-    return _choosing(data, verdict, min(simpler, key=lambda one: one.bic), doubt)
+    reason = Reason(RICHER_AT_BOUND, chosen.label, tuple(_bounded(chosen.fit)))
+    return _choosing(data, verdict, min(simpler, key=lambda one: one.bic), reason)
 
 
-def _choosing(data: MeasuredData, verdict: Verdict, one: Hypothesis, *doubts: str) -> Verdict:
-    """Return the verdict with another of its sets as the chosen one, and further doubts."""
+def _choosing(data: MeasuredData, verdict: Verdict, one: Hypothesis, *more: Reason) -> Verdict:
+    """Return the verdict with another of its sets as the chosen one, and further reasons."""
     assert verdict.chosen is not None
     others = tuple(each for each in (verdict.chosen, *verdict.alternatives) if each is not one)
     rivals = (
@@ -218,8 +223,8 @@ def _choosing(data: MeasuredData, verdict: Verdict, one: Hypothesis, *doubts: st
         for each in verdict.equivalent
         if each is not one and len(each.members) == len(one.members)
     )
-    found = (*_doubts(data, verdict.base, one), *doubts)
-    return _with_rivals(replace(verdict, chosen=one, alternatives=others, doubts=found), rivals)
+    reasons = (*_reasons(data, verdict.base, one), *more)
+    return _with_rivals(replace(verdict, chosen=one, alternatives=others, reasons=reasons), rivals)
 
 
 def _with_true_rivals(data: MeasuredData, verdict: Verdict) -> Verdict:
@@ -261,14 +266,14 @@ def _with_substitutes(
 def _with_rivals(verdict: Verdict, equivalent: Iterable[Hypothesis]) -> Verdict:
     """Return the verdict with other hypotheses that explain as much, which make it a class.
 
-    Without any, doubts make it partial.
+    Without any, reasons against it make it partial.
     """
     rivals = tuple(equivalent)
-    status = "class" if rivals else "partial" if verdict.doubts else "named"
+    status = "class" if rivals else "partial" if verdict.reasons else "named"
     return replace(verdict, status=status, equivalent=rivals)
 
 
-def _doubts(data: MeasuredData, base: Fit, chosen: Hypothesis) -> list[str]:
+def _reasons(data: MeasuredData, base: Fit, chosen: Hypothesis) -> list[Reason]:
     """Return what forbids to name a set plainly: of its effects, and bounds of believed values.
 
     A value that ended at zero, or at the least that a fit knows, is a part that the machine does
@@ -281,8 +286,8 @@ def _doubts(data: MeasuredData, base: Fit, chosen: Hypothesis) -> list[str]:
         if side > 0.0
         or (side < 0.0 and parameter.lower not in (0.0, SMALLEST_SHARE * parameter.start))
     ]
-    found = doubts_of(Search(data, base, ()), chosen, None)
-    return found + [f"{name} ended at the bound of its tolerance" for name in stuck]
+    of_effects = reasons_of(Search(data, base, ()), chosen, None)
+    return of_effects + [Reason(AT_TOLERANCE, name) for name in stuck]
 
 
 def _does_as_well(data: MeasuredData, one: Fit, chosen: Fit) -> bool:
@@ -291,9 +296,9 @@ def _does_as_well(data: MeasuredData, one: Fit, chosen: Fit) -> bool:
     return bool(np.all(data.power(one.residuals) <= most))
 
 
-def _bounded(fitted: Fit) -> list[str]:
-    """Return the unknowns of effects that ended at a bound."""
-    return [name for _, names in bounded_unknowns(fitted) for name in names]
+def _bounded(fitted: Fit) -> list[tuple[str, float]]:
+    """Return the unknowns of effects that ended at a bound, with their values."""
+    return [item for _, values in bounded_unknowns(fitted) for item in values.items()]
 
 
 def _unknowns(one: Hypothesis) -> int:

@@ -106,9 +106,18 @@ class Proof:
 
         Of a record, its transmission error.
         """
+        return tuple(self.growths)
+
+    @property
+    def growths(self) -> dict[str, float]:
+        """Errors that the correction made worse, by their name in `worse`: after over before."""
         gaps = {**self.channels, "overall": self.overall}
         records = zip(self.records, self.by_record, strict=True)
-        return tuple(name for name, gap in (*gaps.items(), *records) if gap.worse)
+        return {
+            name: gap.after / max(gap.before, 1e-300)
+            for name, gap in (*gaps.items(), *records)
+            if gap.worse
+        }
 
     @property
     def condemns(self) -> bool:

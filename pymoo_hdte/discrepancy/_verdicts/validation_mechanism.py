@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 
 from pymoo_hdte.discrepancy._evidence.force_balances.evidence import measured_data
 from pymoo_hdte.discrepancy._evidence.force_balances.unexplained import root_mean_square
-from pymoo_hdte.discrepancy._selection.caveats import NOT_PROVEN
 from pymoo_hdte.discrepancy._selection.rules import RULES, Rules
 from pymoo_hdte.discrepancy._verdicts.gap import grows
 from pymoo_hdte.discrepancy._verdicts.held_out import (
@@ -25,7 +24,6 @@ from pymoo_hdte.discrepancy._verdicts.held_out import (
     simulate_held_out,
 )
 from pymoo_hdte.discrepancy._verdicts.mechanism_finding import MechanismFinding
-from pymoo_hdte.effects.sentence_blanks import in_words
 from pymoo_hdte.mechanism import Record
 from pymoo_hdte.mechanism.quantity_units import unit_of
 
@@ -242,25 +240,13 @@ def rests_told(finding: MechanismFinding) -> list[str]:
     ]
 
 
-def not_proven(finding: MechanismFinding) -> list[str]:
-    """Return a sentence on what the held-out records forbid to name, if they do."""
-    chosen = finding.verdict.chosen
-    if chosen is None or NOT_PROVEN not in finding.verdict.doubts:
-        return []
-    sizes = []
-    for name in finding.mechanism.coordinates:
-        before, after, _ = np.mean([one.powers(name) for one in finding.simulated], axis=0) ** 0.5
-        sizes.append(f"{name} by simulation {before:.3g} without it, {after:.3g} with it")
-    return [
-        f"{in_words(chosen.label)} would explain the records that were fitted, but "
-        f"{NOT_PROVEN}: {', '.join(sizes)} (root mean square, SI)."
-    ]
-
-
-def grown(gaps: Sequence[MeasuredGap]) -> list[str]:
-    """Return in words the gaps that the correction made worse."""
+def grown(gaps: Sequence[MeasuredGap]) -> dict[str, float]:
+    """Return the gaps that the correction made worse: after over before."""
     worse = [one for one in gaps if one.worse(among=len(gaps))]
-    return [f"{one.quantity} by {one.kind} in {one.record}" for one in worse]
+    return {
+        f"{one.quantity} by {one.kind} in {one.record}": one.after / max(one.before, 1e-300)
+        for one in worse
+    }
 
 
 def _size(difference: Values) -> float:

@@ -275,7 +275,7 @@ def test_what_all_members_of_a_class_share_is_said_once(sets, words):
         return SimpleNamespace(candidates=candidates, label=label, listed=True)
 
     first, *others = map(together, sets)
-    verdict = SimpleNamespace(status="class", chosen=first, equivalent=others, doubts=())
+    verdict = SimpleNamespace(status="class", chosen=first, equivalent=others, reasons=())
     assert sentence(verdict).endswith(words)
 
 

@@ -24,6 +24,7 @@ from pymoo_hdte.discrepancy._report.optimum import OptimumShift
 from pymoo_hdte.discrepancy._report.tables import parameter_rows
 from pymoo_hdte.discrepancy._report.write import gap_sentence, write_report
 from pymoo_hdte.discrepancy._robust_optimum import optimum_shift
+from pymoo_hdte.discrepancy._selection.reason import AT_BOUND, Reason
 from pymoo_hdte.discrepancy._verdicts.validation_drive import prove
 from pymoo_hdte.drive import (
     LawAtPort,
@@ -339,7 +340,7 @@ def test_words_of_a_user_s_effect_are_no_lines_of_the_static_error(ripple, locat
     verdict = replace(
         ripple.verdict,
         chosen=replace(chosen, fit=alone),
-        doubts=(f"{unknown.name} of {own.label} ended at a bound",),
+        reasons=(Reason.of(AT_BOUND, own.label, {unknown.name: unknown.upper}),),
         status="partial",
     )
     document = write_report(

@@ -22,6 +22,7 @@ from pymoo_hdte.discrepancy._selection.equivalents import undecided
 from pymoo_hdte.discrepancy._selection.fitted_sets import FittedSets, is_earned
 from pymoo_hdte.discrepancy._selection.fitting import fit
 from pymoo_hdte.discrepancy._selection.hypothesis import alike, hypothesis_of
+from pymoo_hdte.discrepancy._selection.reason import NEEDS_ANOTHER_FORM
 from pymoo_hdte.discrepancy._selection.rules import RULES
 from pymoo_hdte.discrepancy._selection.search import Search
 from pymoo_hdte.discrepancy._selection.verdict import judge
@@ -71,7 +72,7 @@ def test_a_law_is_named_in_part_whose_listed_form_explains_little(label):
     found = judged(label, data)
     assert (found.status, found.chosen.label) == ("partial", label)
     assert found.chosen.explained < RULES.explained_share
-    assert any("another form" in one for one in found.doubts)
+    assert found.has_reason(NEEDS_ANOTHER_FORM)
     assert AnyForm(data, found.base).explains_in_another(found.chosen)
     assert RULES.partial_share < found.in_another_form <= 1.0
 
@@ -82,7 +83,7 @@ def test_without_its_forms_nothing_tells_that_such_a_law_has_another(label, monk
     monkeypatch.setattr(Data, "corrections", lambda self, candidate: [])
     found = judged(label, planted(label))
     assert found.status == ("partial" if label == LOAD else "unlisted")
-    assert not any("another form" in one for one in found.doubts)
+    assert not found.has_reason(NEEDS_ANOTHER_FORM)
 
 
 def test_a_form_far_from_the_listed_one_is_followed_there(monkeypatch):

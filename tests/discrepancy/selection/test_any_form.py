@@ -18,6 +18,7 @@ from pymoo_hdte.discrepancy._selection.any_form import AnyForm
 from pymoo_hdte.discrepancy._selection.excess import Vote
 from pymoo_hdte.discrepancy._selection.fitting import fit
 from pymoo_hdte.discrepancy._selection.hypothesis import down_to_noise, hypothesis_of
+from pymoo_hdte.discrepancy._selection.reason import NEEDS_ANOTHER_FORM, SENSOR_AT_BOUND, Reason
 from pymoo_hdte.discrepancy._selection.rules import RULES
 from pymoo_hdte.discrepancy._selection.screening import screen
 from pymoo_hdte.discrepancy._selection.search import Search
@@ -117,7 +118,7 @@ def test_a_search_goes_on_from_known_sets_only_where_that_is_asked_for(go_on, la
     assert {one.label for one in found.chosen.candidates} == labels
 
 
-GAIN = "output torque gain ended far beyond what is stated of it"
+GAIN = Reason(SENSOR_AT_BOUND, "output_torque_gain")
 
 
 def judged_with_a_gain(*beside):
@@ -135,7 +136,7 @@ def test_a_gain_that_stands_for_the_form_of_a_law_is_no_doubt():
 
 def test_a_gain_beside_one_law_is_a_doubt():
     """In any form it follows too much."""
-    assert GAIN in judged_with_a_gain().doubts
+    assert GAIN in judged_with_a_gain().reasons
 
 
 DRAG, DRY = "nonlinear_drag:input", "coulomb_friction:input"
@@ -156,7 +157,7 @@ def test_a_drag_of_any_form_is_told_with_the_listed_one_and_a_dry_friction(dry, 
     found = judge(data, fit(data), of_labels(DRAG, DRY))
     told = [found.chosen, *found.equivalent]
     assert (found.status, [one.label for one in told]) == (status, labels)
-    assert not found.doubts
+    assert not found.reasons
 
 
 @pytest.mark.parametrize(("plain", "earned"), [(9.0, True), (1000.0, False)])
@@ -360,7 +361,7 @@ def test_a_law_whose_listed_form_contradicts_a_part_is_not_named_plainly(monkeyp
     found = judge(data, fit(data), of_labels(SPRING))
     assert AnyForm(data, found.base).explains(found.chosen)
     assert (found.status, found.chosen.label) == ("partial", SPRING)
-    assert any("another form" in one for one in found.doubts)
+    assert found.has_reason(NEEDS_ANOTHER_FORM)
 
 
 def test_a_law_of_fewer_terms_has_fewer_forms():

@@ -10,6 +10,7 @@ from scipy.stats import chi2
 
 from pymoo_hdte.discrepancy._evidence.order_lines.objective import Objective
 from pymoo_hdte.discrepancy._report.document import effects_of, sentence
+from pymoo_hdte.discrepancy._report.words import doubts
 from pymoo_hdte.discrepancy._selection import fitted_sets, hypothesis, search
 from pymoo_hdte.discrepancy._selection import fitted_sets as membership
 from pymoo_hdte.discrepancy._selection import verdict as naming
@@ -19,6 +20,7 @@ from pymoo_hdte.discrepancy._selection.equivalents import complete
 from pymoo_hdte.discrepancy._selection.excess import Excess
 from pymoo_hdte.discrepancy._selection.fitting import fit
 from pymoo_hdte.discrepancy._selection.hypothesis import adequate
+from pymoo_hdte.discrepancy._selection.reason import ABOVE_NOISE
 from pymoo_hdte.discrepancy._selection.rules import RULES
 from pymoo_hdte.discrepancy._selection.screening import screen
 from pymoo_hdte.discrepancy._selection.verdict import judge
@@ -198,7 +200,7 @@ def test_a_part_that_an_effect_does_not_have_speaks_not_against_it(label, values
     """Friction that falls with speed without a level, or varies about a mean of zero."""
     verdict = verdict_on(planted({label: values}), [label, RIPPLE, "coulomb_friction:input"])
     assert labels_of(verdict) == {label}
-    assert (verdict.status, verdict.doubts) == ("named", ())
+    assert (verdict.status, verdict.reasons) == ("named", ())
 
 
 def test_what_came_nowhere_near_is_only_evaluated_when_the_noise_is_renewed(ripple):
@@ -394,7 +396,7 @@ def test_an_inertia_is_as_certain_as_the_interval_that_is_told_of_it():
     assert "load_inertia" in verdict.chosen.fit.at_bounds
     lower, upper = effects_of(verdict)[0]["parameters"]["inertia"]["interval95"]
     assert 0.0 < lower < 0.015 < upper
-    assert (verdict.status, verdict.doubts) == ("named", ())
+    assert (verdict.status, verdict.reasons) == ("named", ())
 
 
 @pytest.mark.nightly
@@ -521,7 +523,7 @@ def test_what_nothing_tells_apart_is_a_class_also_where_more_is_missing():
     assert verdict.status == "class"
     assert {verdict.chosen.label, *(one.label for one in verdict.equivalent)} == set(labels)
     assert verdict.leaves_more_than_noise
-    assert all(one in sentence(verdict) for one in verdict.doubts)
+    assert all(one in sentence(verdict) for one in doubts(verdict))
     assert verdict.probability == pytest.approx(RULES.partial_right, abs=0.01)
 
 
@@ -595,7 +597,7 @@ def test_a_line_must_explain_down_to_the_noise():
     data = disturbed(planted({RIPPLE: (5e-4, 0.0)}), 1000.0)
     verdict = verdict_on(data, [RIPPLE, LINE])
     assert (verdict.status, labels_of(verdict)) == ("partial", {RIPPLE})
-    assert any("times the noise" in doubt for doubt in verdict.doubts)
+    assert verdict.has_reason(ABOVE_NOISE)
     assert RULES.explained_share < verdict.chosen.explained < RULES.exact_share
     found = verdict_on(data, [RIPPLE, LINE], exact_chi_square=10.0)
     assert (found.status, labels_of(found)) == ("named", {RIPPLE})

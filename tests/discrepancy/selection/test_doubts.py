@@ -9,7 +9,7 @@ import pytest
 
 from pymoo_hdte.discrepancy._selection import choice
 from pymoo_hdte.discrepancy._selection.candidate import Candidate, Layout
-from pymoo_hdte.discrepancy._selection.caveats import doubts_of, varies
+from pymoo_hdte.discrepancy._selection.caveats import reasons_of, varies
 from pymoo_hdte.discrepancy._selection.excess import Vote
 from pymoo_hdte.discrepancy._selection.fitted_sets import FittedSets
 from pymoo_hdte.discrepancy._selection.hypothesis import Hypothesis, alike, contains, label_of
@@ -55,7 +55,7 @@ def doubts(chi_square_per_degree, *candidates, base=(), values=()):
         enough=lambda chosen: quiet,
         forms=SimpleNamespace(in_free_form=lambda one: one),
     )
-    return doubts_of(search, Hypothesis(fitted, bic=0.0, explained=1.0), None)
+    return reasons_of(search, Hypothesis(fitted, bic=0.0, explained=1.0), None)
 
 
 FRICTION, LINE = one("stribeck:input", exact=False), one("kinematic_error:mesh@3", exact=True)
@@ -147,7 +147,7 @@ def test_a_sensor_s_value_is_no_doubt_only_where_the_forms_of_all_laws_explain_i
         ),
     )
     chosen = Hypothesis(fits[False, False], bic=0.0, explained=1.0)
-    assert bool(doubts_of(search, chosen, None)) == doubtful
+    assert bool(reasons_of(search, chosen, None)) == doubtful
 
 
 def test_what_is_left_in_multiples_of_the_noise_is_a_doubt():
@@ -164,6 +164,7 @@ def law(name, *, bounded=False, chi_square=1000.0):
         candidates=(only,),
         chi_square=chi_square,
         bound_sides=np.array([1.0 if bounded else 0.0]),
+        values=np.ones(1),
         places=[(only, slice(0, 1))],
     )
     return Hypothesis(fitted, bic=chi_square, explained=1.0)
@@ -454,7 +455,7 @@ def test_a_richer_law_that_leaves_a_misfit_is_no_more_certain_than_its_special_c
 
 def test_another_choice_keeps_the_rivals_that_name_as_much(monkeypatch):
     """A set with fewer values out of tolerance lost its rivals with more, and its class."""
-    monkeypatch.setattr(measured, "_doubts", lambda data, base, one: [])
+    monkeypatch.setattr(measured, "_reasons", lambda data, base, one: [])
     chosen = set_of(a_law("richer"), *freed("a", "b"), left=1.0)
     simpler = set_of(a_law("play"), *freed("a"), left=1.0)
     rival = set_of(a_law("soft"), *freed("a", "b"), left=1.0)

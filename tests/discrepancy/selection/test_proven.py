@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from pymoo_hdte.discrepancy._evidence.order_lines.candidates import out_of_tolerance
-from pymoo_hdte.discrepancy._selection.caveats import NOT_PROVEN
 from pymoo_hdte.discrepancy._selection.excess import Vote
+from pymoo_hdte.discrepancy._selection.reason import HELD_OUT_ERROR_GROWS, NOT_VALIDATED, Reason
 from pymoo_hdte.discrepancy._selection.rules import RULES
 from pymoo_hdte.discrepancy._selection.verdict import Verdict
 from pymoo_hdte.discrepancy._verdicts.gap import Gap, grows
@@ -23,9 +23,9 @@ def verdict(status, probability=RULES.named_right):
 
 @pytest.mark.parametrize("status", ["named", "parameter"])
 def test_an_error_that_grows_leaves_no_unqualified_status(status):
-    found = verdict(status).proven(worse=["output torque"])
+    found = verdict(status).proven(worse={"output torque": 1.5})
     assert found.status == "partial"
-    assert "output torque" in found.doubts[0]
+    assert found.reasons == (Reason.of(HELD_OUT_ERROR_GROWS, numbers={"output torque": 1.5}),)
     # As probable as other partial verdicts are.
     assert found.probability == pytest.approx(RULES.partial_right)
     assert verdict(status).proven().status == status
@@ -33,9 +33,9 @@ def test_an_error_that_grows_leaves_no_unqualified_status(status):
 
 @pytest.mark.parametrize("status", ["named", "parameter", "class", "partial"])
 def test_a_model_that_is_not_to_be_used_is_not_offered(status):
-    found = verdict(status).proven(worse=["overall"], condemned=True)
+    found = verdict(status).proven(worse={"overall": 1.5}, condemned=True)
     assert (found.status, found.probability) == ("unlisted", None)
-    assert NOT_PROVEN in found.doubts
+    assert found.has_reason(NOT_VALIDATED)
     assert found.accepted is found.base
 
 
@@ -88,7 +88,9 @@ def line(order, side):
     parameter = SimpleNamespace(name="amplitude", linear=True, lower=-1.0, limited_at=bool)
     label = f"kinematic_error:gear@{order}"
     law = SimpleNamespace(label=label, order=order, parameters=(parameter,))
-    fitted = SimpleNamespace(places=[(law, slice(0, 1))], bound_sides=np.array([side]))
+    fitted = SimpleNamespace(
+        places=[(law, slice(0, 1))], bound_sides=np.array([side]), values=np.ones(1)
+    )
     return SimpleNamespace(candidates=(law,), fit=fitted)
 
 

@@ -11,7 +11,7 @@ from measured_oscillator import OSCILLATOR, nothing
 
 from pymoo_hdte.discrepancy._report.mechanism import proof_sentence
 from pymoo_hdte.discrepancy._report.mechanism_document import limits
-from pymoo_hdte.discrepancy._selection.caveats import NOT_PROVEN
+from pymoo_hdte.discrepancy._selection.reason import NOT_VALIDATED
 from pymoo_hdte.discrepancy._selection.rules import RULES
 from pymoo_hdte.discrepancy._verdicts.mechanism import examine_mechanism
 from pymoo_hdte.discrepancy._verdicts.validation_mechanism import prove_measured
@@ -67,9 +67,9 @@ def test_a_name_that_the_held_out_record_contradicts_is_not_given():
     assert told == [(one, len(told)) for one in range(1, len(told) + 1)]
     assert len(told) == finding.simulated[0].extent.windows
     assert finding.verdict.status == "unlisted"
-    assert NOT_PROVEN in finding.verdict.doubts
+    assert finding.verdict.has_reason(NOT_VALIDATED)
     assert finding.accepted is finding.verdict.base
-    (told,) = (one for one in limits(finding) if NOT_PROVEN in one)
+    (told,) = (one for one in limits(finding) if "does not shrink as it should" in one)
     assert told.startswith("coulomb friction")
     (one,) = finding.simulated
     before, after, _ = one.powers("x")

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from pymoo_hdte.discrepancy._selection.reason import EXPLAINS_TOO_LITTLE
 from pymoo_hdte.discrepancy._selection.rules import RULES
 from pymoo_hdte.discrepancy._verdicts.mechanism import examine_mechanism
 from pymoo_hdte.effects.hysteresis import MaxwellSlip
@@ -75,7 +76,7 @@ def test_what_sets_the_noise_by_itself_is_no_plain_name_unless_it_explains_nine_
     assert RULES.main_share < finding.share_removed < RULES.explained_share
     assert set(names(finding)) == {"hysteresis", "hardening_stiffness"}
     assert finding.verdict.status == "partial"
-    assert any("less than a name takes" in one for one in finding.verdict.doubts)
+    assert finding.verdict.has_reason(EXPLAINS_TOO_LITTLE)
 
 
 def test_dry_friction_is_named_before_its_difference_between_the_directions():

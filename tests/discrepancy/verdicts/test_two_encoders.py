@@ -14,7 +14,6 @@ import pymoo_hdte
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy import JointAnalysis, analyse, read_rig
 from pymoo_hdte.discrepancy._answers.joint_open_questions import (
-    torsion_limits,
     torsion_test,
     wiring_doubts,
 )
@@ -25,7 +24,7 @@ from pymoo_hdte.discrepancy._evidence.force_balances.joint_halves import (
     torsion_half,
 )
 from pymoo_hdte.discrepancy._records.rig_model import model_text, read_mechanism_model
-from pymoo_hdte.discrepancy._report.torsion import torsion_document
+from pymoo_hdte.discrepancy._report.torsion import torsion_document, torsion_limits
 from pymoo_hdte.discrepancy._selection.rules import RULES
 from pymoo_hdte.discrepancy._verdicts.held_out_torsion import predicted_torsion, torsion_gaps, voted
 from pymoo_hdte.discrepancy._verdicts.joint import JointFinding, examine_joint

@@ -13,7 +13,7 @@ from night import others_at_night
 from verdict_cases import case_campaign
 
 from pymoo_hdte.discrepancy import analyse
-from pymoo_hdte.discrepancy._selection.caveats import NOT_PROVEN
+from pymoo_hdte.discrepancy._selection.reason import NOT_VALIDATED
 from pymoo_hdte.units import ARCSEC
 
 DEVIATIONS = 3.0
@@ -175,7 +175,7 @@ def check(name, analysis):
 
 
 def also_of_an_order_in_no_list(analysis):
-    assert NOT_PROVEN in analysis.verdict.doubts
+    assert analysis.verdict.has_reason(NOT_VALIDATED)
 
 
 def also_of_noise(analysis):

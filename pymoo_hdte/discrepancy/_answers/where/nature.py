@@ -33,22 +33,72 @@ def sizes(location: Location) -> Values:
     return np.where(location.flagged, np.sqrt(size), 0.0)
 
 
-def nature_of_misfit(location: Location, believed: BelievedDrive) -> str:
-    """Return in words what kind of misfit it is, at the lower speeds where these show it."""
+@dataclass(frozen=True)
+class Nature:
+    """What kind of misfit it is.
+
+    Attributes
+    ----------
+    code : str
+        A key of `SENTENCES`.
+    slow : bool
+        Whether the lower speeds show it, and the higher ones were not asked.
+    """
+
+    code: str
+    slow: bool = False
+
+    @property
+    def sentence(self) -> str:
+        """In words, without a full stop."""
+        words = SENTENCES[self.code]
+        return f"At the lower speeds {words[0].lower()}{words[1:]}" if self.slow else words
+
+
+IN_SWEEP = "in_sweep"
+"""What the torsion sweep shows, too."""
+SENTENCES = {
+    "at_speed": "It shows at speed only, as a torque of inertia or damping does",
+    "input_torque": "It is torque-like and acts on the input: the torsion behind it hardly shows "
+    "it",
+    "output_torque_alone": "It is in the output torque alone: neither the torsion nor the input "
+    "follows it",
+    "both_torques": "It is in both torques, but the torsion hardly follows them",
+    "load_torque": "It is torque-like and comes from the load: the torsion merely follows it",
+    "drive_output": "It is torque-like and acts on the output of the drive: the input has to "
+    "supply it",
+    IN_SWEEP: "It is in the torsion: the sweep with the input locked shows it, too",
+    "compliance": "It is a compliance: the torsion under load is not what the stiffness says",
+    "mesh": "It is in the mesh: no torque goes with it, and the load makes it smaller",
+    "kinematic": "It is kinematic: no torque goes with it, as for an error of teeth or encoders",
+    "no_torque": "No torque goes with it: it is kinematic, as an error of teeth or encoders, or a "
+    "compliance, if it should grow with load, which these records do not tell",
+}
+_WITHOUT_TORQUE = {
+    "grows": "compliance",
+    "turns": "compliance",
+    "falls": "mesh",
+    "steady": "kinematic",
+    "unknown": "no_torque",
+}
+"""By the change of the transmission error with the load."""
+
+
+def nature_of_misfit(location: Location, believed: BelievedDrive) -> Nature:
+    """Return what kind of misfit it is, at the lower speeds where these show it."""
     rules, speed = location.rules, np.abs(location.speed_rpm)
     slow = speed <= np.median(speed)
     size = sizes(location)[:, :3].sum(axis=(1, 2))
     if size[slow].sum() <= rules.slow_share * size.sum():
         if _kind(location, range(3), "speed") == "grows":
-            return "It shows at speed only, as a torque of inertia or damping does"
+            return Nature("at_speed")
         # No more than some records have it, which happen to be fast ones.
         slow = np.ones_like(slow)
-    said = _of_records(location, believed, slow)
-    return said if slow.all() else f"At the lower speeds {said[0].lower()}{said[1:]}"
+    return Nature(_of_records(location, believed, slow), slow=not slow.all())
 
 
 def _of_records(location: Location, believed: BelievedDrive, slow: Flags) -> str:
-    """Return what kind of misfit some records have, in which inertia is small."""
+    """Return the code of the misfit of some records, in which inertia is small."""
     rules = location.rules
     flagged = np.where(location.flagged, np.nan_to_num(location.misfit), 0.0)
     misfit = np.asarray(flagged[slow], dtype=np.complex128)
@@ -62,22 +112,12 @@ def _of_records(location: Location, believed: BelievedDrive, slow: Flags) -> str
     if _power((error - from_output)[seen]) <= rules.caused_share * _power(error):
         return _torque_with_torsion(from_input, from_output, rules)
     if _power((error - from_input)[seen]) <= rules.caused_share * _power(error):
-        return "It is torque-like and acts on the output of the drive: the input has to supply it"
+        return "drive_output"
     if location.sweep_flagged:
-        return "It is in the torsion: the sweep with the input locked shows it, too"
+        return IN_SWEEP
     kind = _kind(location, [0], "load", slow)
     # Fast records are near resonances, but more records may say what the slow ones leave open.
     return _WITHOUT_TORQUE[_kind(location, [0], "load") if kind == "unknown" else kind]
-
-
-_WITHOUT_TORQUE = {
-    "grows": "It is a compliance: the torsion under load is not what the stiffness says",
-    "turns": "It is a compliance: the torsion under load is not what the stiffness says",
-    "falls": "It is in the mesh: no torque goes with it, and the load makes it smaller",
-    "steady": "It is kinematic: no torque goes with it, as for an error of teeth or encoders",
-    "unknown": "No torque goes with it: it is kinematic, as an error of teeth or encoders, or a "
-    "compliance, if it should grow with load, which these records do not tell",
-}
 
 
 def _kind(
@@ -98,24 +138,24 @@ def _kind(
 def _torque_alone(
     from_input: NDArray[np.complex128], from_output: NDArray[np.complex128], rules: Rules
 ) -> str:
-    """Return the words for a misfit of torques that the torsion hardly shows."""
+    """Return the code of a misfit of torques that the torsion hardly shows."""
     if _power(from_output) < rules.caused_share * _power(from_input):
-        return "It is torque-like and acts on the input: the torsion behind it hardly shows it"
+        return "input_torque"
     if _power(from_input) < rules.caused_share * _power(from_output):
-        return "It is in the output torque alone: neither the torsion nor the input follows it"
-    return "It is in both torques, but the torsion hardly follows them"
+        return "output_torque_alone"
+    return "both_torques"
 
 
 def _torque_with_torsion(
     from_input: NDArray[np.complex128], from_output: NDArray[np.complex128], rules: Rules
 ) -> str:
-    """Return the words for a misfit of the output torque that the torsion follows.
+    """Return the code of a misfit of the output torque that the torsion follows.
 
     A torque on the output is transmitted through the drive and shows on both sides.
     """
     if _power(from_output) < rules.caused_share * _power(from_input):
-        return "It is torque-like and acts on the input: the torsion behind it hardly shows it"
-    return "It is torque-like and comes from the load: the torsion merely follows it"
+        return "input_torque"
+    return "load_torque"
 
 
 def _power(lines: NDArray[np.complex128]) -> float:

@@ -8,6 +8,8 @@ import numpy as np
 
 from pymoo_hdte.discrepancy._answers.where.map import Flags, Location, Values
 from pymoo_hdte.discrepancy._answers.where.nature import (
+    IN_SWEEP,
+    Nature,
     StrayLines,
     nature_of_misfit,
     sizes,
@@ -40,13 +42,14 @@ def sentences(location: Location, data: Data, unexpected: Sequence[float]) -> tu
         Orders beyond the expected ones with significant lines.
     """
     believed, stray = data.campaign.believed, stray_lines(data, unexpected)
-    parts, kind = [], ""
+    parts: list[str] = []
+    nature: Nature | None = None
     if location.flagged.any():
         parts.append(_where(location, stray, believed.ratio))
         if stray.frequency is None:
             parts.append(f"{_growth(location, bool(stray.broad))}.")
-        kind = nature_of_misfit(location, believed)
-        parts.append(f"{kind}.")
+        nature = nature_of_misfit(location, believed)
+        parts.append(f"{nature.sentence}.")
     elif not location.within_noise.everywhere:
         parts.append(
             "No single mean or order line stands out of the noise, but together they do: in "
@@ -56,7 +59,7 @@ def sentences(location: Location, data: Data, unexpected: Sequence[float]) -> tu
         parts.append("The named effect moves no mean and no order line by more than its noise.")
     else:
         parts.append("Nowhere: all means and order lines agree within the noise.")
-    if location.sweep_flagged and "sweep" not in kind:
+    if location.sweep_flagged and (nature is None or nature.code != IN_SWEEP):
         parts.append("The torsion sweep disagrees with the model.")
     beyond = [order for order in unexpected if np.abs(location.orders - order).min() > 1e-6]
     if beyond and stray == StrayLines():

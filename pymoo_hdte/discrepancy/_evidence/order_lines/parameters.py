@@ -90,21 +90,19 @@ def name_by_order(name: str, error_orders: Sequence[float]) -> str:
     return name.replace("_", " ")
 
 
-def labels_by_order(text: str, error_orders: Sequence[float]) -> str:
-    """Return a text with labels of candidates in words, lines of the static error by their order.
-
-    It is no text for sentences of effects, which may hold any words.
+def labels_by_order(label: str, error_orders: Sequence[float]) -> str:
+    """Return the label of a set of effects in words, lines of the static error by their order.
 
     Examples
     --------
-    >>> labels_by_order("parameter:error_amplitude_1 or eyring_drag:input", (1.0, 2.0))
-    'error amplitude of order 2 (out of tolerance) or eyring drag (input)'
+    >>> labels_by_order("parameter:error_amplitude_1+eyring_drag:input", (1.0, 2.0))
+    'error amplitude of order 2 (out of tolerance) and eyring drag (input)'
     """
 
-    def named(label: re.Match[str]) -> str:
-        return f"{name_by_order(label[1], error_orders)} (out of tolerance)"
+    def named(line: re.Match[str]) -> str:
+        return f"{name_by_order(line[1], error_orders)} (out of tolerance)"
 
-    return in_words(re.sub(r"\bparameter:(error_(?:amplitude|phase)_\d+)", named, text))
+    return in_words(re.sub(r"\bparameter:(error_(?:amplitude|phase)_\d+)", named, label))
 
 
 def base_parameters(

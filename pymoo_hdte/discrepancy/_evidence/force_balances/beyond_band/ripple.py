@@ -47,6 +47,21 @@ _OTHER = {
 _CENTRAL = float(norm.ppf(0.975))
 
 
+@dataclass(frozen=True)
+class Terms:
+    """Words for what varies with the position of a port, and for its lines."""
+
+    at_port: str = "force at"
+    of_records: str = "forces"
+    lines_at: str = "Ripple at"
+    lines: str = "ripple"
+    cause: str = "a torque"
+
+
+OF_FORCES = Terms()
+OF_TORSION = Terms("torsion of", "torsion", "An error of", "error", "an error")
+
+
 @dataclass(frozen=True, eq=False)
 class Ripple:
     """What varies with the position of a port beyond the band of the motion.
@@ -186,6 +201,7 @@ def find_ripples(
     cutoff: float,
     effects: Collection[LawAt] = (),
     rules: Rules = RULES,
+    terms: Terms = OF_FORCES,
 ) -> Ripples:
     """Return what varies with the position of ports beyond the band of the motion.
 
@@ -199,6 +215,8 @@ def find_ripples(
     effects : collection of LawAt
         That are known already; their orders are not looked for.
     rules : Rules
+    terms : Terms
+        Words for what the records of the mechanism hold.
 
     Returns
     -------
@@ -223,18 +241,23 @@ def find_ripples(
             shown = ripple.held_out is None or _share(ripple.held_out) >= rules.ripple_share
             (here if shown else lost).append(ripple)
         found += here
-        limits += _limits(port, search, here, lost)
+        limits += _limits(port, search, here, lost, terms)
     return Ripples(tuple(found), tuple(limits))
 
 
 def _limits(
-    port: Port, search: SeenOrders, found: Sequence[Ripple], lost: Sequence[Ripple]
+    port: Port,
+    search: SeenOrders,
+    found: Sequence[Ripple],
+    lost: Sequence[Ripple],
+    terms: Terms,
 ) -> list[str]:
     """Return what was seen at a port and is not named, or cannot be told, in sentences."""
 
     def ripple(orders: Sequence[float]) -> str:
         turns = listed([_per_input_turn(one, ratio) for one in orders])
-        return f"Ripple at the {name}, {orders_in_words(orders)}{f' ({turns})' if ratio else ''},"
+        words = f"{orders_in_words(orders)}{f' ({turns})' if ratio else ''}"
+        return f"{terms.lines_at} the {name}, {words},"
 
     limits = []
     name, ratio = port.name, port.gear.ratio if port.gear else 0.0
@@ -242,11 +265,11 @@ def _limits(
         highest = np.format_float_positional(search.highest, 4, fractional=False, trim="-")
         limits.append(f"Orders at the {name} were searched up to {highest} only.")
     if any(one.ways == 1 for one in found):
-        limits.append(_one_way(name))
+        limits.append(_one_way(name, terms))
     if lost:
         limits.append(
-            f"{ripple([one.order for one in lost])} is seen, but to take it away makes the forces "
-            "of the held-out records no smaller: it is not named."
+            f"{ripple([one.order for one in lost])} is seen, but to take it away makes the "
+            f"{terms.of_records} of the held-out records no smaller: it is not named."
         )
     if search.undecided:
         limits.append(
@@ -256,7 +279,7 @@ def _limits(
     if search.fixed:
         lines = ", ".join(f"{one:.3g}" for one in search.fixed)
         limits.append(
-            f"The force at the {name} has lines at {lines} Hz, which these records show as "
+            f"The {terms.at_port} the {name} has lines at {lines} Hz, which these records show as "
             "frequencies and not as orders of its position."
         )
     return limits
@@ -267,10 +290,10 @@ def _per_input_turn(order: float, ratio: float) -> str:
     return f"{order / ratio:.4g} per input turn" if ratio else ""
 
 
-def _one_way(port: str) -> str:
+def _one_way(port: str, terms: Terms = OF_FORCES) -> str:
     return (
-        f"The {port} shows its ripple in one direction only: a torque cannot be told from friction "
-        "that varies with the position."
+        f"The {port} shows its {terms.lines} in one direction only: {terms.cause} cannot be told "
+        "from friction that varies with the position."
     )
 
 

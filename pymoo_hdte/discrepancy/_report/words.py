@@ -1,0 +1,84 @@
+"""Sentences of the reasons of a verdict, beside each other."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from pymoo_hdte.discrepancy._evidence.order_lines.parameters import labels_by_order
+from pymoo_hdte.discrepancy._selection import reason as codes
+from pymoo_hdte.discrepancy._selection.reason import Reason
+from pymoo_hdte.discrepancy._selection.verdict import Verdict
+from pymoo_hdte.effects.sentence_blanks import listed
+
+Label = Callable[[str], str]
+"""From the label of a set of effects to how it is written."""
+
+_SENTENCES: dict[str, Callable[[Reason, Label], str]] = {
+    codes.AT_BOUND: lambda reason, label: (
+        f"{', '.join(reason.names)} of {label(reason.effect)} ended at a bound"
+    ),
+    codes.ZERO_IN_INTERVAL: lambda reason, label: (
+        f"the interval of {label(reason.effect)} contains zero"
+    ),
+    codes.FREED_AT_BOUND: lambda reason, label: (
+        "a base parameter ended at ten times or a tenth of what is believed"
+    ),
+    codes.SENSOR_AT_BOUND: lambda reason, label: (
+        f"{reason.effect.replace('_', ' ')} ended far beyond what is stated of it"
+    ),
+    codes.STANDS_FOR_FORM: lambda reason, label: (
+        f"values out of tolerance may stand for what {label(reason.effect)} leaves"
+    ),
+    codes.HARMONIC_OF_ANOTHER: lambda reason, label: (
+        f"{label(reason.effect)} may be a harmonic of {label(*reason.names)}"
+    ),
+    codes.NOT_VALIDATED: lambda reason, label: (
+        "the error on the records kept out of the fit does not shrink as it should"
+    ),
+    codes.HELD_OUT_ERROR_GROWS: lambda reason, label: (
+        f"the error on records kept out of the fit grows: {listed(reason.names)}"
+    ),
+    codes.ABOVE_NOISE: lambda reason, label: (
+        f"what is left is {dict(reason.numbers)['times_noise']:.3g} times the noise"
+    ),
+    codes.NEEDS_ANOTHER_FORM: lambda reason, label: (
+        f"{label(reason.effect)} has to have another form to explain what is left"
+    ),
+    codes.EXPLAINS_TOO_LITTLE: lambda reason, label: (
+        f"it explains {100.0 * dict(reason.numbers)['share']:.0f} % of the misfit, "
+        "less than a name takes"
+    ),
+    codes.RICHER_AT_BOUND: lambda reason, label: (
+        f"{label(reason.effect)} leaves less, but its {', '.join(reason.names)} ended at a bound"
+    ),
+    codes.AT_TOLERANCE: lambda reason, label: (
+        f"{reason.effect} ended at the bound of its tolerance"
+    ),
+}
+
+
+def in_a_sentence(reason: Reason, label: Label = str) -> str:
+    """Return a reason in words, without a full stop.
+
+    Parameters
+    ----------
+    reason : Reason
+    label : callable, optional
+        From the label of a set of effects to how it is written; as it stands without.
+    """
+    return _SENTENCES[reason.code](reason, label)
+
+
+def doubts(verdict: Verdict, error_orders: Sequence[float] = ()) -> list[str]:
+    """Return the reasons of a verdict in words.
+
+    Parameters
+    ----------
+    verdict : Verdict
+    error_orders : sequence of float
+        Of a drive, the orders of its static error, by which its lines are called.
+    """
+    return [
+        in_a_sentence(one, lambda label: labels_by_order(label, error_orders))
+        for one in verdict.reasons
+    ]

@@ -1,0 +1,37 @@
+"""Reasons of a verdict are data; words are made of them in one place."""
+
+import json
+
+import pytest
+
+from pymoo_hdte.discrepancy._report.words import in_a_sentence
+from pymoo_hdte.discrepancy._selection import reason as codes
+from pymoo_hdte.discrepancy._selection.reason import Reason
+
+CODES = [value for name, value in vars(codes).items() if name.isupper()]
+NUMBERS = {
+    codes.ABOVE_NOISE: {"times_noise": 3.0},
+    codes.EXPLAINS_TOO_LITTLE: {"share": 0.6},
+    codes.HARMONIC_OF_ANOTHER: {"backlash:mesh@1": 2.0},
+}
+
+
+@pytest.mark.parametrize("code", CODES)
+def test_every_code_has_a_sentence_and_is_plain_data(code):
+    reason = Reason.of(code, "hysteresis:mesh", NUMBERS.get(code, {"level": 0.5}))
+    assert in_a_sentence(reason)
+    assert json.loads(json.dumps(reason.as_dict())) == {
+        "code": code,
+        "effect": "hysteresis:mesh",
+        "numbers": dict(reason.numbers),
+    }
+
+
+def test_no_two_codes_are_one():
+    assert len(set(CODES)) == len(CODES)
+
+
+def test_reasons_are_the_same_if_all_of_them_is():
+    reason = Reason.of(codes.ABOVE_NOISE, numbers={"times_noise": 2.0})
+    assert reason == Reason.of(codes.ABOVE_NOISE, numbers={"times_noise": 2.0})
+    assert len({reason, Reason.of(codes.ABOVE_NOISE, numbers={"times_noise": 3.0})}) == 2
