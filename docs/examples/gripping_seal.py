@@ -73,12 +73,13 @@ class GrippingSeal(Aperiodic):
 
     def _along(self, path):
         """Return stretch and state of sticking along paths, (n, steps), from rest."""
-        stretch, now, before = np.empty_like(path), np.zeros(len(path)), np.zeros(len(path))
-        sticks = np.empty_like(path)
-        for step, place in enumerate(path.T):
-            moved = now + place - before
-            now, before = np.clip(moved, -self.slip, self.slip), place
-            stretch[:, step], sticks[:, step] = now, now == moved
+        stretch, sticks = np.empty_like(path), np.empty_like(path)
+        for row, places in enumerate(path.tolist()):
+            now = before = 0.0
+            for step, place in enumerate(places):
+                moved = now + place - before
+                now, before = min(max(moved, -self.slip), self.slip), place
+                stretch[row, step], sticks[row, step] = now, now == moved
         return stretch, sticks
 
 

@@ -61,7 +61,7 @@ class Candidate:
     unit : callable or None
         From an unknown, or the line whose cosine and sine parts two of them are, to its SI unit.
     effect : Effect or None
-        From which it is made, with all facts; None for a base parameter out of its tolerance.
+        From which it is made; of a base parameter out of its tolerance the one that says the same.
     """
 
     name: str
@@ -252,6 +252,7 @@ def out_of_tolerance(
         acts_at=acts_at,
         covered_by=covering.name if covering else "",
         covered_at=covering.sought_at[0] if covering else "",
+        effect=covering,
     )
 
 

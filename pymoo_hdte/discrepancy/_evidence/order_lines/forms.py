@@ -31,7 +31,7 @@ from pymoo_hdte.drive._effects import (
     PreslidingFriction,
     ThermalDrift,
 )
-from pymoo_hdte.effects.effect import AS_LISTED, effect_named
+from pymoo_hdte.effects.effect import AS_LISTED
 from pymoo_hdte.effects.friction import smoothed_sign
 from pymoo_hdte.effects.hysteresis import MaxwellSlip
 from pymoo_hdte.effects.law import PortState, Response, Values
@@ -108,8 +108,7 @@ def corrections(candidate: Candidate, ranges: Ranges) -> list[DriveEffect]:
     A base parameter out of its tolerance has those of the effect that says the same. An error that
     no verdict names has none.
     """
-    covered = effect_named(candidate.covered_by) if candidate.covered_by else None
-    effect = (candidate.effect or covered) if candidate.listed else None
+    effect = candidate.effect if candidate.listed else None
     return _FAMILIES[(effect and effect.forms) or AS_LISTED](candidate, ranges)
 
 
