@@ -17,9 +17,8 @@ from measured_oscillator import (
 )
 from places import DOCS
 
-from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy import MeasuredMechanism, analyse, read_mechanism_model
-from pymoo_hdte.effects.effect import AS_LISTED, FORMS, registered
+from pymoo_hdte.effects.effect import registered
 from pymoo_hdte.effects.law import PortState, periodic_phase
 from pymoo_hdte.mechanism import Record
 
