@@ -56,6 +56,11 @@ from pymoo_hdte.problems import RobustDTE
 # The ``Effect`` names the ports of a drive where the law makes sense, its numbers with their units,
 # its sentence in a report, what it holds as a special case, and a *guess*: from the sizes of a port
 # to the unknowns of a fit, with their bounds and starts. ``register`` makes it known.
+#
+# Further facts are optional: the family of ``forms`` that the law may have, the effect of which it
+# is another form, the base parameter that it ``covers``, and what distinguishes it in a test. Laws
+# that depend on the way since the last reversal keep inner states, as the seal in
+# ``docs/examples/gripping_seal.py`` does.
 
 HERE = Path(sys.argv[0]).resolve().parent  # in a notebook: the folder docs/guides
 sys.path[:0] = [str(HERE.parents[1]), str(HERE.parent / "examples")]

@@ -168,5 +168,6 @@ register(
         "The {force} at the {port} lags behind the motion in a smooth loop that forgets gradually.",
         # A verdict tells it as a form of that.
         special_case_of=("hysteresis",),
+        form_of="hysteresis",
     )
 )

@@ -27,6 +27,28 @@ Place = tuple[str, str, float | None]
 """Name, port and order of an effect."""
 DRIVE_PORTS = (*PORTS, "sensor")
 """Ports of a drive: places of laws, and the reading of its output angle."""
+AS_LISTED = "as_listed"
+FORMS: Mapping[str, tuple[str, ...]] = {
+    AS_LISTED: DRIVE_PORTS,
+    "curve_of_speed": ("input", "output"),
+    "curve_of_speed_and_angle": ("input", "output"),
+    "power_of_load": ("input",),
+    "curve_of_torsion": ("mesh",),
+    "slipping_springs": ("mesh",),
+    "harmonics_of_torque": ("input",),
+    "harmonics_of_stiffness": ("mesh",),
+    "harmonics_of_error": ("mesh",),
+    "harmonics_of_scale": ("sensor",),
+    "lagging_reaction": ("input",),
+    "growing_damping": ("mesh",),
+    "hanging_load": ("output",),
+    "drift_in_time": ("sensor",),
+}
+"""Families of forms that the law of an effect may have, and the ports of a drive for each.
+
+``"as_listed"`` states that no other form is known. The discrepancy workflow has what each of the
+others spans.
+"""
 
 
 class Standing(Protocol):
@@ -80,12 +102,36 @@ class Effect:
         curve of a friction law is only an approximation of a real one.
     of_reading : bool
         Whether, in a mechanism, only the reading of a force sensor shows it.
+    forms : str
+        Family of `FORMS` within which its law in a drive may differ from the listed one, so that
+        such a difference is no evidence of another effect; empty is ``"as_listed"``.
+    form_of : str
+        Effect of which it is another form: where a drive model has one of them, the other is not
+        searched for. Empty for none.
+    covers : str
+        Base parameter of a drive, e.g. ``"load_inertia"``, of which a value beyond its tolerance
+        is the same as this effect at the first of ``sought``; empty for none.
+    twin : str
+        Effect whose line of the transmission error is the same until the disc of the output encoder
+        is turned on its shaft; empty for none.
+    constant_one_way : bool
+        Whether it is like a constant force while a port moves one way only.
+    lags : bool
+        Whether slow reversals at a few angles show what it is: its force jumps, or lags behind.
+    with_load : bool
+        Whether the same motion under another load shows what it is.
+    slows : bool
+        Whether its force grows with the speed, so that ahead of a gear it looks like the delay of
+        an encoder.
+    behind_gear : bool
+        Whether it is searched for at the load of a gear only, not at the shaft ahead of it.
 
     Raises
     ------
     InvalidInput
         For a name that is no such word, neither law nor change, quantities that are no fields of
-        the law, an unknown port, or a sentence that is empty or has an unknown blank.
+        the law, an unknown port or family of forms, a family that is for other ports, or a
+        sentence that is empty or has an unknown blank.
 
     Examples
     --------
@@ -108,6 +154,15 @@ class Effect:
     contains: tuple[str, ...] = ()
     exact: bool = False
     of_reading: bool = False
+    forms: str = ""
+    form_of: str = ""
+    covers: str = ""
+    twin: str = ""
+    constant_one_way: bool = False
+    lags: bool = False
+    with_load: bool = False
+    slows: bool = False
+    behind_gear: bool = False
 
     def __post_init__(self) -> None:
         if not re.fullmatch(r"[a-z]+(_[a-z]+)*", str(self.name)):
@@ -124,6 +179,10 @@ class Effect:
         for number in self.quantities:
             one_of(f"{self.name}.quantities", number, [one.name for one in fields(self.kind)])
         check_sentence(f"{self.name}.sentence", self.sentence)
+        if self.forms:
+            allowed_at = FORMS[one_of(f"{self.name}.forms", self.forms, FORMS)]
+            for port in self.sought_at:
+                one_of(f"{self.name}.sought (with the forms {self.forms})", port, allowed_at)
 
     @property
     def kind(self) -> type[Any]:
@@ -146,6 +205,11 @@ class Effect:
     def remembers(self) -> bool:
         """Whether its law keeps inner states: see `Behaviour.states`."""
         return bool(getattr(self.law, "states", 0))
+
+    @property
+    def loaded(self) -> bool:
+        """Whether its force depends on what the port passes on: see `Behaviour.loaded`."""
+        return bool(getattr(self.law, "loaded", False))
 
     @property
     def drives(self) -> bool:

@@ -85,6 +85,9 @@ register(
             "position_dependent_friction",
             "nonlinear_drag/sublinear",
         ),
+        forms="curve_of_speed",
+        constant_one_way=True,
+        lags=True,
     )
 )
 
@@ -140,6 +143,8 @@ register(
         _falling,
         # At the output only the friction itself shows, over a range of speeds N times as narrow.
         sought=("input",),
+        forms="curve_of_speed",
+        lags=True,
     )
 )
 
@@ -216,6 +221,8 @@ register(
         # At the output it would have to be N times as large, as Stribeck friction.
         sought=("input",),
         of_fit={"level": "torque", "thinning": "speed"},
+        forms="curve_of_speed",
+        slows=True,
     )
 )
 
@@ -262,5 +269,6 @@ register(
         "Friction that varies with the position of the {port}, order {order}.",
         _varying,
         of_fit={"mean": "torque"},
+        forms="curve_of_speed_and_angle",
     )
 )

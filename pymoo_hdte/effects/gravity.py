@@ -59,5 +59,6 @@ register(
         {"torque": "torque", "phase": "angle"},
         "Gravity at the {port}: a {force} of one sine per turn.",
         _weight,
+        behind_gear=True,
     )
 )

@@ -128,6 +128,8 @@ register(
         "next, and LuGre's changes with the speed.",
         _slipping,
         of_fit={"exponent": "", "share": ""},
+        forms="slipping_springs",
+        lags=True,
     )
 )
 

@@ -46,6 +46,9 @@ register(
         {"force": "torque"},
         "A constant {force} at the {port}: gravity, or a bias.",
         _offset,
+        constant_one_way=True,
+        # Ahead of a gear it is the zero of the torsion.
+        behind_gear=True,
     )
 )
 
@@ -94,6 +97,7 @@ register(
         {"level": "torque", "viscous": "damping"},
         "Friction at the {port} that is not the same in both directions.",
         _one_sided,
+        constant_one_way=True,
     )
 )
 
@@ -154,6 +158,7 @@ register(
         "There is a spring at the {port} where none is believed.",
         _spring,
         of_fit={"force": "torque"},
+        behind_gear=True,
     )
 )
 
@@ -185,5 +190,6 @@ register(
         {"coefficient": "damping"},
         "There is a friction that grows with speed at the {port} where none is believed.",
         _damper,
+        slows=True,
     )
 )

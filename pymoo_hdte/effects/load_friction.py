@@ -114,5 +114,7 @@ register(
         {"share": "", "driven_share": "", "exponent": "", "reference": "torque"},
         "Friction at the {port} that grows with the load.",
         _shares,
+        forms="power_of_load",
+        with_load=True,
     )
 )

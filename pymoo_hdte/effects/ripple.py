@@ -57,5 +57,6 @@ register(
         "A ripple at the {port}, order {order} of its position, that acts on the motion.",
         _ripple,
         exact=True,
+        forms="harmonics_of_torque",
     )
 )

@@ -61,6 +61,8 @@ register(
         "A drag at the {port} of a fluid that thins: it grows with the logarithm of the speed.",
         # A verdict tells it as a form of that.
         special_case_of=("nonlinear_drag",),
+        form_of="nonlinear_drag",
+        slows=True,
     )
 )
 

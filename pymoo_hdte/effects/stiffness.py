@@ -94,6 +94,8 @@ register(
         {"coefficient": "cubic stiffness", "stiffening": "", "torsion": "angle", "sharpness": ""},
         "The {port} grows stiffer with its deflection.",
         _hardening,
+        forms="curve_of_torsion",
+        with_load=True,
     )
 )
 
@@ -143,6 +145,8 @@ register(
         {"softening": "", "torsion": "angle", "sharpness": ""},
         "The {port} is softer near its rest position.",
         _soft,
+        forms="curve_of_torsion",
+        with_load=True,
     )
 )
 
@@ -219,6 +223,8 @@ register(
         "There is play at the {port}.",
         _play,
         special_case_of=("clearance_variation",),
+        forms="curve_of_torsion",
+        with_load=True,
     )
 )
 
@@ -299,5 +305,6 @@ register(
         "The play at the {port} varies, order {order} of the shaft.",
         _uneven,
         of_fit={"narrowest": "angle", "locked": "angle"},
+        forms="curve_of_torsion",
     )
 )

@@ -77,5 +77,7 @@ register(
         {"coefficient": "damping", "rate": "1/K", "reference": "K"},
         "Viscous friction at the {port} that falls as the temperature rises.",
         _thinning,
+        # Records at few temperatures would follow any curve of it.
+        forms="as_listed",
     )
 )

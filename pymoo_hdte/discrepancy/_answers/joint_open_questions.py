@@ -8,16 +8,13 @@ from numpy.typing import NDArray
 from pymoo_hdte.discrepancy._evidence.force_balances.candidates import turns_back
 from pymoo_hdte.discrepancy._evidence.force_balances.unexplained import fitted_values, share_removed
 from pymoo_hdte.discrepancy._selection.hypothesis import Hypothesis
-from pymoo_hdte.discrepancy._verdicts.joint import SLOWING, JointFinding
+from pymoo_hdte.discrepancy._verdicts.joint import JointFinding
 from pymoo_hdte.discrepancy._verdicts.joint_torsion import errors_of
+from pymoo_hdte.effects.effect import effect_named
+from pymoo_hdte.effects.law import Law, PortState, periodic_phase
 from pymoo_hdte.mechanism.balances import quantity_names
 from pymoo_hdte.units import ARCSEC
 
-_LAGS = {"hysteresis", "coulomb_friction", "stribeck_friction"}
-_OF_LOAD = {
-    *("soft_windup", "hardening_stiffness", "backlash", "kinematic_error"),
-    "load_dependent_friction",
-}
 _MOST_TOLD = 4
 
 
@@ -90,7 +87,7 @@ def _delay(finding: JointFinding) -> list[str]:
         _slope(finding, effect.law)
         for fit in fits
         for effect in fit.effects
-        if effect.name in SLOWING
+        if effect_named(effect.name).slows
     ]
     if not levels:
         return []
@@ -110,15 +107,13 @@ def _delay(finding: JointFinding) -> list[str]:
     return [told]
 
 
-def _slope(finding: JointFinding, law: object) -> float:
+def _slope(finding: JointFinding, law: Law) -> float:
     """Return the torque of a law over the speed at the largest speed, N.m.s/rad."""
     shaft = finding.torsion.mechanism.ports[0].name
     speed = max(float(np.abs(one.ports[shaft].speed).max()) for one in finding.torsion.data.spectra)
-    coefficient = getattr(law, "coefficient", 0.0)
-    exponent, reference = getattr(law, "exponent", 1.0), getattr(law, "reference", 1.0)
-    if hasattr(law, "exponent"):
-        return float(coefficient * speed * (speed / reference) ** (exponent - 2.0))
-    return float(coefficient)
+    rest = np.zeros(1)
+    state = PortState(rest, np.array([speed]), periodic_phase(rest), rest, load=rest)
+    return float(law.respond(state).torque[0]) / speed
 
 
 def torsion_test(finding: JointFinding) -> str:
@@ -127,7 +122,7 @@ def torsion_test(finding: JointFinding) -> str:
     gear, shaft = finding.joint.gear.name, torsion.mechanism.ports[0].name
     chosen = torsion.verdict.chosen
     sets = [one for one in (chosen, *near_by(finding)) if one is not None]
-    names = {name for one in sets for name, _ in one.names}
+    effects = [one.effect for hypothesis in sets for one in hypothesis.candidates if one.effect]
     wide = max(float(np.ptp(one.ports[gear].position)) for one in torsion.data.spectra) / ARCSEC
     found = []
     if not turns_back(torsion.data, shaft):
@@ -135,18 +130,18 @@ def torsion_test(finding: JointFinding) -> str:
             "Run the same sweep backwards as well: what keeps its sign is compliance or an error "
             "of the gear, what turns it is friction or hysteresis."
         )
-    if names & _LAGS or not found:
+    if any(effect.lags for effect in effects) or not found:
         found.append(
             f"Stop at a few angles and reverse slowly until the torsion has changed by some "
             f"{round(0.1 * wide)} arcseconds: friction ahead of the gear turns with the direction "
             "at once, hysteresis only over a torsion of its own."
         )
-    if names & _OF_LOAD:
+    if any(effect.with_load for effect in effects):
         found.append(
             "Repeat the sweep with another load: an error of the gear stays over the angle, "
             "compliance, wind-up and friction that grows with the load follow the torque."
         )
-    if names & set(SLOWING):
+    if any(effect.slows for effect in effects):
         found.append(
             "Repeat it at a third of the speed and read the encoders in the other order: a delay "
             "turns its sign, friction does not."

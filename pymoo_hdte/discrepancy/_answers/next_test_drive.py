@@ -26,11 +26,11 @@ from pymoo_hdte.discrepancy._selection.fitting import Fit
 from pymoo_hdte.discrepancy._selection.verdict import Verdict
 from pymoo_hdte.discrepancy._verdicts.drive_finding import DriveFinding
 from pymoo_hdte.drive._effects import ENCODER_LINE
+from pymoo_hdte.effects.effect import effect_named
 
 TESTS = ("running", "torsion_sweep", "reclocked_encoder", "none")
 
 _RIVALS = 2
-OF_ENCODER = ("eccentricity", ENCODER_LINE)
 LARGEST_TURNS = 100
 """Cycles per output turn; the response of the drive identifies faster lines as its own."""
 
@@ -193,14 +193,15 @@ def _encoder_twin(grid: Grid, chosen: Fit, model: Model) -> Proposal | None:
     """Return the test that separates a line of whole cycles per output turn from the encoder's."""
     ratio = grid.data.campaign.believed.ratio
     for place, candidate in enumerate(chosen.candidates):
-        if candidate.order is None or candidate.name not in (*OF_ENCODER, "kinematic_error"):
+        if candidate.order is None or candidate.effect is None or not candidate.effect.twin:
             continue
         turns = round(candidate.order * ratio)
         if turns > LARGEST_TURNS or abs(candidate.order * ratio - turns) > 1e-6:
             continue
-        of_encoder = "eccentricity" if turns == 1 else ENCODER_LINE
-        twin = "kinematic_error:mesh" if candidate.name in OF_ENCODER else f"{of_encoder}:sensor"
-        twin = f"{twin}@{candidate.order:.4g}"
+        other = effect_named(candidate.effect.twin)
+        port = other.sought_at[0]
+        name = ENCODER_LINE if port == "sensor" and turns != 1 else other.name
+        twin = f"{name}:{port}@{candidate.order:.4g}"
         parts = chosen.effects_by_candidate
         base = chosen.values[: len(grid.data.base)]
         others = [effect for k, part in enumerate(parts) if k != place for effect in part]

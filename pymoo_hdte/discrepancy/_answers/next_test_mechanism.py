@@ -21,6 +21,7 @@ from pymoo_hdte.discrepancy._selection.fitting import fit
 from pymoo_hdte.discrepancy._selection.hypothesis import Hypothesis
 from pymoo_hdte.discrepancy._verdicts.mechanism_finding import MechanismFinding
 from pymoo_hdte.effects.sentence_blanks import in_words
+from pymoo_hdte.mechanism.effects import law_effects
 from pymoo_hdte.mechanism.port_motion import PortMotion, law_force
 
 Values = NDArray[np.float64]
@@ -81,7 +82,7 @@ def next_test(finding: MechanismFinding) -> NextTest:
             first,
             1.0,
             -1.0,
-            ("coulomb_friction", "force_offset", "direction_dependent_friction"),
+            tuple(effect.name for effect in law_effects() if effect.constant_one_way),
             0.0,
             f"Run the same speeds in the reverse direction: the {one_way[0]} moves one way only, "
             "in which dry friction cannot be told from a constant force.",

@@ -60,6 +60,8 @@ class Candidate:
         Number of candidates from which it differs only by a number that no fit follows.
     unit : callable or None
         From an unknown, or the line whose cosine and sine parts two of them are, to its SI unit.
+    effect : Effect or None
+        From which it is made; of a base parameter out of its tolerance the one that says the same.
     """
 
     name: str
@@ -80,6 +82,7 @@ class Candidate:
     instead_of: tuple[str, ...] = ()
     among: int = 1
     unit: Callable[[str], str] | None = None
+    effect: Effect | None = None
 
     @property
     def label(self) -> str:
@@ -221,11 +224,12 @@ def candidate_of(
         instead_of=guess.instead_of,
         among=guess.among,
         unit=partial(effect.unit, of_guess=guess.quantities),
+        effect=effect,
     )
 
 
 def out_of_tolerance(
-    name: str, words: str, acts_at: str = "", covered_by: tuple[str, str] = ("", "")
+    name: str, words: str, acts_at: str = "", covering: Effect | None = None
 ) -> Candidate:
     """Return the candidate that frees a base parameter, called ``words``, of its tolerance.
 
@@ -233,8 +237,8 @@ def out_of_tolerance(
     ----------
     name, words, acts_at : str
         See `Candidate`.
-    covered_by : (str, str)
-        Name and port of the effect that says the same.
+    covering : Effect or None
+        That says the same.
     """
     return Candidate(
         "parameter",
@@ -246,8 +250,9 @@ def out_of_tolerance(
         exact=True,
         frees=name,
         acts_at=acts_at,
-        covered_by=covered_by[0],
-        covered_at=covered_by[1],
+        covered_by=covering.name if covering else "",
+        covered_at=covering.sought_at[0] if covering else "",
+        effect=covering,
     )
 
 

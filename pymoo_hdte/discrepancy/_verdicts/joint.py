@@ -29,8 +29,6 @@ from pymoo_hdte.discrepancy._verdicts.validation_mechanism import MeasuredGap
 from pymoo_hdte.drive._effects.static_error import KinematicTorsion
 from pymoo_hdte.mechanism import ErrorLine, LawAt, Mechanism, Port, Record
 
-SLOWING = ("viscous_friction", "nonlinear_drag")
-"""Frictions ahead of a gear that the delay of an encoder looks like."""
 _WORST_FIRST = ("partial", "class", "parameter", "named")
 
 
@@ -107,7 +105,7 @@ def examine_joint(
     torsion = examine_torsion(torsion_half(joint, records, known), joint, torque.cutoff, rules)
     gaps = torsion_gaps(torsion)
     verdict = voted(torsion, gaps)
-    slows = any(one.name in SLOWING for one in verdict.accepted.candidates)
+    slows = any(one.effect and one.effect.slows for one in verdict.accepted.candidates)
     if verdict.status == "named" and slows:
         # The delay of one encoder behind the other explains as much.
         verdict = replace(verdict, status="class")

@@ -43,9 +43,6 @@ from pymoo_hdte.mechanism import BelievedValue, Input, LawAt, Mechanism, Port, R
 from pymoo_hdte.mechanism.effects import law_effects
 from pymoo_hdte.mechanism.port_motion import motion_at_port
 
-BEYOND_THE_GEAR = ("gravity", "linear_stiffness", "force_offset")
-"""Effects that are not looked for ahead of the gear: what varies with the position of the load
-acts on the load, and a constant torque is the zero of the torsion."""
 KINEMATIC = KinematicErrorLine.name
 ANGLE = "torsion"
 """Name of the measured torsion as a signal of its own."""
@@ -166,7 +163,7 @@ def _belongs(effect: Effect, port: Port) -> bool:
     """Tell whether an effect may be at a port: of the gear, or of the shaft ahead of it."""
     if port.followed:
         return "mesh" in effect.ports
-    if effect.of_reading or effect.drives or effect.name in BEYOND_THE_GEAR:
+    if effect.of_reading or effect.drives or effect.behind_gear:
         return False
     return "input" in effect.ports or not effect.ports
 

@@ -125,5 +125,7 @@ register(
         _off_centre,
         change=Eccentricity,
         exact=True,
+        forms="harmonics_of_scale",
+        twin="kinematic_error",
     )
 )

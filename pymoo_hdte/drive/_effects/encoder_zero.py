@@ -132,6 +132,7 @@ register(
         "The reading of the output angle drifts with time.",
         _drift,
         change=ThermalDrift,
+        forms="drift_in_time",
     )
 )
 

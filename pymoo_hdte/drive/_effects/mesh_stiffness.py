@@ -81,5 +81,6 @@ register(
         "The stiffness varies {order} times in an input turn.",
         _varying,
         change=MeshStiffnessVariation,
+        forms="harmonics_of_stiffness",
     )
 )

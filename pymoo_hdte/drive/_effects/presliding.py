@@ -68,5 +68,7 @@ register(
         "{port} by some arcseconds that return.",
         _bending,
         contains=("coulomb_friction",),
+        forms="curve_of_speed",
+        form_of="coulomb_friction",
     )
 )

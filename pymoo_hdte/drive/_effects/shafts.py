@@ -161,6 +161,8 @@ register(
         change=LoadInertia,
         of_fit={"time": "time"},
         exact=True,
+        forms="hanging_load",
+        covers="load_inertia",
     )
 )
 
@@ -242,5 +244,7 @@ register(
         "The damping of the torsion is referred to another shaft than believed.",
         _damping,
         change=DampingReference,
+        forms="growing_damping",
+        covers="damping",
     )
 )

@@ -153,6 +153,9 @@ register(
         change=KinematicErrorLine,
         exact=True,
         of_reading=True,
+        forms="harmonics_of_error",
+        twin="eccentricity",
+        with_load=True,
     )
 )
 
@@ -207,5 +210,6 @@ register(
         _reaction,
         change=KinematicReaction,
         # A generator that turns under a load may answer with a lag.
+        forms="lagging_reaction",
     )
 )

@@ -13,6 +13,7 @@ from pymoo_hdte.discrepancy._evidence.order_lines.evidence import Data
 from pymoo_hdte.discrepancy._evidence.order_lines.features import measure
 from pymoo_hdte.discrepancy._selection.verdict import Verdict
 from pymoo_hdte.discrepancy._verdicts.drive_finding import DriveFinding
+from pymoo_hdte.effects import effect_named
 
 ORDERS = [1.0, 2.0, 2.02, 3.0, 4.0]
 FREEDOM = 2000
@@ -40,7 +41,8 @@ def said(campaign, fitted=None, orders=ORDERS, chosen=None, status="named", **of
 def periodic(misfit, *orders):
     """Effects of some orders that leave ``misfit`` times the variance of the noise."""
     fit = SimpleNamespace(**{**vars(UNFITTED), "chi_square": misfit * FREEDOM})
-    candidates = [SimpleNamespace(name="torque_ripple", order=one) for one in orders]
+    ripple = effect_named("torque_ripple")
+    candidates = [SimpleNamespace(effect=ripple, name=ripple.name, order=one) for one in orders]
     return SimpleNamespace(fit=fit, candidates=candidates)
 
 
@@ -51,7 +53,7 @@ def trained(campaign, keep):
 def test_friction_of_the_load_is_told_from_a_gain_where_the_load_drives(campaign):
     """A torque sensor that was off by 5 % was friction that grows with the load, for 97 %."""
     chosen = periodic(1.0, None)
-    chosen.candidates[0].name = "load_dependent_friction"
+    chosen.candidates[0].effect = effect_named("load_dependent_friction")
     loaded = [one for one in campaign.train if one.load_torque > 0.0]
     (limit,) = [one for one in said(campaign, loaded, chosen=chosen) if "gain error" in one]
     assert "0.5 %" in limit

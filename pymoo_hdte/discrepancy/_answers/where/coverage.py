@@ -123,7 +123,7 @@ def _like_a_gain(finding: DriveFinding) -> list[str]:
     """Return what tells a friction in proportion to the load from a gain of the torque sensor."""
     verdict = finding.verdict
     chosen = verdict.chosen if verdict.status in EXPLAINED else None
-    if chosen is None or all(one.name != "load_dependent_friction" for one in chosen.candidates):
+    if chosen is None or not any(one.effect and one.effect.loaded for one in chosen.candidates):
         return []
     power = [one.input_speed * one.load_torque for one in finding.data.features.records]
     if min(power) < 0.0 < max(power):

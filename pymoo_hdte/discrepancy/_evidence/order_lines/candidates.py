@@ -6,25 +6,14 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from pymoo_hdte.checks import InvalidInput
-from pymoo_hdte.discrepancy._evidence.order_lines.parameters import MECHANICAL, words_of
+from pymoo_hdte.discrepancy._evidence.order_lines.parameters import ACTING_AT, MECHANICAL, words_of
 from pymoo_hdte.discrepancy._records.known_values import known_values, with_known_values
 from pymoo_hdte.discrepancy._selection import candidate
 from pymoo_hdte.discrepancy._selection.candidate import Candidate, candidate_of
 from pymoo_hdte.discrepancy._selection.fitting import Unknowns
 from pymoo_hdte.drive._effects import DriveEffect, DriveSizes, LawAtPort, drive_effects
-from pymoo_hdte.effects.effect import effect_named, place_of
+from pymoo_hdte.effects.effect import Place, effect_named, place_of
 from pymoo_hdte.effects.unknowns import Parameter
-
-_ACTING_AT = {"input_damping": "input", "output_damping": "output"}
-"""Ports at which base parameters are friction, as a law there is."""
-_COVERED = {"load_inertia": ("load_inertia", "output"), "damping": ("damping_reference", "mesh")}
-"""Base parameters that an effect in the library covers, and name and port of the effect."""
-_ONCE = (
-    {"coulomb_friction", "presliding_friction"},
-    {"nonlinear_drag", "shear_thinning_drag"},
-    {"hysteresis", "bouc_wen_hysteresis"},
-)
-"""Names of one thing in several forms, which a port has once: dry friction, drag, hysteresis."""
 
 
 def drive_candidates(
@@ -32,24 +21,23 @@ def drive_candidates(
 ) -> list[Candidate]:
     """Return all candidates for a drive, for the sizes of each of its ports.
 
-    None of them is at the place of a believed effect; dry friction is there once, bending or not,
-    drag once, of a fluid that thins or not, and hysteresis once, of springs or of Bouc and Wen.
+    None of them is at the place of a believed effect, nor of another form of it: dry friction is
+    there once, bending or not, and hysteresis once, of springs or of Bouc and Wen.
     """
-    known = {place_of(effect) for effect in believed}
-    known |= {
-        (name, port, order)
-        for one, port, order in known
-        for names in _ONCE
-        if one in names
-        for name in names
-    }
+    known = {_in_first_form(place_of(effect)) for effect in believed}
     found = [
         candidate_of(effect, guess, port, "torque", _standing, sizes[port].slower)
         for effect in drive_effects()
         for port in effect.sought_at
         for guess in effect.guesses(sizes[port])
     ]
-    return [one for one in found if not one.places & known]
+    return [one for one in found if not {_in_first_form(place) for place in one.places} & known]
+
+
+def _in_first_form(place: Place) -> Place:
+    """Return a place with the effect of which its own is another form, if it is one."""
+    name, port, order = place
+    return effect_named(name).form_of or name, port, order
 
 
 def _standing(name: str, port: str, part: Any) -> Any:
@@ -71,17 +59,18 @@ def out_of_tolerance(
     believed ``effects`` is one if its law takes all values that it may then have.
     """
     believed, known = {one.name: one.start for one in base}, known_values(effects)
+    covering = {effect.covers: effect for effect in drive_effects() if effect.covers}
     found = [
         candidate.out_of_tolerance(
             name,
             words_of(name, error_orders),
-            _ACTING_AT.get(name, ""),
-            _COVERED.get(name, ("", "")),
+            ACTING_AT.get(name, ""),
+            covering.get(name),
         )
         for name in at_bounds
         if (name in MECHANICAL or name.startswith("error_amplitude_") or name in known)
         and believed[name] > 0.0
-        and (together or name not in _COVERED)
+        and (together or name not in covering)
     ]
     return [one for one in found if one.port not in known or _taken(base, one, effects)]
 

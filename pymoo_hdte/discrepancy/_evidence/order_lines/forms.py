@@ -31,6 +31,7 @@ from pymoo_hdte.drive._effects import (
     PreslidingFriction,
     ThermalDrift,
 )
+from pymoo_hdte.effects.effect import AS_LISTED
 from pymoo_hdte.effects.friction import smoothed_sign
 from pymoo_hdte.effects.hysteresis import MaxwellSlip
 from pymoo_hdte.effects.law import PortState, Response, Values
@@ -102,9 +103,13 @@ class Ranges:
 
 
 def corrections(candidate: Candidate, ranges: Ranges) -> list[DriveEffect]:
-    """Return the corrections of the form of a candidate's laws; none where no form is known."""
-    of_name = _FORMS.get(candidate.frees or candidate.name)
-    return [] if of_name is None else of_name(candidate, ranges)
+    """Return the corrections of the form of a candidate's laws; none where no form is known.
+
+    A base parameter out of its tolerance has those of the effect that says the same. An error that
+    no verdict names has none.
+    """
+    effect = candidate.effect if candidate.listed else None
+    return _FAMILIES[(effect and effect.forms) or AS_LISTED](candidate, ranges)
 
 
 def _friction(candidate: Candidate, ranges: Ranges) -> list[DriveEffect]:
@@ -277,25 +282,20 @@ def _load(candidate: Candidate, ranges: Ranges) -> list[DriveEffect]:
     return [LoadRate(k, _SHARE * ranges.inertia / fastest**k) for k in _RATES]
 
 
-_FORMS: dict[str, Callable[[Candidate, Ranges], list[DriveEffect]]] = {
-    "coulomb_friction": _friction,
-    "presliding_friction": _friction,
-    "stribeck_friction": _friction,
-    "nonlinear_drag": _friction,
-    "position_dependent_friction": _varying_friction,
-    "load_dependent_friction": _friction_of_load,
-    "hardening_stiffness": _stiffness,
-    "soft_windup": _stiffness,
-    "backlash": _stiffness,
-    "clearance_variation": _stiffness,
-    "hysteresis": _springs,
-    "mesh_stiffness_variation": _stiffness_wave,
-    "torque_ripple": _ripple,
-    "kinematic_error": _error,
-    "eccentricity": _scale_error,
-    "kinematic_reaction": _reaction,
-    "damping_reference": _damping,
-    "damping": _damping,
-    "load_inertia": _load,
-    "thermal_drift": _drift,
+_FAMILIES: dict[str, Callable[[Candidate, Ranges], list[DriveEffect]]] = {
+    AS_LISTED: lambda candidate, ranges: [],
+    "curve_of_speed": _friction,
+    "curve_of_speed_and_angle": _varying_friction,
+    "power_of_load": _friction_of_load,
+    "curve_of_torsion": _stiffness,
+    "slipping_springs": _springs,
+    "harmonics_of_torque": _ripple,
+    "harmonics_of_stiffness": _stiffness_wave,
+    "harmonics_of_error": _error,
+    "harmonics_of_scale": _scale_error,
+    "lagging_reaction": _reaction,
+    "growing_damping": _damping,
+    "hanging_load": _load,
+    "drift_in_time": _drift,
 }
+"""What the families of `effects.effect.FORMS` span."""

@@ -47,6 +47,8 @@ _UNITS = {
     "output_torque_zero": "N.m",
 }
 """SI units of the base parameters, by name; those of lines without their number."""
+ACTING_AT = {"input_damping": "input", "output_damping": "output"}
+"""Ports at which base parameters are friction, as a law there is."""
 _OF_LINES = ("error_amplitude", "error_phase")
 
 

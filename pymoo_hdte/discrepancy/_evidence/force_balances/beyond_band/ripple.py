@@ -40,10 +40,6 @@ from pymoo_hdte.mechanism import LawAt, Mechanism, Port, Record
 Values = NDArray[np.float64]
 Pair = tuple[float, float]
 
-_OTHER = {
-    "position_dependent_friction": "turns with the direction, as friction",
-    "torque_ripple": "is the same in both directions",
-}
 _CENTRAL = float(norm.ppf(0.975))
 
 
@@ -121,7 +117,9 @@ class Ripple:
         words = effect_named(names[0]).sentence
         told = [sentence_at(words, self.port, f"{self.order:.5g}", "force")]
         if len(names) > 1:
-            told.append(f"A part of it {_OTHER[names[1]]}.")
+            same = "is the same in both directions"
+            turns = "turns with the direction, as friction"
+            told.append(f"A part of it {same if effect_named(names[1]).drives else turns}.")
         if self.ways == 1:
             told.append(_one_way(self.port))
         if self.ratio:
