@@ -202,15 +202,13 @@ def prove(finding: DriveFinding) -> Proof | None:
             float(overall[0]), float(overall[1]), 1.0, DEVIATIONS, data.rules, overall_chance, 2
         ),
         by_record=tuple(
-            replace(
-                _gap(
-                    data,
-                    error[:, [k]].sum(axis=2),
-                    error_floor[[k]].sum(axis=1),
-                    chance[[k], 0],
-                    CHANNELS[0],
-                ),
-                among=others,
+            _gap(
+                data,
+                error[:, [k]].sum(axis=2),
+                error_floor[[k]].sum(axis=1),
+                chance[[k], 0],
+                CHANNELS[0],
+                others,
             )
             for k in range(error.shape[1])
         ),
@@ -260,13 +258,15 @@ def _chance(data: Data, change: Values, misfit: float, channel: int) -> Values:
     return np.asarray(2.0 * np.sqrt(misfit * variance))
 
 
-def _gap(data: Data, squares: Values, noise: Values, chance: Values, channel: str) -> Gap:
+def _gap(
+    data: Data, squares: Values, noise: Values, chance: Values, channel: str, among: int = 1
+) -> Gap:
     """Return the gap from mean squares (2, r), those of the noise (r,), and `_chance` (r,)."""
     unit, size = SHOWN_IN[channel]
     before, after = np.sqrt(squares.mean(axis=1)) / size
     floor = float(np.sqrt(noise.mean()) / size)
     by_chance = float(np.linalg.norm(chance)) / squares.shape[1] / size**2
-    return Gap(float(before), float(after), floor, unit, data.rules, by_chance)
+    return Gap(float(before), float(after), floor, unit, data.rules, by_chance, among)
 
 
 def _height(gap: Gap) -> float:

@@ -114,7 +114,7 @@ def _means(records: Sequence[RunningRecord], believed: BelievedDrive, rig: Rig) 
     variance = shared + np.array([one.covariance[0, 0, 0] for one in lines])
     # Every load has a level of its own, since how the torsion grows with it is not known here; but
     # small deviations of the load from what was set turn the drive by one stiffness.
-    states = [(one.load_torque, one.input_speed > 0.0) for one in records]
+    states = _states(records)
     levels = np.array([[one == other for other in dict.fromkeys(states)] for one in states])
     beside = torque - np.array([one.load_torque for one in records])
     return _Means(
@@ -191,9 +191,14 @@ def _torque_change(
     return _Change(slice(place, place + 1), channel, size) if abs(size) > stated else None
 
 
+def _states(records: Sequence[RunningRecord]) -> list[tuple[float, bool]]:
+    """Return the load of each record, and whether it turns forward."""
+    return [(one.load_torque, one.input_speed > 0.0) for one in records]
+
+
 def _alike(records: Sequence[RunningRecord], place: int) -> list[bool]:
     """Return which of the other records have the load and direction of one, shape (n - 1,)."""
-    states = [(one.load_torque, one.input_speed > 0.0) for one in records]
+    states = _states(records)
     return [one == states[place] for one in (*states[:place], *states[place + 1 :])]
 
 
