@@ -29,7 +29,7 @@ class MechanismModel:
     effects : tuple of LawAt
         Known laws at its ports.
     cutoff : float or None
-        Hz, up to which the motion is known; None to determine it from the records.
+        Frequency up to which the motion is known, Hz; None to determine it from the records.
 
     Examples
     --------
@@ -49,7 +49,7 @@ def read_mechanism_model(path: str | Path) -> MechanismModel:
     Parameters
     ----------
     path : str or Path
-        Of a file like ``rig.toml``, without records.
+        File like ``rig.toml``, without records.
 
     Raises
     ------
@@ -90,17 +90,22 @@ def model_text(model: MechanismModel) -> str:
     }
     top["ports"] = {port.name: _port_table(port) for port in mechanism.ports}
     top["inputs"] = {
-        one.name: {"acts": one.acts} | ({"gain": _believed_table(one.gain)} if one.scaled else {})
-        for one in mechanism.inputs
+        signal.name: {"acts": signal.acts}
+        | ({"gain": _believed_table(signal.gain)} if signal.scaled else {})
+        for signal in mechanism.inputs
     }
     # The reader takes finite numbers only: a loop without saturation has no limit there.
     loops = [
-        {name: one for name, one in vars(loop).items() if one != float("inf")}
+        {name: value for name, value in vars(loop).items() if value != float("inf")}
         for loop in mechanism.loops
     ]
     rows = [
-        {"name": one.name, "port": one.port, **effect_named(one.name).numbers_of(one.law)}
-        for one in model.effects
+        {
+            "name": effect.name,
+            "port": effect.port,
+            **effect_named(effect.name).numbers_of(effect.law),
+        }
+        for effect in model.effects
     ]
     # The reader takes no empty array of tables.
     top |= {name: array for name, array in (("loops", loops), ("effects", rows)) if array}
@@ -109,21 +114,23 @@ def model_text(model: MechanismModel) -> str:
     return toml_text(top)
 
 
-def _believed_table(one: BelievedValue) -> dict[str, float]:
-    limits = {"tolerance": one.tolerance, "factor": one.factor}
-    return {"value": one.value} | {
+def _believed_table(believed: BelievedValue) -> dict[str, float]:
+    limits = {"tolerance": believed.tolerance, "factor": believed.factor}
+    return {"value": believed.value} | {
         name: limit for name, limit in limits.items() if limit != getattr(NOTHING, name)
     }
 
 
 def _port_table(port: Port) -> dict[str, Any]:
     elements = {"stiffness": port.stiffness, "damping": port.damping}
-    there = {name: _believed_table(one) for name, one in elements.items() if one != NOTHING}
+    stated = {name: _believed_table(value) for name, value in elements.items() if value != NOTHING}
     error = {"error": [vars(line) for line in port.error]} if port.error else {}
-    more: dict[str, Any] = {"load": dict(port.load)} if port.load else {}
+    optional: dict[str, Any] = {"load": dict(port.load)} if port.load else {}
     if port.gear:
-        more["gear"] = vars(port.gear)
-    return {"motion": port.motion, **there} | ({"read": True} if port.read else {}) | error | more
+        optional["gear"] = vars(port.gear)
+    return (
+        {"motion": port.motion, **stated} | ({"read": True} if port.read else {}) | error | optional
+    )
 
 
 def model_from_fields(top: Fields, file: str) -> MechanismModel:
@@ -154,19 +161,19 @@ def _mechanism(top: Fields, file: str) -> Mechanism:
         gain = _believed(table, "gain") if scaled else BelievedValue(1.0)
         inputs.append(Input(name, acts, gain, scaled))
         table.finish()
-    pushing = [one.name for one in inputs]
+    input_names = [signal.name for signal in inputs]
     ports = [
-        _port(name, table, f"{file}.ports.{name}", inertias, pushing)
+        _port(name, table, f"{file}.ports.{name}", inertias, input_names)
         for name, table in _named(top, "ports", file).items()
     ]
     rows = top.tables("loops") if top.has("loops") else []
-    loops = [_loop(row, [one.name for one in inputs], inertias) for row in rows]
+    loops = [_loop(row, input_names, inertias) for row in rows]
     turning = [name for name, turns in angles.items() if turns] if angles else None
     sliding = [name for name, turns in angles.items() if not turns] if angles else None
     try:
         return Mechanism(inertias, ports, inputs, loops, turning, sliding)
     except InvalidInput as error:
-        gains = {f"gain of {one.name}": f"{file}.inputs.{one.name}.gain" for one in inputs}
+        gains = {f"gain of {signal.name}": f"{file}.inputs.{signal.name}.gain" for signal in inputs}
         place = gains.get(error.field, f"{file}: {error.field}")
         raise InvalidInput(place, error.value, error.allowed) from None
 
@@ -230,7 +237,7 @@ def _port(
     lines = []
     for row in table.tables("error") if table.has("error") else []:
         coordinate = row.choice("coordinate", coordinates)
-        numbers = {one: row.number(one) for one in ("order", "amplitude", "phase")}
+        numbers = {field: row.number(field) for field in ("order", "amplitude", "phase")}
         lines.append(ErrorLine(coordinate, **numbers))
         row.finish()
     gear = _gear(table.table("gear"), place) if table.has("gear") else None
@@ -263,7 +270,7 @@ def _loop(row: Fields, inputs: Collection[str], coordinates: Collection[str]) ->
 
 
 def _effect(row: Fields, place: str, mechanism: Mechanism) -> LawAt:
-    name = row.choice("name", [one.name for one in law_effects()])
+    name = row.choice("name", [effect.name for effect in law_effects()])
     effect, port = effect_named(name), row.choice("port", mechanism.port_names)
     if effect.of_reading and not mechanism.port(port).read:
         allowed = f"a port with read = true: {name} is what its force sensor shows"
@@ -271,7 +278,9 @@ def _effect(row: Fields, place: str, mechanism: Mechanism) -> LawAt:
     if getattr(effect.law, "loaded", False) and not mechanism.port(port).load:
         allowed = f"a port with load = {{ input = share }}, on which {name} depends"
         raise InvalidInput(f"{place}.port", port, allowed)
-    numbers = {one: row.number(one) for one in effect.quantities if row.has(one)}
+    numbers = {
+        quantity: row.number(quantity) for quantity in effect.quantities if row.has(quantity)
+    }
     row.finish()
     try:
         return LawAt(name, port, effect.law_of(numbers))
