@@ -29,13 +29,13 @@ ROWS_A_POINT = 24
 FEWEST_ROWS = 2 * ROWS_A_POINT
 """Least number of rows of a leg."""
 MOST_ROWS = 500 * ROWS_A_POINT
-"""Rows of a sweep beyond which consecutive ones are averaged first: the covariance of the points
-and the polynomials of the legs grow with the square of their number, and 500 points show a curve of
-stiffness and friction as finely as any law of the package bends."""
+"""Rows of a sweep beyond which consecutive ones are averaged first. The covariance of the points
+and the polynomials of the legs grow with the square of their number, and 500 points resolve the
+bends of every law of the package."""
 _REVERSAL = 8.0
 """Least reversal at a turning point, in standard deviations of the torque noise."""
 _REVERSAL_SHARE = 0.05
-"""The same as a share of the swept range, for a sensor noisier than believed."""
+"""Least reversal as a share of the swept range, for a sensor noisier than believed."""
 _REFINEMENTS = 3
 _FEW_ROWS = 8
 """Rows by which a refinement may move a turning point."""
@@ -50,13 +50,13 @@ class TorsionLeg:
     Attributes
     ----------
     time, angle : ndarray, shape (n,)
-        Of the rows, s; minus the output angle, rad.
+        Time of the rows, s, and minus the output angle, rad.
     end : float
         Time of the turning point at the end, s.
     coefficients : ndarray, shape (k,)
-        Of Chebyshev polynomials over the rows, N.m.
+        Coefficients of Chebyshev polynomials over the rows, N.m.
     covariance : ndarray, shape (k, k)
-        Of the coefficients.
+        Covariance of the coefficients.
     """
 
     time: Values
@@ -91,16 +91,16 @@ class TorsionLeg:
     def edges(self) -> Values:
         """Times of the beginning of every point and of the end of the last, s."""
         middles = (self.time[1:] + self.time[:-1]) / 2.0
-        first, last = 2.0 * self.time[:1] - middles[:1], 2.0 * self.time[-1:] - middles[-1:]
+        start, end = 2.0 * self.time[:1] - middles[:1], 2.0 * self.time[-1:] - middles[-1:]
         cuts = np.cumsum([len(rows) for rows in self.split(self.time)])[:-1]
-        return np.concatenate([first, middles[cuts - 1], last])
+        return np.concatenate([start, middles[cuts - 1], end])
 
 
 def shortened(record: TorsionRecord, rig: Rig) -> tuple[TorsionRecord, Rig]:
     """Return a sweep of at most `MOST_ROWS` rows, and the rig with the noise of such a row.
 
-    A row of a long sweep becomes the mean of an equal number of consecutive rows; fewer rows than
-    make one more are left out at the end. A short sweep is returned as it is.
+    Each row becomes the mean of an equal number of consecutive rows; an incomplete last group is
+    left out. A short sweep is returned as it is.
 
     Parameters
     ----------
@@ -135,7 +135,7 @@ def torsion_legs(record: TorsionRecord, rig: Rig) -> list[TorsionLeg]:
     corners = _turning_times(record, rig.output_torque_noise)
     legs = _between(record, rig, corners)
     for _ in range(_REFINEMENTS):
-        corners[1:-1] = [_meeting(one, other) for one, other in pairwise(legs)]
+        corners[1:-1] = [_meeting_time(leg, following) for leg, following in pairwise(legs)]
         legs = _between(record, rig, corners)
     return legs
 
@@ -194,11 +194,11 @@ def _fitted(record: TorsionRecord, rows: NDArray[np.bool_], end: float, noise: f
     return TorsionLeg(time, -record.output_angle[rows], end, coefficients, covariance)
 
 
-def _meeting(one: TorsionLeg, other: TorsionLeg) -> float:
+def _meeting_time(leg: TorsionLeg, following: TorsionLeg) -> float:
     """Return the time at which two curves meet, within a few rows of the present turning point."""
-    closing = one.slope(one.end) - other.slope(one.end)
+    closing = leg.slope(leg.end) - following.slope(leg.end)
     if closing == 0.0:
-        return one.end
-    apart = float(other.torque(one.end)[0] - one.torque(one.end)[0])
-    most = _FEW_ROWS * float(one.time[1] - one.time[0])
-    return one.end + min(max(apart / closing, -most), most)
+        return leg.end
+    apart = float(following.torque(leg.end)[0] - leg.torque(leg.end)[0])
+    most = _FEW_ROWS * float(leg.time[1] - leg.time[0])
+    return leg.end + min(max(apart / closing, -most), most)
