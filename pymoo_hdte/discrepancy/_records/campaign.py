@@ -94,10 +94,10 @@ class Campaign:
                 check_stiffness(self.believed, largest_load, rules)
                 raise
         for record in self.running:
-            with complaints.noted(), _named(record.name):
+            with complaints.noted(), _errors_name_record(record.name):
                 check_running(record, self.believed, self.rig, largest_load, rules)
         for sweep in self.torsion:
-            with complaints.noted(), _named(sweep.name):
+            with complaints.noted(), _errors_name_record(sweep.name):
                 check_torsion(sweep, self.believed, rules)
         # The checks below would only report the same faults in other words.
         complaints.finish()
@@ -168,7 +168,7 @@ class Campaign:
 
 
 @contextmanager
-def _named(name: str) -> Iterator[None]:
+def _errors_name_record(name: str) -> Iterator[None]:
     try:
         yield
     except InvalidInput as error:

@@ -125,7 +125,7 @@ def read_record(
     known = _ranges(entry, place) | _temperature(entry, place, layout) if running else {}
     columns = read_columns(path, layout, seen=seen)
     measured = _in_si(columns, ratio)
-    with _placed(columns, place):
+    with _errors_name_file(columns, place):
         record: RunningRecord | TorsionRecord = build(
             kind, names, entry, place, name=_name_of(path.name), role=role, **known, **measured
         )
@@ -230,7 +230,7 @@ def _in_si(columns: Columns, ratio: float) -> Channels:
 
 
 @contextmanager
-def _placed(columns: Columns, place: str) -> Iterator[None]:
+def _errors_name_file(columns: Columns, place: str) -> Iterator[None]:
     """Raise errors about the channels of a record as errors about its file."""
     try:
         yield

@@ -59,7 +59,7 @@ def with_known_values(
     InvalidInput
         For a number that its law does not take.
     """
-    return tuple(_with(effect, values) for effect in effects)
+    return tuple(_with_values(effect, values) for effect in effects)
 
 
 def of_equal_numbers(
@@ -114,7 +114,7 @@ def known_unit(name: str) -> str:
     return effect_named(name.partition(".")[0]).unit(name.rpartition(".")[2])
 
 
-def _with(effect: DriveEffect, values: Mapping[str, float]) -> DriveEffect:
+def _with_values(effect: DriveEffect, values: Mapping[str, float]) -> DriveEffect:
     given = {
         name.rpartition(".")[2]: float(values[name])
         for name in known_values([effect])

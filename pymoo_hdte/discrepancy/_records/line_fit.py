@@ -49,12 +49,12 @@ class OrderLines:
     mean : ndarray, shape (4,)
         Value of the straight line at the middle of the record, rad or N.m.
     slope : ndarray, shape (4,)
-        Of the straight line, rad/s or N.m/s; that of the input angle is the mean input speed.
+        Slope of the straight line, rad/s or N.m/s; that of the input angle is the mean input speed.
     phasors : ndarray of complex, shape (4, m)
         Corrected for the loss by averaging, rad or N.m.
     covariance : ndarray, shape (4, 1 + 2 m, 1 + 2 m)
-        Of (mean, Re phasors, Im phasors) of each channel, from sensor noise and quantisation, in
-        the square of its unit.
+        Covariance of (mean, Re phasors, Im phasors) of each channel, from sensor noise and
+        quantisation, in the square of its unit.
     row_covariance : ndarray, shape (4, 4)
         Covariance of the noise of one row between channels, in the product of their units. The
         covariance of channel a with channel b is ``covariance[a] * row_covariance[a, b] /
@@ -98,9 +98,9 @@ def order_lines(
     Parameters
     ----------
     record : RunningRecord
-        Of a drive at constant speed.
+        Record of a drive at constant speed.
     rig : Rig
-        For the noise.
+        Gives the noise.
     ratio : float
         Transmission ratio N, dimensionless.
     orders : array_like, shape (m,)

@@ -76,7 +76,7 @@ def check_stiffness(believed: BelievedDrive, largest_load: float, rules: Rules) 
     ----------
     believed : BelievedDrive
     largest_load : float
-        Of all running records, N.m.
+        Largest load of all running records, N.m.
     rules : Rules
 
     Raises

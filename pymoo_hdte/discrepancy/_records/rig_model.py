@@ -149,13 +149,13 @@ def model_from_fields(top: Fields, file: str) -> MechanismModel:
 def _mechanism(top: Fields, file: str) -> Mechanism:
     inertias: dict[str, BelievedValue] = {}
     angles: dict[str, bool] = {}
-    for name, table in _named(top, "coordinates", file).items():
+    for name, table in _tables_by_name(top, "coordinates", file).items():
         inertias[name] = _believed(table, "inertia", above=0.0)
         if table.has("angle"):
             angles[name] = _flag(table, "angle", f"{file}.coordinates.{name}")
         table.finish()
     inputs = []
-    for name, table in _named(top, "inputs", file).items():
+    for name, table in _tables_by_name(top, "inputs", file).items():
         acts = _shares(table, "acts", f"{file}.inputs.{name}", inertias)
         scaled = table.has("gain")
         gain = _believed(table, "gain") if scaled else BelievedValue(1.0)
@@ -164,7 +164,7 @@ def _mechanism(top: Fields, file: str) -> Mechanism:
     input_names = [signal.name for signal in inputs]
     ports = [
         _port(name, table, f"{file}.ports.{name}", inertias, input_names)
-        for name, table in _named(top, "ports", file).items()
+        for name, table in _tables_by_name(top, "ports", file).items()
     ]
     rows = top.tables("loops") if top.has("loops") else []
     loops = [_loop(row, input_names, inertias) for row in rows]
@@ -178,7 +178,7 @@ def _mechanism(top: Fields, file: str) -> Mechanism:
         raise InvalidInput(place, error.value, error.allowed) from None
 
 
-def _named(top: Fields, field: str, file: str) -> dict[str, Fields]:
+def _tables_by_name(top: Fields, field: str, file: str) -> dict[str, Fields]:
     """Return tables by the names that users gave them; only coordinates are required."""
     if field != "coordinates" and not top.has(field):
         return {}

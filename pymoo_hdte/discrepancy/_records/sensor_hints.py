@@ -58,10 +58,10 @@ def sensor_hints(campaign: Campaign) -> list[str]:
     ----------
     campaign : Campaign
     """
-    return [hint for hint in (_of_place(campaign), _of_unit(campaign)) if hint]
+    return [hint for hint in (_place_hint(campaign), _unit_hint(campaign)) if hint]
 
 
-def _of_unit(campaign: Campaign) -> str:
+def _unit_hint(campaign: Campaign) -> str:
     """Return which unit the mean torques are in, if it is not that of the loads that were set.
 
     A factor may differ by its standard error and by the stated errors of gain and zero.
@@ -82,7 +82,7 @@ def _of_unit(campaign: Campaign) -> str:
     return f"The output torque is{cause.removeprefix(';')}" if cause else ""
 
 
-def _of_place(campaign: Campaign) -> str:
+def _place_hint(campaign: Campaign) -> str:
     """Return where the output's torque sensor seems to sit, if it is not where it is stated.
 
     The reading must differ from the stated place by half of the inertia and several standard

@@ -39,14 +39,14 @@ def mechanism_candidates(
     candidates = [
         candidate_of(effect, guess, port.name, "force", LawAt)
         for port in data.mechanism.ports
-        for effect, sizes in _sought(data, port, forces[port.name], orders)
+        for effect, sizes in _searched_effects(data, port, forces[port.name], orders)
         for guess in effect.guesses(sizes)
     ]
     known = {place_of(effect) for effect in data.known}
     return [candidate for candidate in candidates if not candidate.places & known]
 
 
-def _sought(
+def _searched_effects(
     data: MeasuredData, port: Port, force: float, orders: Mapping[str, Sequence[float]]
 ) -> Iterator[tuple[Effect, Sizes]]:
     """Yield the effects that are searched for at a port, each with the sizes of the port."""

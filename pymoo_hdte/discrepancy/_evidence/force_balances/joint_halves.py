@@ -121,18 +121,20 @@ def rigid_half(joint: Joint, records: Sequence[Record], known: Sequence[LawAt]) 
     port = replace(
         load,
         motion={name: 1.0},
-        stiffness=_sum(load.stiffness, motor.stiffness),
-        damping=_sum(load.damping, motor.damping),
+        stiffness=_sum_of_values(load.stiffness, motor.stiffness),
+        damping=_sum_of_values(load.damping, motor.damping),
         load={**motor.load, **load.load},
         gear=joint.kind,
     )
     inputs = [
         replace(signal, acts={name: sum(signal.acts.values())}) for signal in mechanism.inputs
     ]
-    rigid = Mechanism({name: _sum(*mechanism.inertias.values())}, [port], inputs, (), [name])
+    rigid = Mechanism(
+        {name: _sum_of_values(*mechanism.inertias.values())}, [port], inputs, (), [name]
+    )
     laws = [replace(effect, port=port.name) for effect in known if effect.port != joint.gear.name]
     channels = {name, *(signal.name for signal in inputs)}
-    return Half(rigid, tuple(_only(record, channels) for record in records), tuple(laws))
+    return Half(rigid, tuple(_with_channels(record, channels) for record in records), tuple(laws))
 
 
 def torsion_half(joint: Joint, records: Sequence[Record], known: Sequence[LawAt]) -> Half:
@@ -178,14 +180,16 @@ def torsion_half(joint: Joint, records: Sequence[Record], known: Sequence[LawAt]
     half = Mechanism(inertia, [shaft, gear], inputs, (), [motor])
     channels = {motor, load, *(signal.name for signal in inputs)}
     moved = [
-        _only(record, channels, {load: record.channel(load) + middle, motor: record.channel(motor)})
+        _with_channels(
+            record, channels, {load: record.channel(load) + middle, motor: record.channel(motor)}
+        )
         for record in records
     ]
     laws = tuple(effect for effect in known if effect.port in half.port_names)
     return Half(half, tuple(moved), laws)
 
 
-def _only(
+def _with_channels(
     record: Record, names: Collection[str], instead: dict[str, NDArray[np.float64]] | None = None
 ) -> Record:
     """Return a record with the named channels only, some of them replaced."""
@@ -195,7 +199,7 @@ def _only(
     return Record(record.name, record.role, record.time, channels, noise, *treatment)
 
 
-def _sum(a: BelievedValue, b: BelievedValue) -> BelievedValue:
+def _sum_of_values(a: BelievedValue, b: BelievedValue) -> BelievedValue:
     """Return a sum, which is right where both parts are within their limits."""
     if NOTHING.value in (a.value, b.value):
         return b if a.value == NOTHING.value else a

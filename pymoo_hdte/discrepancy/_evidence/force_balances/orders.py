@@ -73,7 +73,9 @@ def _strongest(signals: list[tuple[Values, Values]], rules: Rules) -> tuple[floa
         order = _refined(signals, float(orders[place]), step)
         if not any(abs(order - stronger) <= _BESIDE * step for stronger in strongest):
             strongest.append(order)
-        signals = [(position, _without(signal, order * position)) for position, signal in signals]
+        signals = [
+            (position, _without_wave(signal, order * position)) for position, signal in signals
+        ]
     return tuple(strongest)
 
 
@@ -88,11 +90,11 @@ def _order_grid(positions: Sequence[Values], rules: Rules) -> tuple[Values, floa
         return np.empty(0), 1.0
     step = 1.0 if np.pi / widest < _WHOLE else np.pi / widest
     lowest = step * np.ceil(max(1.0, 2.0 * np.pi * rules.fewest_periods / widest) / step)
-    highest = min(max(map(_finest, positions)), lowest + _MOST_TRIED * step)
+    highest = min(max(map(_finest_order, positions)), lowest + _MOST_TRIED * step)
     return np.arange(lowest, highest, step), step
 
 
-def _finest(position: Values) -> float:
+def _finest_order(position: Values) -> float:
     """Return the order at which a record has eight samples per period on average."""
     return len(position) * np.pi / (4.0 * max(float(np.sum(np.abs(np.diff(position)))), 1e-300))
 
@@ -114,7 +116,7 @@ def _significance(signals: Sequence[tuple[Values, Values]], orders: Values, rule
     total, counted = np.zeros((2, len(orders)))
     for position, signal in signals:
         seen = orders * np.ptp(position) >= 2.0 * np.pi * rules.fewest_periods
-        seen &= orders <= _finest(position)
+        seen &= orders <= _finest_order(position)
         if not seen.any():
             continue
         power = np.abs(phasors(position, signal, orders[seen])) ** 2
@@ -124,7 +126,7 @@ def _significance(signals: Sequence[tuple[Values, Values]], orders: Values, rule
     return np.asarray(total / limit)
 
 
-def _without(signal: Values, angle: Values) -> Values:
+def _without_wave(signal: Values, angle: Values) -> Values:
     """Return a signal without its cosine and sine parts of an angle, both of shape (n,)."""
     lines = np.column_stack([np.cos(angle), np.sin(angle)])
     return np.asarray(signal - lines @ np.linalg.lstsq(lines, signal, rcond=None)[0])

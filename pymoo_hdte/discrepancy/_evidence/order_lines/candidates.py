@@ -25,9 +25,9 @@ def drive_candidates(
     None of them stands where the drive is believed to have the same effect, in whatever form: dry
     friction acts there once, bending or not, and hysteresis once, of springs or of Bouc and Wen.
     """
-    known = {_in_first_form(place_of(effect)) for effect in believed}
+    known = {_place_of_main_form(place_of(effect)) for effect in believed}
     candidates = [
-        candidate_of(effect, guess, port, "torque", _standing, sizes[port].slower)
+        candidate_of(effect, guess, port, "torque", _at_port, sizes[port].slower)
         for effect in drive_effects()
         for port in effect.sought_at
         for guess in effect.guesses(sizes[port])
@@ -35,17 +35,17 @@ def drive_candidates(
     return [
         candidate
         for candidate in candidates
-        if not {_in_first_form(place) for place in candidate.places} & known
+        if not {_place_of_main_form(place) for place in candidate.places} & known
     ]
 
 
-def _in_first_form(place: Place) -> Place:
+def _place_of_main_form(place: Place) -> Place:
     """Return the place of an effect under the name of the effect of which it is a form."""
     name, port, order = place
     return effect_named(name).form_of or name, port, order
 
 
-def _standing(name: str, port: str, part: Any) -> Any:
+def _at_port(name: str, port: str, part: Any) -> Any:
     """Return a law as an effect at its port; other parts already are effects of a drive."""
     return LawAtPort(name, port, part) if effect_named(name).change is None else part
 

@@ -109,7 +109,7 @@ def measure(
     conditions = Conditions(
         input_speed=np.array([line.slope[3] for line in lines]),
         output_torque=np.array([line.mean[2] for line in lines]),
-        elapsed=np.array([_middle(record) for record in records]),
+        elapsed=np.array([_middle_time(record) for record in records]),
         bends=np.array([line.bends for line in lines]),
         temperature=np.array([record.temperature for record in records], dtype=float),
         input_angle=np.array([line.mean[3] for line in lines]),
@@ -159,7 +159,7 @@ def shown_order(record: RunningRecord, rules: Rules) -> float:
     return rules.nyquist_share * (np.pi * record.sample_rate / abs(record.input_speed))
 
 
-def _middle(record: RunningRecord) -> float:
+def _middle_time(record: RunningRecord) -> float:
     """Return the time from the start of the session to the middle of a record, s."""
     # A first time further than one row from zero shows that the clock does not start at the record.
     own_clock = abs(record.time[0]) * record.sample_rate <= 1.0

@@ -55,7 +55,7 @@ class Objective(Unknowns):
     def differences(self, values: Vector) -> tuple[NDArray[np.float64], Vector]:
         """Return predicted minus measured features (r, f), and residuals of sweeps and priors."""
         difference = self._features(values) - self.data.features.values
-        torsion = self._torsion(*self._parts(values))[0]
+        torsion = self._torsion(*self._base_and_effects(values))[0]
         return difference, np.concatenate([torsion, self.priors(values)])
 
     def jacobian(self, values: Vector) -> NDArray[np.float64]:
@@ -71,8 +71,8 @@ class Objective(Unknowns):
         """
         n_base, steps = len(self.data.base), self.steps(values)
         moved = values + np.diag(steps * self.scale)
-        base, effects = self._parts(values)
-        here = self._departed(values)
+        base, effects = self._base_and_effects(values)
+        here = self._features_at_departure(values)
         slopes = self._slopes(values) if self.slopes is None else self.slopes
         in_sweeps = (*_IN_SWEEPS, *known_values(self.data.campaign.believed.effects))
         swept = [k for k, parameter in enumerate(self.data.base) if parameter.name in in_sweeps]
@@ -81,8 +81,8 @@ class Objective(Unknowns):
         by_base[swept] = (torsion[1:] - torsion[0]) / steps[swept, None]
         features, sweeps = list(slopes), list(by_base)
         for place in range(n_base, len(values)):
-            base, effects = self._parts(moved[place])
-            shifted, (states,) = self._moved(base, effects)
+            base, effects = self._base_and_effects(moved[place])
+            shifted, (states,) = self._near_last_values(base, effects)
             features.append((shifted[0] - here) / steps[place])
             self._states.follow(place, steps[place] * self.scale[place], states)
             sweeps.append((self._torsion(base, effects)[0] - torsion[0]) / steps[place])
@@ -96,12 +96,12 @@ class Objective(Unknowns):
 
     def slopes_at(self, values: Vector) -> NDArray[np.float64]:
         """Return derivatives of the features by base parameters in units of their scale."""
-        self._departed(values)
+        self._features_at_departure(values)
         return self._slopes(values)
 
     def _slopes(self, values: Vector) -> NDArray[np.float64]:
         """Return `slopes_at` values whose steady states are known, and follow these."""
-        base, effects = self._parts(values)
+        base, effects = self._base_and_effects(values)
         n_base = base.shape[1]
         steps = self.steps(values)[:n_base]
         moving = [
@@ -109,7 +109,9 @@ class Objective(Unknowns):
         ]
         moved = base + np.diag(steps * self.scale[:n_base])
         # Solved together, so that the remaining errors of Newton's method cancel in the quotients.
-        stacked, (_, *moved_states) = self._moved(np.vstack([base, moved[moving]]), effects)
+        stacked, (_, *moved_states) = self._near_last_values(
+            np.vstack([base, moved[moving]]), effects
+        )
         here = stacked[0]
         slopes = np.empty((n_base, *here.shape))
         slopes[moving] = (stacked[1:] - here) / steps[moving, None, None]
@@ -117,10 +119,12 @@ class Objective(Unknowns):
             self._states.follow(place, steps[place] * self.scale[place], states)
         for place, parameter in enumerate(self.data.base):
             if parameter.name in _READ_ONLY:
-                slopes[place] = self.scale[place] * self._reading(parameter.name, base[0], here)
+                slopes[place] = self.scale[place] * self._slope_of_reading(
+                    parameter.name, base[0], here
+                )
         return slopes
 
-    def _reading(
+    def _slope_of_reading(
         self, name: str, base: Vector, features: NDArray[np.float64]
     ) -> NDArray[np.float64]:
         """Return the derivative of features (r, f) by a parameter of `_READ_ONLY`."""
@@ -138,7 +142,9 @@ class Objective(Unknowns):
             slope /= 1.0 + gain
         return slope
 
-    def _parts(self, values: Vector) -> tuple[NDArray[np.float64], tuple[DriveEffect, ...]]:
+    def _base_and_effects(
+        self, values: Vector
+    ) -> tuple[NDArray[np.float64], tuple[DriveEffect, ...]]:
         """Return the base parameters as one row, and the effects."""
         n_base = len(self.data.base)
         parts = built(self.candidates, values[n_base:])
@@ -146,17 +152,17 @@ class Objective(Unknowns):
 
     def _features(self, values: Vector) -> NDArray[np.float64]:
         """Return predicted features (r, f) at values; their steady states are kept as a start."""
-        prediction = self.data.prediction(*self._parts(values), self._states.at(values))
+        prediction = self.data.prediction(*self._base_and_effects(values), self._states.at(values))
         self._states.arrived(values, prediction.balance)
         return self.data.features.of_prediction(prediction)[0]
 
-    def _departed(self, values: Vector) -> NDArray[np.float64]:
+    def _features_at_departure(self, values: Vector) -> NDArray[np.float64]:
         """Return predicted features (r, f) at values from which slopes are to follow."""
         features = self._features(values)
         self._states.depart(len(values))
         return features
 
-    def _moved(
+    def _near_last_values(
         self, vectors: NDArray[np.float64], effects: tuple[DriveEffect, ...]
     ) -> tuple[NDArray[np.float64], list[SteadyMotion]]:
         """Return features (v, r, f) and states near the values tried last, for slopes.

@@ -146,31 +146,31 @@ class Observations:
         effort: Effort = PREDICTION,
     ) -> Prediction:
         """Return the prediction behind `predict`, steady states included."""
-        values = self._named(vectors)
+        values = self._values_by_name(vectors)
         believed, rig = self.campaign.believed, self.campaign.rig
         features = self.features
         orders = features.orders.tolist()
         conditions = features.conditions
         return predict(believed, rig, conditions, orders, values, effects, start, effort)
 
-    def _named(self, vectors: Vector) -> dict[str, Vector]:
+    def _values_by_name(self, vectors: Vector) -> dict[str, Vector]:
         return {p.name: column for p, column in zip(self.base, vectors.T, strict=True)}
 
     def torsion_residuals(
         self, vectors: Vector, effects: Sequence[DriveEffect]
     ) -> NDArray[np.float64]:
         """Return whitened residuals (v, n_points) of the sweeps; none where there is no sweep."""
-        groups = of_equal_numbers(self.campaign.believed.effects, self._named(vectors))
+        groups = of_equal_numbers(self.campaign.believed.effects, self._values_by_name(vectors))
         residuals = np.empty((len(vectors), self.n_sweep_residuals))
         for rows, known in groups if self.torsion else ():
-            residuals[rows] = self._swept(vectors[rows], known, effects)
+            residuals[rows] = self._sweep_residuals(vectors[rows], known, effects)
         return residuals
 
-    def _swept(
+    def _sweep_residuals(
         self, vectors: Vector, known: Sequence[DriveEffect], effects: Sequence[DriveEffect]
     ) -> NDArray[np.float64]:
         """Return whitened residuals of the sweeps where the believed effects are ``known``."""
-        values = self._named(vectors)
+        values = self._values_by_name(vectors)
         coefficients = coefficients_of(self.campaign.believed, values, (*known, *effects), 1)
         stiffness = coefficients.stiffness * values["locked_stiffness"]
         coefficients = replace(coefficients, stiffness=stiffness)

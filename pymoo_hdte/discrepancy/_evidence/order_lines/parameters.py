@@ -120,10 +120,10 @@ def base_parameters(
         First guess of the constant of the transmission error, rad.
     """
     parameters = [
-        _within(name, getattr(believed, name), believed.tolerance_of(name)) for name in MECHANICAL
+        _bounded(name, getattr(believed, name), believed.tolerance_of(name)) for name in MECHANICAL
     ]
     for line, amplitude in enumerate(believed.error_amplitudes):
-        length = _within(f"error_amplitude_{line}", amplitude, believed.error_tolerance)
+        length = _bounded(f"error_amplitude_{line}", amplitude, believed.error_tolerance)
         name, phase = f"error_phase_{line}", phases[line]
         # With a tenth of a radian the remaining error of Newton's method put the difference
         # quotient by the phase of a weak line off by 0.8 %.
@@ -131,10 +131,10 @@ def base_parameters(
         parameters += [length, Parameter(name, phase, *within, scale, phase_of=length.name)]
     for name, value in known_values(believed.effects).items():
         if name in believed.tolerances:
-            parameters.append(_within(name, value, believed.tolerances[name]))
+            parameters.append(_bounded(name, value, believed.tolerances[name]))
     parameters.append(Parameter("offset", offset, offset - 1.0, offset + 1.0, 1e-5))
     # Where the input was locked, a varying stiffness differs from its mean.
-    locked = _within("locked_stiffness", 1.0, believed.tolerance_of("stiffness"))
+    locked = _bounded("locked_stiffness", 1.0, believed.tolerance_of("stiffness"))
     # The prior only determines it where no sweep does.
     parameters.append(replace(locked, prior=locked.scale))
     for name in READING[1:]:
@@ -145,6 +145,6 @@ def base_parameters(
     return tuple(parameters)
 
 
-def _within(name: str, value: float, tolerance: float) -> Parameter:
+def _bounded(name: str, value: float, tolerance: float) -> Parameter:
     reach = max(tolerance * abs(value), 1e-12)
     return Parameter(name, value, value - reach, value + reach, reach)

@@ -132,7 +132,7 @@ def predict(
         )
     if len(parts) == 1:
         return parts[0]
-    return _joined(parts, [rows for rows, _ in groups], len(conditions))
+    return _in_order(parts, [rows for rows, _ in groups], len(conditions))
 
 
 def _predict_group(
@@ -161,7 +161,7 @@ def _predict_group(
         output_torque = output_torque * (np.arange(output_torque.shape[1]) == 0)
     channels = [
         balance.transmission_error,
-        balance.motor_torque + _driving(balance, coefficients),
+        balance.motor_torque + _motor_ripple(balance, coefficients),
         output_torque,
         balance.lead,
     ]
@@ -169,11 +169,11 @@ def _predict_group(
     means = np.array([channel[:, 0].real for channel in channels])
     phasors = lines.reshape(count, records, len(CHANNELS), len(orders))
     mean = means.T.reshape(count, records, len(CHANNELS))
-    _read(believed.ratio, conditions, orders, values, present, mean, phasors)
+    _add_sensor_errors(believed.ratio, conditions, orders, values, present, mean, phasors)
     return Prediction(mean, phasors, balance)
 
 
-def _joined(
+def _in_order(
     parts: Sequence[Prediction], places: Sequence[NDArray[np.int_]], records: int
 ) -> Prediction:
     """Return predictions of several groups of vectors as one, in the order of their places."""
@@ -277,7 +277,7 @@ def _readings(predicted: tuple[float, ...], orders: tuple[float, ...], ratio: fl
     return readings
 
 
-def _driving(balance: SteadyMotion, coefficients: Coefficients) -> NDArray[np.complex128]:
+def _motor_ripple(balance: SteadyMotion, coefficients: Coefficients) -> NDArray[np.complex128]:
     """Return the harmonics of a motor's ripple as its torque sensor reads it, (1, n_harmonics)."""
     total = np.zeros((1, len(balance.torus.orders)), dtype=complex)
     for port, law in coefficients.laws:
@@ -287,7 +287,7 @@ def _driving(balance: SteadyMotion, coefficients: Coefficients) -> NDArray[np.co
     return total
 
 
-def _read(
+def _add_sensor_errors(
     ratio: float,
     conditions: Conditions,
     orders: Sequence[float],

@@ -133,10 +133,10 @@ def torsion_legs(record: TorsionRecord, rig: Rig) -> list[TorsionLeg]:
         For a leg of fewer than `FEWEST_ROWS` rows.
     """
     corners = _turning_times(record, rig.output_torque_noise)
-    legs = _between(record, rig, corners)
+    legs = _legs_between(record, rig, corners)
     for _ in range(_REFINEMENTS):
         corners[1:-1] = [_meeting_time(leg, following) for leg, following in pairwise(legs)]
-        legs = _between(record, rig, corners)
+        legs = _legs_between(record, rig, corners)
     return legs
 
 
@@ -166,7 +166,7 @@ def _turning_times(record: TorsionRecord, noise: float) -> Values:
     return record.time[[*rows, len(torque) - 1]]
 
 
-def _between(record: TorsionRecord, rig: Rig, corners: Values) -> list[TorsionLeg]:
+def _legs_between(record: TorsionRecord, rig: Rig, corners: Values) -> list[TorsionLeg]:
     """Fit the torque of the rows that lie wholly between two turning points."""
     half = 0.5 / record.sample_rate
     legs = []
@@ -176,11 +176,13 @@ def _between(record: TorsionRecord, rig: Rig, corners: Values) -> list[TorsionLe
         if count < FEWEST_ROWS:
             allowed = f"at least {FEWEST_ROWS} from each turning point of the torque to the next"
             raise InvalidInput("number of samples", count, allowed)
-        legs.append(_fitted(record, rows, float(end), rig.output_torque_noise))
+        legs.append(_fitted_leg(record, rows, float(end), rig.output_torque_noise))
     return legs
 
 
-def _fitted(record: TorsionRecord, rows: NDArray[np.bool_], end: float, noise: float) -> TorsionLeg:
+def _fitted_leg(
+    record: TorsionRecord, rows: NDArray[np.bool_], end: float, noise: float
+) -> TorsionLeg:
     """Fit a straight line, or a polynomial where the residual exceeds the noise."""
     time, torque = record.time[rows], record.output_torque[rows]
     flexible = max(len(time) // ROWS_A_POINT // 2, 2)

@@ -86,13 +86,13 @@ def cleaned_rows(
         "torsion": tuple(record for record, _ in sweeps),
         "rig": rig,
     }
-    if any(not _same(getattr(campaign, name), value) for name, value in changed.items()):
+    if any(not _unchanged(getattr(campaign, name), value) for name, value in changed.items()):
         campaign = replace(campaign, **changed, rules=rules)
     faults = [fault for run in runs for fault in run.faults]
     pairs = zip(records, runs_used, strict=True)
     faults += [_hidden_decay(record) for record, run in pairs if record is not run.record]
     faults += [fault for _, sweep_faults in sweeps for fault in sweep_faults]
-    final = [_final(fault, left_out) for fault in (*faults, *drifting)]
+    final = [_with_treatment(fault, left_out) for fault in (*faults, *drifting)]
     return campaign, RowFindings(n_rows, (*final, *new_zero), left_out, noise)
 
 
@@ -126,7 +126,7 @@ def _hidden_decay(record: RunningRecord) -> RowFault:
     return RowFault(record.name, "settling", "rows", 0, rows, length, "modelled")
 
 
-def _same(old: object, new: object) -> bool:
+def _unchanged(old: object, new: object) -> bool:
     """Return whether nothing was replaced in a tuple of records, or in a rig."""
     if isinstance(old, tuple) and isinstance(new, tuple):
         return len(old) == len(new) and all(a is b for a, b in zip(old, new, strict=True))
@@ -170,5 +170,5 @@ def _check_failed(runs: Sequence[RepairedRun]) -> None:
             raise InvalidInput(field, f"{word} {failed[0].size:g}", allowed)
 
 
-def _final(fault: RowFault, left_out: Sequence[str]) -> RowFault:
+def _with_treatment(fault: RowFault, left_out: Sequence[str]) -> RowFault:
     return replace(fault, treatment="left out") if fault.record in left_out else fault

@@ -86,14 +86,14 @@ def without_drift(
         Stated zeros that are replaced.
     """
     known = [np.zeros(2) if rises is None else rises for rises in drifts]
-    sizes = np.array([_of_sensors(rises, rig, ratio, rules) for rises in known]).reshape(-1, 2)
+    sizes = np.array([_sensor_drifts(rises, rig, ratio, rules) for rises in known]).reshape(-1, 2)
     steady, faults, zeros = list(records), list[RowFault](), list[NoiseFinding]()
     for channel, rises in zip(TORQUES, sizes.T, strict=True):
         if not rises.any():
             continue
         shared = float(np.median(rises))
         steady = [
-            _steadied(record, channel, rise, shared)
+            _without_rise(record, channel, rise, shared)
             for record, rise in zip(steady, rises.tolist(), strict=True)
         ]
         faults += [
@@ -110,7 +110,7 @@ def without_drift(
     return steady, faults, zeros
 
 
-def _of_sensors(rises: Values, rig: Rig, ratio: float, rules: Rules) -> tuple[float, float]:
+def _sensor_drifts(rises: Values, rig: Rig, ratio: float, rules: Rules) -> tuple[float, float]:
     """Return how much of the rise of each torque is a drift of its sensor, N.m."""
     of_input, of_output = float(rises[0]) * ratio, float(rises[1])
     apart = of_input - of_output
@@ -124,7 +124,7 @@ def _of_sensors(rises: Values, rig: Rig, ratio: float, rules: Rules) -> tuple[fl
     return 0.0, (-apart if abs(apart) > rig.output_torque_zero else 0.0)
 
 
-def _steadied(record: RunningRecord, channel: str, rise: float, shared: float) -> RunningRecord:
+def _without_rise(record: RunningRecord, channel: str, rise: float, shared: float) -> RunningRecord:
     """Return a record without its drift, whose zero may differ from that of other records."""
     if rise:
         share = centred(record, slice(None)) / float(np.ptp(record.time))

@@ -130,15 +130,15 @@ def _outstanding(before: Rows, after: Rows, deviations: float, rules: Rules) -> 
     """
     usual = _DEVIATION * float(np.median(np.abs(before)))
     departs = np.where(after * before > 0.0, np.minimum(np.abs(after), np.abs(before)), 0.0)
-    limits = np.full(len(departs), max(deviations * usual, _common(departs, rules)))
+    limits = np.full(len(departs), max(deviations * usual, _common_departure(departs, rules)))
     ends = np.r_[:_BESIDE, len(departs) - _BESIDE : len(departs)]
     departs[:_BESIDE], departs[-_BESIDE:] = np.abs(after[:_BESIDE]), np.abs(before[-_BESIDE:])
-    limits[ends] = max(deviations * usual, _common(np.abs(before[_BESIDE:]), rules))
+    limits[ends] = max(deviations * usual, _common_departure(np.abs(before[_BESIDE:]), rules))
     flags = departs > limits
     return flags & (usual > 0.0) & (_run_lengths(flags) <= rules.longest_spike)
 
 
-def _common(departs: Rows, rules: Rules) -> float:
+def _common_departure(departs: Rows, rules: Rules) -> float:
     """Return what a spike has to exceed where that many departures are too many to be spikes."""
     most = max(1, int(rules.spike_share * len(departs)))
     return rules.fault_prominence * float(np.partition(departs, -1 - most)[-1 - most])
@@ -161,7 +161,7 @@ def step(residual: Rows, steps: UnitSteps, deviations: float, rules: Rules) -> S
     ----------
     residual : ndarray, shape (n,)
     steps : UnitSteps
-        Of the lines whose residual it is.
+        Unit steps beside the lines that left the residual.
     deviations : float
         Least size of a jump in its standard deviations.
     rules : Rules

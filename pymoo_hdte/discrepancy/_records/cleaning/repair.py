@@ -77,7 +77,7 @@ class RowSearch(Generic[Record]):
             for start, end in _runs(again):
                 length = float(self.record.time[end] - self.record.time[start - 1])
                 self.note("repeated", "rows", start, end - start + 1, length, "left out")
-            self._keep(~again)
+            self._keep_rows(~again)
 
     def take_stuck(self) -> bool:
         """Leave out rows in which a channel is saturated, or stays the same for far too long.
@@ -102,7 +102,7 @@ class RowSearch(Generic[Record]):
         enough = bool(np.count_nonzero(~every) >= FEWEST_SAMPLES)
         enough &= saturated <= self.rules.saturated_share * len(every)
         if every.any() and enough:
-            self._keep(~every)
+            self._keep_rows(~every)
         return enough
 
     def _saturated(self, values: Rows, reading: float) -> NDArray[np.bool_]:
@@ -154,7 +154,7 @@ class RowSearch(Generic[Record]):
                 run = departures[start : end + 1]
                 size = float(run[np.argmax(np.abs(run))])
                 self.note("spike", channel, start, end - start + 1, size, "left out")
-        self._keep(~np.any([flags for _, flags, _ in channels], axis=0))
+        self._keep_rows(~np.any([flags for _, flags, _ in channels], axis=0))
 
     def note(
         self, kind: str, channel: str, place: int, rows: int, size: float, treatment: str
@@ -163,7 +163,7 @@ class RowSearch(Generic[Record]):
         row = int(self.rows[place])
         self.faults.append(RowFault(self.record.name, kind, channel, row, rows, size, treatment))
 
-    def _keep(self, flags: NDArray[np.bool_]) -> None:
+    def _keep_rows(self, flags: NDArray[np.bool_]) -> None:
         columns = {name: getattr(self.record, name)[flags] for name in ("time", *self.channels)}
         self.record = replace(self.record, **columns)
         self.rows = self.rows[flags]
@@ -292,7 +292,7 @@ class _RunSearch(RowSearch[RunningRecord]):
                 steps = self._steps(fit)
             if not steps:
                 return fit.whole_residual
-            self._compare(steps)
+            self._note_simultaneous_jumps(steps)
             rough = rough or (self.record, self.rows, list(self.faults))
             if taken == self.rules.most_jumps or not self._take_step(*steps[0], orders):
                 break
@@ -368,12 +368,12 @@ class _RunSearch(RowSearch[RunningRecord]):
             jump = step(residual[:, place], unit_steps, self.deviations, self.rules)
             if jump is None:
                 continue
-            channel, size = self._jumped(place, jump, residual)
+            channel, size = self._jumping_channel(place, jump, residual)
             if channel != "time" or self._is_of_rows(size):
                 jumps.append((jump, channel, size))
         return sorted(jumps, key=lambda jump: -jump[0].deviations)
 
-    def _compare(self, steps: Sequence[ChannelStep]) -> None:
+    def _note_simultaneous_jumps(self, steps: Sequence[ChannelStep]) -> None:
         """Note jumps of other channels at the row of the clearest: a record of two tests."""
         angles = ("time", "input_angle", "output_angle")
         best, *further = steps
@@ -402,7 +402,7 @@ class _RunSearch(RowSearch[RunningRecord]):
         self.note("jump", channel, detected.row, rows, size, "modelled")
         return True
 
-    def _jumped(self, place: int, detected: Step, residual: Rows) -> tuple[str, float]:
+    def _jumping_channel(self, place: int, detected: Step, residual: Rows) -> tuple[str, float]:
         """Return which channel of the record jumps at a step, and by how much."""
         if place in (1, 2):
             return RUNNING[place + 1], detected.size

@@ -33,10 +33,10 @@ _LEAST_FREEDOM = 4
 _FEWEST = 2
 """Least number of records before and after a change that stays."""
 
-_OWN = 0.1
+_LEAST_OWN_SQUARE = 0.1
 """Least squared residual of one record's departure from the levels: 0.5 where two share one."""
 
-_FOLLOWED = 1e-9
+_LEAST_SINGULAR_VALUE = 1e-9
 """Least singular value of the levels, as a share of the largest; a constant load adds none."""
 
 _WARMING = (0.03, 0.1, 0.3, 1.0)
@@ -69,7 +69,7 @@ def with_one_zero(
     Parameters
     ----------
     records : sequence of RunningRecord
-        Of one session, in any order.
+        Records of one session, in any order.
     believed : BelievedDrive
     rig : Rig
     rules : Rules
@@ -140,7 +140,7 @@ def _outlier(
     speeds = np.array([record.input_speed for record in records])
     levels = np.column_stack([speeds[:, None] == np.unique(speeds), design])
     axes, sizes, _ = np.linalg.svd(levels * weights[:, None], full_matrices=False)
-    axes = axes[:, sizes > _FOLLOWED * sizes[0]]
+    axes = axes[:, sizes > _LEAST_SINGULAR_VALUE * sizes[0]]
     freedom = number - axes.shape[1] - 1
     if freedom < _LEAST_FREEDOM:
         return None
@@ -152,7 +152,7 @@ def _outlier(
     courses = np.column_stack([np.eye(number), warming * weights[:, None]])
     courses -= axes @ (axes.T @ courses)
     own = np.sum(courses**2, axis=0)
-    known = own > _OWN
+    known = own > _LEAST_OWN_SQUARE
     gains = np.where(known, (residual @ courses) ** 2 / np.where(known, own, 1.0), 0.0)
     place = int(np.argmax(gains[:number]))
     least = float(student.isf(rules.row_fault_chance / number / 2.0, freedom)) ** 2
@@ -183,7 +183,7 @@ def _torque_change(
     place, size = outlier
     channel = "input_torque"
     turned = size * ratio / believed.stiffness
-    others = np.delete(means.values, place)[_alike(records, place)]
+    others = np.delete(means.values, place)[_of_same_state(records, place)]
     # A load that is read wrong also moves the transmission error away from that of the others.
     if others.size and abs(departs := means.values[place] - np.mean(others)) > abs(
         departs - turned
@@ -198,7 +198,7 @@ def _states(records: Sequence[RunningRecord]) -> list[tuple[float, bool]]:
     return [(record.load_torque, record.input_speed > 0.0) for record in records]
 
 
-def _alike(records: Sequence[RunningRecord], place: int) -> list[bool]:
+def _of_same_state(records: Sequence[RunningRecord], place: int) -> list[bool]:
     """Return which other records have the load and direction of one, shape (n - 1,)."""
     states = _states(records)
     return [state == states[place] for state in (*states[:place], *states[place + 1 :])]

@@ -294,9 +294,9 @@ def differs_from_frequencies(
         gain_of_order = of_order / noise - n_order
         gain_of_frequency = float(of_frequency[place]) / noise - n_windows
         limit = gamma.isf(rules.position_order_chance / len(frequencies), n_windows) - n_windows
-        doubt = gamma.isf(rules.second_speed_chance, n_windows) - n_windows
+        margin = gamma.isf(rules.second_speed_chance, n_windows) - n_windows
         significant = gain_of_frequency > limit
-        if gain_of_order <= gain_of_frequency + doubt and (windows == 1 or significant):
+        if gain_of_order <= gain_of_frequency + margin and (windows == 1 or significant):
             return False, float(frequencies[place]) if significant else None
     return True, None
 

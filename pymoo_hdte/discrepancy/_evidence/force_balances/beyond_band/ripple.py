@@ -27,7 +27,7 @@ from pymoo_hdte.discrepancy._evidence.force_balances.beyond_band.order_search im
 )
 from pymoo_hdte.discrepancy._evidence.force_balances.beyond_band.ripple_size import (
     Part,
-    gap_of,
+    force_before_and_after,
     over_speed,
     size_of,
     trend_of,
@@ -138,9 +138,9 @@ class Ripple:
                 "port": self.port,
                 "sentence": self.sentence,
                 "parameters": {
-                    "order": _value(self.order, self.variance),
+                    "order": _value_with_interval(self.order, self.variance),
                     **{
-                        name: _value(value, variance)
+                        name: _value_with_interval(value, variance)
                         for name, (value, variance) in part.values.items()
                     },
                 },
@@ -326,8 +326,8 @@ def _ripple(
         size.ways,
         speeds,
         trend_of(speeds, rules),
-        gap_of(seen.order, laws, train) or (0.0, 0.0),
-        gap_of(seen.order, laws, held_out),
+        force_before_and_after(seen.order, laws, train) or (0.0, 0.0),
+        force_before_and_after(seen.order, laws, held_out),
     )
 
 
@@ -337,6 +337,6 @@ def _share(gap: Pair) -> float:
     return 1.0 - (after / before) ** 2 if before > 0.0 else 0.0
 
 
-def _value(value: float, variance: float) -> dict[str, Any]:
+def _value_with_interval(value: float, variance: float) -> dict[str, Any]:
     half = _CENTRAL * variance**0.5
     return {"value": value, "interval95": [value - half, value + half], "at_bound": False}

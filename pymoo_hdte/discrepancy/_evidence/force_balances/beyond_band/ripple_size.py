@@ -103,16 +103,16 @@ def size_of(port: str, seen: SeenOrder, bands: Sequence[HighBand], rules: Rules)
     variance = 1.0 / sum(line.known for line in known)
     if len(known) == 2:
         # Several orders that the travel does not resolve add up differently in the two directions.
-        apart = (_nearest(seen, bands, 1.0) - _nearest(seen, bands, -1.0)) ** 2
+        apart = (_strongest_order(seen, bands, 1.0) - _strongest_order(seen, bands, -1.0)) ** 2
         if apart > chi2.isf(rules.second_speed_chance, 1) * sum(1.0 / line.known for line in known):
             variance += apart / 4.0
     return Size(_parts(port, seen, known, variance, rules), len(known), variance)
 
 
-def _nearest(seen: SeenOrder, bands: Sequence[HighBand], way: float) -> float:
+def _strongest_order(seen: SeenOrder, bands: Sequence[HighBand], way: float) -> float:
     """Return the order of largest power within the resolution while the port moves one way."""
     orders = seen.order + seen.resolution * _OFFSETS
-    powers = np.abs(phasors(*_moving(seen, bands, way), orders))
+    powers = np.abs(phasors(*_rows_of_line(seen, bands, way), orders))
     return float(orders[np.argmax(powers)])
 
 
@@ -158,7 +158,7 @@ def _line(
     slowest, fastest : float
         Speeds between which rows are taken.
     """
-    position, signal = _moving(seen, bands, way, slowest, fastest)
+    position, signal = _rows_of_line(seen, bands, way, slowest, fastest)
     if len(signal) < FEWEST_ROWS:
         return None
     line = np.exp(1j * seen.order * position)
@@ -173,7 +173,7 @@ def _line(
     return _Line(amplitude, max(variance, 1e-300), middle, spread)
 
 
-def _moving(
+def _rows_of_line(
     seen: SeenOrder,
     bands: Sequence[HighBand],
     way: float,
@@ -245,7 +245,9 @@ def trend_of(speeds: Values, rules: Rules) -> str:
     return unknown
 
 
-def gap_of(order: float, laws: Sequence[LawAt], bands: Sequence[HighBand]) -> Pair | None:
+def force_before_and_after(
+    order: float, laws: Sequence[LawAt], bands: Sequence[HighBand]
+) -> Pair | None:
     """Return the root mean square of other records before and after laws are removed."""
     before = after = 0.0
     count = 0
