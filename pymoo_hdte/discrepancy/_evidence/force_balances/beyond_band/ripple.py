@@ -179,6 +179,11 @@ class Ripples:
         return tuple(part.law for ripple in self.lines for part in ripple.parts)
 
     @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the effects of all ripples."""
+        return tuple(dict.fromkeys(law.name for law in self.laws))
+
+    @property
     def sentence(self) -> str:
         """Sentences that name the ripples; empty for none."""
         ports = dict.fromkeys(ripple.port for ripple in self.lines)
