@@ -92,14 +92,14 @@ class ModelEvidence(ABC):
     def candidates(self, fitted: Fit) -> list[Candidate]:
         """Return every effect that a port may have; override it to search for less, or more."""
         known = {place_of(effect) for effect in self.known}
-        found = [
+        candidates = [
             candidate_of(effect, guess, port, "force", LawAt)
             for port, sizes in self.sizes(fitted).items()
             for effect in law_effects()
             if effect.of_reading == sizes.read
             for guess in effect.guesses(sizes)
         ]
-        return [candidate for candidate in found if not candidate.places & known]
+        return [candidate for candidate in candidates if not candidate.places & known]
 
     def objective(self, candidates: Sequence[Candidate]) -> ModelObjective:
         """Return the whitened residuals with candidates, and their derivatives."""
@@ -146,7 +146,7 @@ class ModelEvidence(ABC):
         """Return what the records kept out of the fit say of two fits; None without any."""
         if self.held_out is None:
             return None
-        before, after = (self.held_out.left_by(each) for each in (base, fitted))
+        before, after = (self.held_out.left_by(fit) for fit in (base, fitted))
         change = after - before
         return Vote(float(before @ before), float(after @ after), float(change @ change))
 
@@ -158,12 +158,12 @@ class ModelEvidence(ABC):
         """Return all whitened residuals, shape (n,), record by record and channel by channel."""
         names = [parameter.name for parameter in self.base]
         values = dict(zip(names, base.tolist(), strict=True))
-        found = [
+        residuals = [
             np.asarray(channels[part], dtype=float)
             for channels in self.residuals(values, tuple(effects))
             for part in channels
         ]
-        return np.nan_to_num(np.concatenate(found), nan=_LOST, posinf=_LOST, neginf=-_LOST)
+        return np.nan_to_num(np.concatenate(residuals), nan=_LOST, posinf=_LOST, neginf=-_LOST)
 
     @property
     def parts(self) -> tuple[str, ...]:
