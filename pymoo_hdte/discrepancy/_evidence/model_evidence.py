@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -19,6 +21,7 @@ from pymoo_hdte.effects.guess import Sizes
 from pymoo_hdte.effects.unknowns import Parameter
 from pymoo_hdte.mechanism import LawAt
 from pymoo_hdte.mechanism.effects import law_effects
+from pymoo_hdte.mechanism.quantity_units import unit_at_length
 
 _LOST = 1e3
 """Whitened residual where a model has no finite prediction, which a fit leaves again."""
@@ -39,6 +42,9 @@ class ModelEvidence(ABC):
         Effects that the model has already; they are not searched for.
     units : mapping of str to str
         SI unit of an unknown of the base; those that are missing are dimensionless.
+    along : collection of str
+        Ports that move along a line: numbers of effects are in N and m there, elsewhere in N.m and
+        rad.
     rules : Rules
         Thresholds of the verdict; `analyse` sets them.
 
@@ -49,7 +55,8 @@ class ModelEvidence(ABC):
 
     base: tuple[Parameter, ...]
     known: tuple[LawAt, ...] = ()
-    units: Mapping[str, str] = {}
+    units: Mapping[str, str] = MappingProxyType({})
+    along: Collection[str] = ()
     rules: Rules = RULES
     held_out: ModelEvidence | None = None
     evident: frozenset[str] = frozenset()
@@ -92,14 +99,20 @@ class ModelEvidence(ABC):
     def candidates(self, fitted: Fit) -> list[Candidate]:
         """Return every effect that a port may have; override it to search for less, or more."""
         known = {place_of(effect) for effect in self.known}
-        candidates = [
-            candidate_of(effect, guess, port, "force", LawAt)
+        found = [
+            self._in_units(candidate_of(effect, guess, port, "force", LawAt))
             for port, sizes in self.sizes(fitted).items()
             for effect in law_effects()
             if effect.of_reading == sizes.read
             for guess in effect.guesses(sizes)
         ]
-        return [candidate for candidate in candidates if not candidate.places & known]
+        return [candidate for candidate in found if not candidate.places & known]
+
+    def _in_units(self, candidate: Candidate) -> Candidate:
+        unit = candidate.unit
+        if unit is None or candidate.port not in self.along:
+            return candidate
+        return replace(candidate, unit=lambda name: unit_at_length(unit(name)))
 
     def objective(self, candidates: Sequence[Candidate]) -> ModelObjective:
         """Return the whitened residuals with candidates, and their derivatives."""
@@ -146,7 +159,7 @@ class ModelEvidence(ABC):
         """Return what the records kept out of the fit say of two fits; None without any."""
         if self.held_out is None:
             return None
-        before, after = (self.held_out.left_by(fit) for fit in (base, fitted))
+        before, after = (self.held_out.left_by(each) for each in (base, fitted))
         change = after - before
         return Vote(float(before @ before), float(after @ after), float(change @ change))
 
@@ -158,12 +171,12 @@ class ModelEvidence(ABC):
         """Return all whitened residuals, shape (n,), record by record and channel by channel."""
         names = [parameter.name for parameter in self.base]
         values = dict(zip(names, base.tolist(), strict=True))
-        residuals = [
+        found = [
             np.asarray(channels[part], dtype=float)
             for channels in self.residuals(values, tuple(effects))
             for part in channels
         ]
-        return np.nan_to_num(np.concatenate(residuals), nan=_LOST, posinf=_LOST, neginf=-_LOST)
+        return np.nan_to_num(np.concatenate(found), nan=_LOST, posinf=_LOST, neginf=-_LOST)
 
     @property
     def parts(self) -> tuple[str, ...]:
