@@ -38,10 +38,11 @@ class Aims:
     def pairs(self) -> NDArray[np.bool_]:
         """Which rivals are to be told from which effects, (n_effects, n_rivals)."""
         signatures = self.signatures
-        found = [
-            [is_rival(one, other) for other in signatures.rivals] for one in signatures.effects
+        separable = [
+            [is_rival(effect, rival) for rival in signatures.rivals]
+            for effect in signatures.effects
         ]
-        return np.array(found, dtype=bool).reshape(len(found), len(signatures.rivals))
+        return np.array(separable, dtype=bool).reshape(len(separable), len(signatures.rivals))
 
     def powers(self, counts: Counts) -> tuple[Values, Values]:
         """Return the powers of detection (n_effects,) and separation (n_effects, n_rivals).
@@ -103,12 +104,12 @@ def _set_for(aims: Aims, most: int, pursued: NDArray[np.bool_]) -> Counts:
         if max(gains) <= _GAIN:
             break
         grown = one_more[int(np.argmax(gains))]
-    found = [_pruned(aims, grown, pursued)]
-    if not _reached(aims, found[0], pursued).all():
+    sets = [_pruned(aims, grown, pursued)]
+    if not _reached(aims, sets[0], pursued).all():
         # Where tests help only together, adding one by one does not find them.
-        found.append(_pruned(aims, np.ones(n_tests, dtype=int), pursued))
-    allowed = [one for one in found if one.sum() <= most]
-    return max(allowed, key=lambda one: (_reached(aims, one, pursued).sum(), -one.sum()))
+        sets.append(_pruned(aims, np.ones(n_tests, dtype=int), pursued))
+    allowed = [counts for counts in sets if counts.sum() <= most]
+    return max(allowed, key=lambda counts: (_reached(aims, counts, pursued).sum(), -counts.sum()))
 
 
 def _reached(aims: Aims, counts: Counts, pursued: NDArray[np.bool_]) -> NDArray[np.bool_]:
@@ -119,13 +120,13 @@ def _pruned(aims: Aims, counts: Counts, pursued: NDArray[np.bool_]) -> Counts:
     """Take tests away, the most dispensable first, while all that was reached still is."""
     counts, reached = counts.copy(), _reached(aims, counts, pursued)
     while counts.any():
-        left: dict[int, float] = {}
+        information: dict[int, float] = {}
         for test in np.flatnonzero(counts):
             fewer = counts - np.eye(len(counts), dtype=int)[test]
             alone, beside = aims.signatures.noncentralities(fewer)
             if np.all(_reached(aims, fewer, pursued) >= reached):
-                left[int(test)] = float(np.log1p(alone).sum() + np.log1p(beside).sum())
-        if not left:
+                information[int(test)] = float(np.log1p(alone).sum() + np.log1p(beside).sum())
+        if not information:
             return counts
-        counts[max(left, key=lambda test: left[test])] -= 1
+        counts[max(information, key=lambda test: information[test])] -= 1
     return counts
