@@ -190,16 +190,16 @@ _REQUIRED = ("speeds", "loads", "sample_rate", "most_records")
 
 def _given(top: Fields) -> dict[str, Any]:
     """Return the attributes that the file gives, in SI."""
-    found: dict[str, Any] = {}
+    attributes: dict[str, Any] = {}
     for name, (key, factor) in _KEYS.items():
         if name not in _REQUIRED and not top.has(key):
             continue
         if name in ("speeds", "loads", "sweeps"):
-            found[name] = tuple(factor * number for number in top.numbers(key))
+            attributes[name] = tuple(factor * number for number in top.numbers(key))
         elif name in ("directions", "channels"):
-            found[name] = top.texts(key)
+            attributes[name] = top.texts(key)
         elif name in ("most_records", "held_out", "output_turns"):
-            found[name] = top.whole(key, at_least=0)
+            attributes[name] = top.whole(key, at_least=0)
         else:
-            found[name] = top.number(key)
-    return found
+            attributes[name] = top.number(key)
+    return attributes
