@@ -154,12 +154,12 @@ class Candidate:
 
         Each of `starts` then changes one of them.
         """
-        return all(one.linear for one in self.parameters)
+        return all(parameter.linear for parameter in self.parameters)
 
     @property
     def lines(self) -> list[NDArray[np.int_]]:
         """Where cosine and sine part of each line of its law stand among its parameters, (2,)."""
-        begins = [row for row, one in enumerate(self.parameters) if one.begins_line]
+        begins = [row for row, parameter in enumerate(self.parameters) if parameter.begins_line]
         return [np.array([row, row + 1]) for row in begins]
 
     @property
@@ -261,10 +261,10 @@ def labels_apart(sets: Sequence[Sequence[Candidate]]) -> list[str]:
 
     The whole labels if nothing of one would be left. A set may have one effect twice.
     """
-    labels = [[candidate.label for candidate in one] for one in sets]
+    labels = [[candidate.label for candidate in members] for members in sets]
     shared = reduce(Counter.__and__, map(Counter, labels))
-    own = [list((Counter(each) - shared).elements()) for each in labels]
-    return ["+".join(one) for one in (own if all(own) else labels)]
+    remaining = [list((Counter(members) - shared).elements()) for members in labels]
+    return ["+".join(names) for names in (remaining if all(remaining) else labels)]
 
 
 def _no_effect(values: Sequence[float]) -> tuple[Any, ...]:
