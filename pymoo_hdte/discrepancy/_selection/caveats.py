@@ -37,28 +37,28 @@ from pymoo_hdte.discrepancy._selection.search import Search
 
 def reasons_of(search: Search, chosen: Hypothesis, vote: Vote | None) -> list[Reason]:
     """Return what forbids to name a set plainly; nothing if it may be named."""
-    found, fitted = [], chosen.fit
+    reasons, fitted = [], chosen.fit
     unsure = uncertain(fitted, search.data.rules)
     for candidate, bounded in bounded_unknowns(fitted):
         if bounded:
-            found.append(Reason.of(AT_BOUND, candidate.label, bounded))
+            reasons.append(Reason.of(AT_BOUND, candidate.label, bounded))
         elif candidate in unsure:
-            found += holds_zero([candidate])
+            reasons += holds_zero([candidate])
     if freed := _freed_at_bounds(chosen):
-        found.append(Reason.of(FREED_AT_BOUND, numbers=freed))
+        reasons.append(Reason.of(FREED_AT_BOUND, numbers=freed))
     for name in _contradicted_in_any_form(search, chosen):
-        found.append(Reason(SENSOR_AT_BOUND, name))
-    curves = [one.label for one in chosen.candidates if not one.exact]
+        reasons.append(Reason(SENSOR_AT_BOUND, name))
+    curves = [candidate.label for candidate in chosen.candidates if not candidate.exact]
     if not search.enough(chosen):
         if curves and chosen.freed:
-            found.append(Reason(STANDS_FOR_FORM, curves[0]))
-        found += _harmonics_of_another(chosen.candidates)
+            reasons.append(Reason(STANDS_FOR_FORM, curves[0]))
+        reasons += _harmonics_of_another(chosen.candidates)
     if vote is not None and vote.denies(search.data.rules, fitted.misfit):
-        found.append(Reason(NOT_VALIDATED))
+        reasons.append(Reason(NOT_VALIDATED))
     per_degree = fitted.chi_square / search.degrees_of_freedom
     if per_degree > search.data.rules.contradicting_chi_square:
-        found.append(above_noise(per_degree))
-    return found
+        reasons.append(above_noise(per_degree))
+    return reasons
 
 
 def other_forms(search: Search, chosen: Hypothesis) -> list[Reason]:
@@ -67,26 +67,26 @@ def other_forms(search: Search, chosen: Hypothesis) -> list[Reason]:
     All together where the listed forms contradict a part of the data and only others do not.
     """
     members = chosen.members if len(chosen.members) > 1 else []
-    found = [
-        "+".join(one.label for one in member)
+    labels = [
+        "+".join(candidate.label for candidate in member)
         for member in members
         if search.forms.only_in_another(chosen, search.without(chosen, member))
     ]
-    if not found and not explains_as_listed(search, chosen):
+    if not labels and not explains_as_listed(search, chosen):
         forms = search.forms
         if forms.explains(chosen) or forms.explains_in_another(chosen):
-            found = [chosen.label]
-    return [Reason(NEEDS_ANOTHER_FORM, label) for label in found]
+            labels = [chosen.label]
+    return [Reason(NEEDS_ANOTHER_FORM, label) for label in labels]
 
 
-def explains_in_any_form(search: Search, one: Hypothesis) -> bool:
+def explains_in_any_form(search: Search, hypothesis: Hypothesis) -> bool:
     """Tell whether a set explains the misfit, in the listed forms of its laws or in others."""
-    return explains_as_listed(search, one) or search.forms.explains(one)
+    return explains_as_listed(search, hypothesis) or search.forms.explains(hypothesis)
 
 
-def explains_as_listed(search: Search, one: Hypothesis) -> bool:
+def explains_as_listed(search: Search, hypothesis: Hypothesis) -> bool:
     """Tell whether a set explains the misfit in the listed forms of its laws."""
-    return explains(search.data, one, search.base, search.degrees_of_freedom)
+    return explains(search.data, hypothesis, search.base, search.degrees_of_freedom)
 
 
 def _harmonics_of_another(candidates: Sequence[Candidate]) -> list[Reason]:
@@ -117,10 +117,10 @@ def above_noise(per_degree: float) -> Reason:
 def _freed_at_bounds(chosen: Hypothesis) -> dict[str, float]:
     """Return the base values that a set frees and that ended at a bound."""
     fitted = chosen.fit
-    freed = {one.frees for one in chosen.candidates} & set(fitted.at_bounds)
+    freed = {candidate.frees for candidate in chosen.candidates} & set(fitted.at_bounds)
     # Parameters of effects follow those of the base, and may have the same names.
     named = reversed([*zip(fitted.parameters, fitted.values, strict=True)])
-    return {one.name: float(value) for one, value in named if one.name in freed}
+    return {parameter.name: float(value) for parameter, value in named if parameter.name in freed}
 
 
 def _contradicted_in_any_form(search: Search, chosen: Hypothesis) -> list[str]:
@@ -131,15 +131,15 @@ def _contradicted_in_any_form(search: Search, chosen: Hypothesis) -> list[str]:
     of these laws, the gain stood for their forms. One law in any form follows too much alone.
     """
     rules, forms = search.data.rules, search.forms
-    found = _contradicted(chosen.fit, rules)
-    if not found or len(chosen.members) < 2:
-        return found
-    free = forms.in_free_form(chosen.fit)
-    if not forms.rest_is_noise(free) or beyond_stated(free, rules).any():
-        return found
-    fewer = [search.without(chosen, one).fit for one in chosen.members]
-    every = [*fewer, *map(forms.in_free_form, fewer)]
-    return found if any(map(forms.rest_is_noise, every)) else []
+    names = _contradicted(chosen.fit, rules)
+    if not names or len(chosen.members) < 2:
+        return names
+    free_fit = forms.in_free_form(chosen.fit)
+    if not forms.rest_is_noise(free_fit) or beyond_stated(free_fit, rules).any():
+        return names
+    simpler_fits = [search.without(chosen, member).fit for member in chosen.members]
+    every = [*simpler_fits, *map(forms.in_free_form, simpler_fits)]
+    return names if any(map(forms.rest_is_noise, every)) else []
 
 
 def _contradicted(fitted: Fit, rules: Rules) -> list[str]:
@@ -147,11 +147,13 @@ def _contradicted(fitted: Fit, rules: Rules) -> list[str]:
 
     It then takes what the effects leave, and what they are is not known.
     """
-    far = beyond_stated(fitted, rules)
+    excess = beyond_stated(fitted, rules)
     return [
-        one.name
-        for one, side, away in zip(fitted.parameters, fitted.bound_sides, far, strict=True)
-        if side != 0.0 and away
+        parameter.name
+        for parameter, side, beyond in zip(
+            fitted.parameters, fitted.bound_sides, excess, strict=True
+        )
+        if side != 0.0 and beyond
     ]
 
 
@@ -163,15 +165,15 @@ def uncertain(
     By its own covariance, or by another one that reports state, shape (n_parameters, n_parameters).
     """
     return [
-        one
-        for one, place in fitted.places
-        if not strength_is_certain(fitted, one, place, rules, covariance)
+        candidate
+        for candidate, place in fitted.places
+        if not strength_is_certain(fitted, candidate, place, rules, covariance)
     ]
 
 
 def holds_zero(candidates: Sequence[Candidate]) -> list[Reason]:
     """Return that the intervals of candidates contain zero."""
-    return [Reason(ZERO_IN_INTERVAL, one.label) for one in candidates]
+    return [Reason(ZERO_IN_INTERVAL, candidate.label) for candidate in candidates]
 
 
 def strength_is_certain(
