@@ -38,11 +38,14 @@ def best_set(search: Search) -> Hypothesis:
     A set of several effects counts only if each of them is earned. What is fitted on the way, as
     the set without one of them, counts too.
     """
-    found: list[Hypothesis] = []
-    while found != search.found:
-        found = search.found
+    hypotheses: list[Hypothesis] = []
+    while hypotheses != search.found:
+        hypotheses = search.found
         best = _least_that(
-            search, lambda one: explains_in_any_form(search, one) and search.earned(one)
+            search,
+            lambda hypothesis: (
+                explains_in_any_form(search, hypothesis) and search.earned(hypothesis)
+            ),
         ) or _least_that(search, search.earned)
     assert best is not None, "a single effect is earned"
     return best
@@ -52,10 +55,10 @@ def _least_that(search: Search, passes: Callable[[Hypothesis], bool]) -> Hypothe
     """Return the set of least BIC that passes, of all that are known once it has been judged."""
     passed: set[Hypothesis] = set()
     refused: set[Hypothesis] = set()
-    while left := [one for one in search.found if one not in refused]:
-        if left[0] in passed:
-            return left[0]
-        (passed if passes(left[0]) else refused).add(left[0])
+    while open_sets := [hypothesis for hypothesis in search.found if hypothesis not in refused]:
+        if open_sets[0] in passed:
+            return open_sets[0]
+        (passed if passes(open_sets[0]) else refused).add(open_sets[0])
     return None
 
 
@@ -70,17 +73,22 @@ def special_case(search: Search, best: Hypothesis) -> Hypothesis:
     if is_bounded(best.fit):
         error = np.inf
     simpler = (
-        search.finished(one)
-        for one in search.found
-        if one.names != best.names and contains(best, one)
+        search.finished(hypothesis)
+        for hypothesis in search.found
+        if hypothesis.names != best.names and contains(best, hypothesis)
     )
     good = (
-        one
-        for one in simpler
-        if search.enough(one) and one.fit.chi_square - best.fit.chi_square <= error
+        hypothesis
+        for hypothesis in simpler
+        if search.enough(hypothesis) and hypothesis.fit.chi_square - best.fit.chi_square <= error
     )
     return next(
-        (one for one in good if explains_in_any_form(search, one) and search.earned(one)), best
+        (
+            hypothesis
+            for hypothesis in good
+            if explains_in_any_form(search, hypothesis) and search.earned(hypothesis)
+        ),
+        best,
     )
 
 
@@ -93,16 +101,20 @@ def confirmed(search: Search, chosen: Hypothesis) -> Hypothesis:
     rules, smaller = search.data.rules, []
     doubted = uncertain(chosen.fit, rules)
     for member in chosen.members if len(chosen.members) > 1 else ():
-        rest = search.without(chosen, member)
-        if not search.enough(rest):
+        reduced = search.without(chosen, member)
+        if not search.enough(reduced):
             continue
-        vote = search.data.held_out_vote(rest.fit, chosen.fit)
-        gain = rest.fit.chi_square - chosen.fit.chi_square
+        vote = search.data.held_out_vote(reduced.fit, chosen.fit)
+        gain = reduced.fit.chi_square - chosen.fit.chi_square
         denied = vote and gain + vote.before - vote.after < rules.single_effect_gain
-        unsure = any(one in doubted for one in member)
-        if denied or (unsure and explains_in_any_form(search, rest)):
-            smaller.append(rest)
-    return confirmed(search, min(smaller, key=lambda one: one.bic)) if smaller else chosen
+        unsure = any(candidate in doubted for candidate in member)
+        if denied or (unsure and explains_in_any_form(search, reduced)):
+            smaller.append(reduced)
+    return (
+        confirmed(search, min(smaller, key=lambda hypothesis: hypothesis.bic))
+        if smaller
+        else chosen
+    )
 
 
 def simpler_law(search: Search, chosen: Hypothesis) -> Hypothesis:
@@ -111,20 +123,20 @@ def simpler_law(search: Search, chosen: Hypothesis) -> Hypothesis:
     A law with more unknowns follows more of the form of any other law: that it leaves less of a
     misfit that is no noise does not show it.
     """
-    most = search.data.rules.form_ratio * left_beyond_noise(search, chosen)
+    limit = search.data.rules.form_ratio * left_beyond_noise(search, chosen)
     special = (
-        one
-        for one in search.found
-        if one.names != chosen.names
-        and contains(chosen, one)
-        and left_beyond_noise(search, one) < most
+        hypothesis
+        for hypothesis in search.found
+        if hypothesis.names != chosen.names
+        and contains(chosen, hypothesis)
+        and left_beyond_noise(search, hypothesis) < limit
     )
-    return next((one for one in special if search.earned(one)), chosen)
+    return next((hypothesis for hypothesis in special if search.earned(hypothesis)), chosen)
 
 
-def left_beyond_noise(search: Search, one: Hypothesis) -> float:
+def left_beyond_noise(search: Search, hypothesis: Hypothesis) -> float:
     """Return the excess chi-square that a set leaves."""
-    return one.fit.chi_square - search.degrees_of_freedom
+    return hypothesis.fit.chi_square - search.degrees_of_freedom
 
 
 def twins(search: Search, chosen: Hypothesis) -> list[Hypothesis]:
@@ -133,14 +145,14 @@ def twins(search: Search, chosen: Hypothesis) -> list[Hypothesis]:
     A law that contains the chosen one follows more of any form, and is none.
     """
     return [
-        one
-        for one in search.of_size(len(chosen.members))
-        if one.names != chosen.names
-        and len(one.candidates) == len(chosen.candidates)
-        and bool(one.freed) == bool(chosen.freed)
-        and near_by_evidence(one, chosen, search.degrees_of_freedom, search.data.rules)
-        and not (contains(one, chosen) or contains(chosen, one))
-        and search.earned(one)
+        hypothesis
+        for hypothesis in search.of_size(len(chosen.members))
+        if hypothesis.names != chosen.names
+        and len(hypothesis.candidates) == len(chosen.candidates)
+        and bool(hypothesis.freed) == bool(chosen.freed)
+        and near_by_evidence(hypothesis, chosen, search.degrees_of_freedom, search.data.rules)
+        and not (contains(hypothesis, chosen) or contains(chosen, hypothesis))
+        and search.earned(hypothesis)
     ]
 
 
@@ -152,17 +164,23 @@ def stands_out(search: Search, chosen: Hypothesis, together: Sequence[Hypothesis
     others; those that the screening left out are far behind.
     """
     rules = search.data.rules
-    others = (
-        one
-        for one in search.of_size(len(chosen.members))
-        if not one.names >= chosen.names and one not in together and not contains(one, chosen)
+    competing = (
+        hypothesis
+        for hypothesis in search.of_size(len(chosen.members))
+        if not hypothesis.names >= chosen.names
+        and hypothesis not in together
+        and not contains(hypothesis, chosen)
     )
     enough = chosen.explained >= rules.partial_share and gains_enough(chosen, search.base, rules)
     least = rules.form_ratio * left_beyond_noise(search, chosen)
-    return enough and all(left_beyond_noise(search, one) >= least for one in others)
+    return enough and all(
+        left_beyond_noise(search, hypothesis) >= least for hypothesis in competing
+    )
 
 
-def replaced(search: Search, chosen: Hypothesis, others: Sequence[Candidate]) -> list[Hypothesis]:
+def replaced(
+    search: Search, chosen: Hypothesis, replacements: Sequence[Candidate]
+) -> list[Hypothesis]:
     """Return sets that explain the misfit with another effect in the place of some members.
 
     What could follow the form of any law in a part of the data is no explanation unless it leaves
@@ -177,27 +195,33 @@ def replaced(search: Search, chosen: Hypothesis, others: Sequence[Candidate]) ->
         Which effects they may replace, they say.
     """
     rules = search.data.rules
-    near = [one for size in (1, 2, 3) for one in search.of_size(size)[: rules.most_firsts]]
-    found, tried = list[Hypothesis](), set[frozenset[str]]()
-    for one in [chosen] if search.enough(chosen) else near:
-        for other in others:
-            kept = tuple(each for each in one.candidates if not other.replaces(each))
-            effects, label = (*kept, other), label_of((*kept, other))
-            if len(kept) == len(one.candidates) or label in tried:
+    leading = [
+        hypothesis for size in (1, 2, 3) for hypothesis in search.of_size(size)[: rules.most_firsts]
+    ]
+    explaining, tried = list[Hypothesis](), set[frozenset[str]]()
+    for hypothesis in [chosen] if search.enough(chosen) else leading:
+        for replacement in replacements:
+            remaining = tuple(
+                candidate
+                for candidate in hypothesis.candidates
+                if not replacement.replaces(candidate)
+            )
+            effects, label = (*remaining, replacement), label_of((*remaining, replacement))
+            if len(remaining) == len(hypothesis.candidates) or label in tried:
                 continue
             tried.add(label)
-            values = one.values_of(kept)
-            for start in other.starts:
-                whole = search.fitted(effects, np.append(values, start), again=True)
-            if left_beyond_noise(search, whole) <= left_beyond_noise(search, one):
-                whole = search.finished(whole)
-            less = rules.form_ratio * left_beyond_noise(search, whole)
-            plainly = less <= left_beyond_noise(search, one) or search.enough(whole)
-            if plainly and explains_as_listed(search, whole):
-                found.append(whole)
+            values = hypothesis.values_of(remaining)
+            for start in replacement.starts:
+                trial = search.fitted(effects, np.append(values, start), again=True)
+            if left_beyond_noise(search, trial) <= left_beyond_noise(search, hypothesis):
+                trial = search.finished(trial)
+            less = rules.form_ratio * left_beyond_noise(search, trial)
+            plainly = less <= left_beyond_noise(search, hypothesis) or search.enough(trial)
+            if plainly and explains_as_listed(search, trial):
+                explaining.append(trial)
             else:
-                search.leave_out(whole)
-    return found
+                search.leave_out(trial)
+    return explaining
 
 
 def in_another_form(
@@ -216,37 +240,44 @@ def in_another_form(
     screened : sequence of Screened
         All candidates beside its base; none if only the sets that it knows are compared.
     """
-    if any(search.data.corrections(one) is None for one in search.candidates[:1]):
+    if any(search.data.corrections(candidate) is None for candidate in search.candidates[:1]):
         return []
-    effects = [one for one in screened if one.candidate.frees is None]
-    for one in search.forms.hopeful_in_another(effects) if effects else ():
-        search.alone(one)
-    singles = [one for one in search.found if one.listed and _is_effect(one)]
-    finished = [one if one is chosen else search.finished(one) for one in singles]
-    found = [one for one in finished if _explains(search, one)]
-    if not found and chosen.listed and _explains(search, chosen):
-        found = [chosen]
-    return sorted(found, key=lambda one: one.bic)
+    effects = [effect for effect in screened if effect.candidate.frees is None]
+    for effect in search.forms.hopeful_in_another(effects) if effects else ():
+        search.alone(effect)
+    singles = [
+        hypothesis for hypothesis in search.found if hypothesis.listed and _is_effect(hypothesis)
+    ]
+    finished = [
+        hypothesis if hypothesis is chosen else search.finished(hypothesis)
+        for hypothesis in singles
+    ]
+    explaining = [hypothesis for hypothesis in finished if _explains(search, hypothesis)]
+    if not explaining and chosen.listed and _explains(search, chosen):
+        explaining = [chosen]
+    return sorted(explaining, key=lambda hypothesis: hypothesis.bic)
 
 
-def _explains(search: Search, one: Hypothesis) -> bool:
+def _explains(search: Search, hypothesis: Hypothesis) -> bool:
     """Tell whether a set explains the misfit in another form, and is more than that form.
 
     A load on a soft sensor moves as further inertia would in some form, of which none is there: the
     strength of an effect of exact form has to be certain beside its corrections.
     """
-    if not search.forms.explains_in_another(one):
+    if not search.forms.explains_in_another(hypothesis):
         return False
-    free, rules = search.forms.in_free_form(one.fit), search.data.rules
-    places = zip(one.candidates, free.places, strict=True)
+    free_fit, rules = search.forms.in_free_form(hypothesis.fit), search.data.rules
+    places = zip(hypothesis.candidates, free_fit.places, strict=True)
     return all(
-        strength_is_certain(free, own, place, rules) for own, (_, place) in places if own.exact
+        strength_is_certain(free_fit, candidate, place, rules)
+        for candidate, (_, place) in places
+        if candidate.exact
     )
 
 
-def _is_effect(one: Hypothesis) -> bool:
+def _is_effect(hypothesis: Hypothesis) -> bool:
     """Tell whether a set is a single effect, and no base parameter."""
-    return len(one.candidates) == 1 and one.candidates[0].frees is None
+    return len(hypothesis.candidates) == 1 and hypothesis.candidates[0].frees is None
 
 
 def in_one_law(search: Search, chosen: Hypothesis) -> list[Hypothesis]:
@@ -255,22 +286,26 @@ def in_one_law(search: Search, chosen: Hypothesis) -> list[Hypothesis]:
     A clearance that varies once in some angle need not do so as a cosine: its harmonics are lines
     at its port, beside a play that does not vary.
     """
-    found = []
-    for wide in search.candidates:
-        if wide.listed and wide.order is not None and _consists_of(chosen, wide, wide.order):
-            one = search.finished(search.alone(Screened(wide, 0.0, wide.starts[0])))
-            if _explains(search, one):
-                found.append(one)
-    return sorted(found, key=lambda one: one.bic)
+    hypotheses = []
+    for law in search.candidates:
+        if law.listed and law.order is not None and _consists_of(chosen, law, law.order):
+            hypothesis = search.finished(search.alone(Screened(law, 0.0, law.starts[0])))
+            if _explains(search, hypothesis):
+                hypotheses.append(hypothesis)
+    return sorted(hypotheses, key=lambda hypothesis: hypothesis.bic)
 
 
-def _consists_of(chosen: Hypothesis, wide: Candidate, order: float) -> bool:
+def _consists_of(chosen: Hypothesis, law: Candidate, order: float) -> bool:
     """Tell whether a set is a law or its special case and lines of harmonics at the same port."""
-    curves = [one for one in chosen.candidates if one.name == wide.name or wide.holds(one)]
-    lines = [one for one in chosen.candidates if one not in curves]
+    curves = [
+        candidate
+        for candidate in chosen.candidates
+        if candidate.name == law.name or law.holds(candidate)
+    ]
+    lines = [candidate for candidate in chosen.candidates if candidate not in curves]
     return (
         len(curves) == 1
         and bool(lines)
-        and all(one.port == wide.port for one in chosen.candidates)
-        and all(one.order is not None and is_harmonic(one.order, order) for one in lines)
+        and all(candidate.port == law.port for candidate in chosen.candidates)
+        and all(line.order is not None and is_harmonic(line.order, order) for line in lines)
     )
