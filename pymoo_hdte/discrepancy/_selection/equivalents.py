@@ -70,14 +70,19 @@ def answer_of(search: Search, chosen: Hypothesis, screened: Sequence[Screened]) 
         equivalent = [*foreign[1:], *([chosen] if certain else [])]
         chosen, certain = foreign[0], True
     else:
-        more = with_one_more(search, chosen) if certain else []
-        told = [*more, chosen, *rivals(search, chosen)]
-        chosen, equivalent = told[0], told[1:]
+        extended = with_one_more(search, chosen) if certain else []
+        reported = [*extended, chosen, *rivals(search, chosen)]
+        chosen, equivalent = reported[0], reported[1:]
     together = [] if certain else twins(search, chosen)
     in_part = not certain and stands_out(search, chosen, together)
     equivalent += together if in_part else []
-    if not chosen.listed and (listed := [one for one in equivalent if one.listed]):
-        equivalent = [chosen, *(one for one in equivalent if one is not listed[0])]
+    if not chosen.listed and (
+        listed := [hypothesis for hypothesis in equivalent if hypothesis.listed]
+    ):
+        equivalent = [
+            chosen,
+            *(hypothesis for hypothesis in equivalent if hypothesis is not listed[0]),
+        ]
         chosen = listed[0]
     return Answer(chosen, equivalent, certain, bool(foreign), in_part)
 
@@ -92,54 +97,54 @@ def rivals(search: Search, chosen: Hypothesis) -> list[Hypothesis]:
 
     What contains one of them is a further one only where it comes near that, too.
     """
-    found = [
-        one
-        for one in search.found
-        if one is not chosen
-        and _comes_near(search, one, chosen)
-        and explains_in_any_form(search, one)
-        and search.earned(one)
+    competing = [
+        hypothesis
+        for hypothesis in search.found
+        if hypothesis is not chosen
+        and _comes_near(search, hypothesis, chosen)
+        and explains_in_any_form(search, hypothesis)
+        and search.earned(hypothesis)
     ]
     return [
-        one
-        for one in found
+        hypothesis
+        for hypothesis in competing
         if all(
-            _comes_near(search, one, special)
-            for special in found
-            if special.names != one.names and contains(one, special)
+            _comes_near(search, hypothesis, special)
+            for special in competing
+            if special.names != hypothesis.names and contains(hypothesis, special)
         )
     ]
 
 
-def _comes_near(search: Search, one: Hypothesis, other: Hypothesis) -> bool:
+def _comes_near(search: Search, hypothesis: Hypothesis, chosen: Hypothesis) -> bool:
     """Tell whether a set says something else than another that the data do not tell from it.
 
     A law that contains the other one and ends at its bound is the other one. Where its further
     unknowns are determined, the evidence has told; where they are not, it is a rival.
     """
-    near = search.alike(one, other) or undecided(one, other, search.data.rules)
-    near = near or _needs_fewer_values(search, one, other)
-    return near and not (contains(one, other) and is_bounded(one.fit))
+    near = search.alike(hypothesis, chosen) or undecided(hypothesis, chosen, search.data.rules)
+    near = near or _needs_fewer_values(search, hypothesis, chosen)
+    return near and not (contains(hypothesis, chosen) and is_bounded(hypothesis.fit))
 
 
-def _needs_fewer_values(search: Search, one: Hypothesis, other: Hypothesis) -> bool:
+def _needs_fewer_values(search: Search, hypothesis: Hypothesis, chosen: Hypothesis) -> bool:
     """Tell whether a set explains, in another form and with fewer values free, what another does.
 
     Of two laws at one port the values beside one may stand for the form of the other: a soft
     wind-up with an error of the gears too large is nearly a play with a soft skin.
     """
-    shared = label_of(one.effects) & label_of(other.effects)
-    mine, theirs = (
-        [each for each in those if each.label not in shared]
-        for those in (one.effects, other.effects)
+    shared = label_of(hypothesis.effects) & label_of(chosen.effects)
+    own, replaced = (
+        [effect for effect in effects if effect.label not in shared]
+        for effects in (hypothesis.effects, chosen.effects)
     )
-    fewer = label_of(one.freed) < label_of(other.freed)
-    if not fewer or not mine or len(mine) != len(theirs):
+    fewer = label_of(hypothesis.freed) < label_of(chosen.freed)
+    if not fewer or not own or len(own) != len(replaced):
         return False
-    same = all(any(each.beside(law) for law in theirs) for each in mine)
-    further = one.fit.chi_square - other.fit.chi_square
-    most = search.data.rules.form_share**2 * search.excess
-    return same and further < most and search.forms.rest_is_noise(one.fit)
+    same = all(any(effect.beside(law) for law in replaced) for effect in own)
+    increase = hypothesis.fit.chi_square - chosen.fit.chi_square
+    limit = search.data.rules.form_share**2 * search.excess
+    return same and increase < limit and search.forms.rest_is_noise(hypothesis.fit)
 
 
 def with_one_more(search: Search, chosen: Hypothesis) -> list[Hypothesis]:
@@ -150,51 +155,61 @@ def with_one_more(search: Search, chosen: Hypothesis) -> list[Hypothesis]:
     either may be true. The best first, and those that no evidence tells from it.
     """
     rules, freedom = search.data.rules, search.degrees_of_freedom
-    known, freed = label_of(chosen.candidates), label_of(chosen.freed)
+    labels, freed = label_of(chosen.candidates), label_of(chosen.freed)
     larger = [
-        one
-        for one in search.of_size(len(chosen.members) + 1)
-        if label_of(one.candidates) > known
-        and label_of(one.freed) == freed
-        and one.listed
-        and chosen.bic - one.bic >= rules.bic_gain
+        hypothesis
+        for hypothesis in search.of_size(len(chosen.members) + 1)
+        if label_of(hypothesis.candidates) > labels
+        and label_of(hypothesis.freed) == freed
+        and hypothesis.listed
+        and chosen.bic - hypothesis.bic >= rules.bic_gain
     ]
     # Where forms are not known, only what is listed was compared.
     any_form = search.forms.known(chosen.effects)
     if not (larger and any_form) or not reasons_of(search, chosen, None):
         return []
-    found = [
-        one
-        for one in map(search.finished, larger)
-        if search.enough(one)
-        and confirmed(search, one) is one
-        and not reasons_of(search, one, None)
+    extended = [
+        hypothesis
+        for hypothesis in map(search.finished, larger)
+        if search.enough(hypothesis)
+        and confirmed(search, hypothesis) is hypothesis
+        and not reasons_of(search, hypothesis, None)
     ]
-    found.sort(key=lambda one: one.bic)
-    return [one for one in found if near_by_evidence(one, found[0], freedom, rules)]
+    extended.sort(key=lambda hypothesis: hypothesis.bic)
+    return [
+        hypothesis
+        for hypothesis in extended
+        if near_by_evidence(hypothesis, extended[0], freedom, rules)
+    ]
 
 
 def distinct(chosen: Hypothesis, equivalent: Sequence[Hypothesis]) -> list[Hypothesis]:
     """Return the sets that name other effects, each once: one order or another is one effect."""
-    of_names = {one.names: one for one in reversed(equivalent) if one.names != chosen.names}
+    of_names = {
+        hypothesis.names: hypothesis
+        for hypothesis in reversed(equivalent)
+        if hypothesis.names != chosen.names
+    }
     return list(reversed(of_names.values()))
 
 
-def undecided(one: Hypothesis, chosen: Hypothesis, rules: Rules) -> bool:
+def undecided(hypothesis: Hypothesis, chosen: Hypothesis, rules: Rules) -> bool:
     """Tell whether a set and the chosen one are a law and its special case, and either may be true.
 
     A special case is not shown where its law may vary as much as it is strong: flanks that are held
     by a load show a play that varies as a line of the static error, which has a tolerance. And a
     law is not shown by a part of it so small that its special case in another form has it too.
     """
-    if contains(one, chosen):
-        pairs = differing(one.effects, chosen.effects)
+    if contains(hypothesis, chosen):
+        pairs = differing(hypothesis.effects, chosen.effects)
         return any(
-            _may_vary_as_much(one.fit, wide, chosen.fit, case, rules) for wide, case in pairs
+            _may_vary_as_much(hypothesis.fit, law, chosen.fit, case, rules) for law, case in pairs
         )
-    if contains(chosen, one):
-        pairs = differing(chosen.effects, one.effects)
-        return any(_is_its_form(chosen.fit, wide, one.fit, case, rules) for wide, case in pairs)
+    if contains(chosen, hypothesis):
+        pairs = differing(chosen.effects, hypothesis.effects)
+        return any(
+            _is_its_form(chosen.fit, law, hypothesis.fit, case, rules) for law, case in pairs
+        )
     return False
 
 
@@ -221,19 +236,19 @@ def _is_its_form(of_law: Fit, law: Candidate, of_case: Fit, case: Candidate, rul
     place = _place(of_law, law)
     if law.lines:
         return not varies(law, of_law.values[place], of_law.covariance[place, place], rules)
-    shared = {one.name for one in case.parameters}
-    further = [
+    shared = {parameter.name for parameter in case.parameters}
+    additions = [
         abs(value)
-        for one, value in zip(law.parameters, of_law.values[place], strict=True)
-        if one.lower <= 0.0 and one.name not in shared
+        for parameter, value in zip(law.parameters, of_law.values[place], strict=True)
+        if parameter.lower <= 0.0 and parameter.name not in shared
     ]
-    most = rules.form_share * _strength(of_case, case)
-    return bool(further) and max(further) <= most
+    limit = rules.form_share * _strength(of_case, case)
+    return bool(additions) and max(additions) <= limit
 
 
 def _place(fitted: Fit, candidate: Candidate) -> slice:
     """Return where the values of a candidate stand in a fit."""
-    return next(place for one, place in fitted.places if one is candidate)
+    return next(place for member, place in fitted.places if member is candidate)
 
 
 def _strength(fitted: Fit, candidate: Candidate) -> float:
@@ -258,14 +273,18 @@ def _with_other_parts(search: Search, chosen: Hypothesis) -> None:
     effects, and takes longest where a line beats with those of the error.
     """
     whole, rules = label_of(chosen.candidates), search.data.rules
-    for part in [one for one in search.found if label_of(one.candidates) < whole]:
-        kept = [each for each in chosen.candidates if each not in part.candidates]
-        for other in search.of_size(len(part.members)):
-            both = (*other.candidates, *kept)
-            near = leave_the_same(other, part, rules) or search.alike(other, part)
-            if other is not part and near and may_be_together(both):
-                start = chosen.values_of(kept)[len(search.base.values) :]
-                search.fitted(both, np.append(other.fit.values, start))
+    for part in [
+        hypothesis for hypothesis in search.found if label_of(hypothesis.candidates) < whole
+    ]:
+        remaining = [
+            candidate for candidate in chosen.candidates if candidate not in part.candidates
+        ]
+        for substitute in search.of_size(len(part.members)):
+            effects = (*substitute.candidates, *remaining)
+            close = leave_the_same(substitute, part, rules) or search.alike(substitute, part)
+            if substitute is not part and close and may_be_together(effects):
+                start = chosen.values_of(remaining)[len(search.base.values) :]
+                search.fitted(effects, np.append(substitute.fit.values, start))
 
 
 def _with_other_laws(search: Search, chosen: Hypothesis) -> None:
@@ -277,10 +296,10 @@ def _with_other_laws(search: Search, chosen: Hypothesis) -> None:
     Only where another form can take most of what such a set leaves, or all but noise: not for
     machines whose laws have no known forms.
     """
-    for other in _rivals_at_its_ports(search, chosen):
-        if search.forms.rest_is_noise(other.fit) or search.leaves_forms(other):
-            best = other
-            for member, _ in differing(other.candidates, chosen.candidates):
+    for competitor in _rivals_at_its_ports(search, chosen):
+        if search.forms.rest_is_noise(competitor.fit) or search.leaves_forms(competitor):
+            best = competitor
+            for member, _ in differing(competitor.candidates, chosen.candidates):
                 best = _from_all_starts(search, best, member)
 
 
@@ -290,28 +309,34 @@ def _rivals_at_its_ports(search: Search, chosen: Hypothesis) -> list[Hypothesis]
     One that is not told from the chosen set is in its class already.
     """
     of_names: dict[frozenset[tuple[str, str]], Hypothesis] = {}
-    for one in search.of_size(len(chosen.members)):
-        if len(one.candidates) == len(chosen.candidates):
-            of_names.setdefault(one.names, one)
+    for hypothesis in search.of_size(len(chosen.members)):
+        if len(hypothesis.candidates) == len(chosen.candidates):
+            of_names.setdefault(hypothesis.names, hypothesis)
     of_names.pop(chosen.names, None)
     return [
-        one
-        for one in of_names.values()
-        if all(mine.beside(its) for mine, its in differing(one.candidates, chosen.candidates))
-        and not search.alike(one, chosen)
+        hypothesis
+        for hypothesis in of_names.values()
+        if all(
+            member.beside(replaced)
+            for member, replaced in differing(hypothesis.candidates, chosen.candidates)
+        )
+        and not search.alike(hypothesis, chosen)
     ]
 
 
-def _from_all_starts(search: Search, one: Hypothesis, member: Candidate) -> Hypothesis:
+def _from_all_starts(search: Search, hypothesis: Hypothesis, member: Candidate) -> Hypothesis:
     """Fit a set with each form of a member, from each start of it; return the best of them."""
-    found, base = [one], one.fit.values[: one.fit.n_base]
+    hypotheses, base = [hypothesis], hypothesis.fit.values[: hypothesis.fit.n_base]
     forms = [form for form in search.candidates if form.is_form_of(member)]
     for law in (member, *forms):
-        effects = tuple(law if each is member else each for each in one.candidates)
+        effects = tuple(
+            law if candidate is member else candidate for candidate in hypothesis.candidates
+        )
         for start in law.starts if may_be_together(effects) else ():
             values = [
-                start if each is member else one.fit.values[place] for each, place in one.fit.places
+                start if candidate is member else hypothesis.fit.values[place]
+                for candidate, place in hypothesis.fit.places
             ]
             begin = np.concatenate([base, *values])
-            found.append(search.fitted(effects, begin, again=True, hopeless=search.hopeless))
-    return min(found, key=lambda each: each.bic)
+            hypotheses.append(search.fitted(effects, begin, again=True, hopeless=search.hopeless))
+    return min(hypotheses, key=lambda hypothesis: hypothesis.bic)
