@@ -60,14 +60,20 @@ class FittedSets:
     @property
     def found(self) -> list[Hypothesis]:
         """All sets fitted so far that are no others under another name, by rising BIC."""
-        known = [one for label, one in self._by_label.items() if label not in self._left_out]
+        hypotheses = [
+            hypothesis
+            for label, hypothesis in self._by_label.items()
+            if label not in self._left_out
+        ]
         if self._whole_only:
-            known = [one for one in known if not self.lacks_evident(one)]
-        return sorted(known, key=lambda one: one.bic)
+            hypotheses = [
+                hypothesis for hypothesis in hypotheses if not self.lacks_evident(hypothesis)
+            ]
+        return sorted(hypotheses, key=lambda hypothesis: hypothesis.bic)
 
     def of_size(self, size: int) -> list[Hypothesis]:
         """Return the sets of so many members, by rising BIC."""
-        return [one for one in self.found if len(one.members) == size]
+        return [hypothesis for hypothesis in self.found if len(hypothesis.members) == size]
 
     @property
     def hopeless(self) -> float:
@@ -78,106 +84,123 @@ class FittedSets:
         share = rules.outdone_share * self.base.chi_square
         return max(rules.contradicting_chi_square * best[0].fit.chi_square, share)
 
-    def enough(self, one: Hypothesis) -> bool:
+    def enough(self, hypothesis: Hypothesis) -> bool:
         """Tell whether a set explains the data down to the noise, and has what is evident."""
-        return self.forms.leaves_noise(one) and not self.lacks_evident(one)
+        return self.forms.leaves_noise(hypothesis) and not self.lacks_evident(hypothesis)
 
-    def lacks_evident(self, one: Hypothesis) -> bool:
+    def lacks_evident(self, hypothesis: Hypothesis) -> bool:
         """Tell whether an effect is evident, and a set has none of those that it may be."""
         evident = self.data.evident
-        return bool(evident) and not any(each.name in evident for each in one.candidates)
+        return bool(evident) and not any(
+            candidate.name in evident for candidate in hypothesis.candidates
+        )
 
-    def add_evident(self, one: Hypothesis, others: Sequence[Candidate]) -> None:
+    def add_evident(self, hypothesis: Hypothesis, candidates: Sequence[Candidate]) -> None:
         """Fit a set that lacks what is evident with each of the others that it may be."""
-        for more in others if self.lacks_evident(one) else ():
-            for start in more.starts if more.name in self.data.evident else ():
-                self.fitted((*one.candidates, more), np.append(one.fit.values, start), again=True)
+        for candidate in candidates if self.lacks_evident(hypothesis) else ():
+            for start in candidate.starts if candidate.name in self.data.evident else ():
+                self.fitted(
+                    (*hypothesis.candidates, candidate),
+                    np.append(hypothesis.fit.values, start),
+                    again=True,
+                )
 
     def leave_out_lacking(self) -> None:
         """Leave out all sets that lack what is evident, if any has it."""
         self._whole_only = not all(map(self.lacks_evident, self.found))
 
-    def could_count(self, one: Hypothesis) -> bool:
+    def could_count(self, hypothesis: Hypothesis) -> bool:
         """Tell whether a further effect could be justified.
 
         One at a bound may stand for two, and so may a zero or gain far beyond what is stated.
         """
-        if self.held_by_sensors(one) or self.lacks_evident(one):
+        if self.held_by_sensors(hypothesis) or self.lacks_evident(hypothesis):
             return True
-        if self.enough(one):
-            return is_bounded(one.fit)
-        return one.exact or bool(self.data.excess(one.fit).significant(self.data.rules).any())
+        if self.enough(hypothesis):
+            return is_bounded(hypothesis.fit)
+        return hypothesis.exact or bool(
+            self.data.excess(hypothesis.fit).significant(self.data.rules).any()
+        )
 
-    def leaves_forms(self, one: Hypothesis) -> bool:
+    def leaves_forms(self, hypothesis: Hypothesis) -> bool:
         """Tell whether most of what a set leaves is what other forms of its laws do, at first.
 
         Not where it leaves no more than noise with each of its laws within its listed form.
         """
-        if self.enough(one) and not is_bounded(one.fit):
+        if self.enough(hypothesis) and not is_bounded(hypothesis.fit):
             return False
-        rest, left = self.forms.rest(one.fit), one.fit.chi_square - self.degrees_of_freedom
-        most = 1.0 - self.data.rules.explained_part_share
-        return rest is not None and rest.excess <= most * left
+        unexplained, excess = (
+            self.forms.rest(hypothesis.fit),
+            hypothesis.fit.chi_square - self.degrees_of_freedom,
+        )
+        limit = 1.0 - self.data.rules.explained_part_share
+        return unexplained is not None and unexplained.excess <= limit * excess
 
-    def leaves_form_of(self, one: Hypothesis, member: Candidate) -> bool:
+    def leaves_form_of(self, hypothesis: Hypothesis, member: Candidate) -> bool:
         """Tell whether another form may do better in the place of a member of a set.
 
         Where forms are most of what it leaves. And where it leaves more than noise beside a law
         with memory: a loop that forgets is no sum of springs that slip, not even to first order.
         """
-        return self.leaves_forms(one) or (member.remembers and not self.enough(one))
+        return self.leaves_forms(hypothesis) or (member.remembers and not self.enough(hypothesis))
 
-    def alike(self, one: Hypothesis, chosen: Hypothesis) -> bool:
+    def alike(self, hypothesis: Hypothesis, chosen: Hypothesis) -> bool:
         """Tell whether the data do not tell a set from another: see `hypothesis.alike`."""
-        same_values = label_of(one.freed) == label_of(chosen.freed)
-        overlap = same_values and self.forms.known((*one.effects, *chosen.effects))
-        return alike(one, chosen, self.degrees_of_freedom, self.data.rules, overlap)
+        same_values = label_of(hypothesis.freed) == label_of(chosen.freed)
+        overlap = same_values and self.forms.known((*hypothesis.effects, *chosen.effects))
+        return alike(hypothesis, chosen, self.degrees_of_freedom, self.data.rules, overlap)
 
-    def earned(self, one: Hypothesis) -> bool:
+    def earned(self, hypothesis: Hypothesis) -> bool:
         """Tell whether each member is earned: without it the rest explains clearly less."""
-        members = one.members
+        members = hypothesis.members
         if len(members) == 1:
             return True
-        return all(self._earns(one, member, self.without(one, member)) for member in members)
+        return all(
+            self._earns(hypothesis, member, self.without(hypothesis, member)) for member in members
+        )
 
-    def _earns(self, one: Hypothesis, member: Effects, rest: Hypothesis) -> bool:
+    def _earns(self, hypothesis: Hypothesis, member: Effects, simpler: Hypothesis) -> bool:
         """Tell whether a member is earned, as the listed laws go or in any form of the others.
 
         What is evident is.
         """
-        if self.lacks_evident(rest) and not self.lacks_evident(one):
+        if self.lacks_evident(simpler) and not self.lacks_evident(hypothesis):
             return True
-        earned = is_earned(self.data, self.base, one, rest, member)
-        return earned or self.forms.earns(one, rest) or self._brings_sensors_back(one, rest)
+        earned = is_earned(self.data, self.base, hypothesis, simpler, member)
+        return (
+            earned
+            or self.forms.earns(hypothesis, simpler)
+            or self._brings_sensors_back(hypothesis, simpler)
+        )
 
-    def _brings_sensors_back(self, one: Hypothesis, rest: Hypothesis) -> bool:
+    def _brings_sensors_back(self, hypothesis: Hypothesis, simpler: Hypothesis) -> bool:
         """Tell whether sensors are as stated in a set, and in no form of the rest.
 
         A friction that grows with the load is a gain of the torque sensor nearly as well.
         """
-        least = self.data.rules.single_effect_gain * misfit_of(one, self.degrees_of_freedom)
-        clear = rest.fit.chi_square - one.fit.chi_square >= least
-        back = self.beyond_stated(rest.fit) > 0.0 and self.beyond_stated(one.fit) == 0.0
+        least = self.data.rules.single_effect_gain * misfit_of(hypothesis, self.degrees_of_freedom)
+        clear = simpler.fit.chi_square - hypothesis.fit.chi_square >= least
+        back = self.beyond_stated(simpler.fit) > 0.0 and self.beyond_stated(hypothesis.fit) == 0.0
         # A fit in a free form takes as long as several others.
-        return clear and back and self.beyond_stated(self.forms.in_free_form(rest.fit)) > 0.0
+        return clear and back and self.beyond_stated(self.forms.in_free_form(simpler.fit)) > 0.0
 
-    def held_by_sensors(self, one: Hypothesis) -> float:
+    def held_by_sensors(self, hypothesis: Hypothesis) -> float:
         """Return `beyond_stated` of a set that could be named plainly; 0 of others.
 
         Where more is left, sensors take a share of it whatever is missing.
         """
-        left = misfit_of(one, self.degrees_of_freedom)
-        plain = left <= self.data.rules.contradicting_chi_square
-        return self.beyond_stated(one.fit) if plain else 0.0
+        misfit = misfit_of(hypothesis, self.degrees_of_freedom)
+        plain = misfit <= self.data.rules.contradicting_chi_square
+        return self.beyond_stated(hypothesis.fit) if plain else 0.0
 
     def beyond_stated(self, fitted: Fit) -> float:
         """Return the chi-square of sensors' zeros and gains far beyond what is stated of them."""
         return float(beyond_stated(fitted, self.data.rules).sum())
 
-    def without(self, one: Hypothesis, member: Effects, again: bool = False) -> Hypothesis:
+    def without(self, hypothesis: Hypothesis, member: Effects, again: bool = False) -> Hypothesis:
         """Return a set without one of its members, fitted to the end; ``again`` as of `fitted`."""
-        kept = tuple(other for other in one.candidates if other not in member)
-        return self.finished(self.fitted(kept, one.values_of(kept), again))
+        effects = tuple(candidate for candidate in hypothesis.candidates if candidate not in member)
+        return self.finished(self.fitted(effects, hypothesis.values_of(effects), again))
 
     def fitted(
         self,
@@ -197,8 +220,8 @@ class FittedSets:
         if known is None or again:
             ends = [known.fit] if known and known.candidates == effects else []
             settled = self.data.rules.trial_gain
-            found = fit(self.data, effects, start, steps, settled, ends, hopeless)
-            trial = hypothesis_of(found, self.excess)
+            fitted = fit(self.data, effects, start, steps, settled, ends, hopeless)
+            trial = hypothesis_of(fitted, self.excess)
             if known is None or trial.bic < known.bic:
                 self._by_label[label] = trial
                 self._finished.discard(label)
@@ -206,64 +229,69 @@ class FittedSets:
 
     def from_other_starts(self, sets: Sequence[Hypothesis]) -> None:
         """Fit single effects from all their starts, each once."""
-        for one in sets:
-            starts = other_starts(one, self.base.values)
-            if starts and (label := label_of(one.candidates)) not in self._from_all_starts:
-                self.finished(one, *starts)
+        for hypothesis in sets:
+            starts = other_starts(hypothesis, self.base.values)
+            if starts and (label := label_of(hypothesis.candidates)) not in self._from_all_starts:
+                self.finished(hypothesis, *starts)
                 self._from_all_starts.add(label)
 
-    def finished(self, one: Hypothesis, *starts: Vector) -> Hypothesis:
+    def finished(self, hypothesis: Hypothesis, *starts: Vector) -> Hypothesis:
         """Return a set fitted to the end: from its values and, unless resumed, other starts."""
-        label = label_of(one.candidates)
+        label = label_of(hypothesis.candidates)
         if label not in self._finished or starts:
-            known = self._resumed or label in self._finished
+            fitted_before = self._resumed or label in self._finished
             if self._resumed:
-                best = fit(self.data, one.candidates, one.fit)
+                best = fit(self.data, hypothesis.candidates, hypothesis.fit)
             else:
-                self._finish_special_cases(one)
-                best = best_fit(self.data, one, starts, self._by_label.values())
+                self._finish_special_cases(hypothesis)
+                best = best_fit(self.data, hypothesis, starts, self._by_label.values())
             self._by_label[label] = hypothesis_of(best, self.excess)
             self._finished.add(label)
-            if not known:
+            if not fitted_before:
                 self._reopen(self._by_label[label])
         return self._by_label[label]
 
-    def _finish_special_cases(self, one: Hypothesis) -> None:
+    def _finish_special_cases(self, hypothesis: Hypothesis) -> None:
         """Fit special cases to the end that may come as near as a set, for `best_fit` to know."""
-        for other in list(self._by_label.values()):
-            if is_special_case(other, one) and self.may_come_as_near(other, one):
-                self.finished(other)
+        for special in list(self._by_label.values()):
+            if is_special_case(special, hypothesis) and self.may_come_as_near(special, hypothesis):
+                self.finished(special)
 
     def _reopen(self, special: Hypothesis) -> None:
         """Let laws be fitted to the end again that do no better than this special case of them."""
-        most = special.fit.chi_square - self.data.rules.evidence_distance
+        limit = special.fit.chi_square - self.data.rules.evidence_distance
         for label in list(self._finished):
             law = self._by_label[label]
-            if is_special_case(special, law) and law.fit.chi_square > most:
+            if is_special_case(special, law) and law.fit.chi_square > limit:
                 self._finished.discard(label)
 
-    def resume(self, known: Sequence[Hypothesis], go_on: bool = False) -> None:
+    def resume(self, hypotheses: Sequence[Hypothesis], go_on: bool = False) -> None:
         """Fit sets from the values that another search has found on nearly the same data.
 
         The chosen one first. Those that came nowhere near it are only evaluated.
         Where the search is to ``go_on``, what it fits afterwards is fitted as in any search.
         """
         self._resumed = True
-        chosen = known[0]
-        rivals = [chosen, *(one for one in known[1:] if self.alike(one, chosen))]
-        for one in known:
+        chosen = hypotheses[0]
+        competing = [
+            chosen,
+            *(hypothesis for hypothesis in hypotheses[1:] if self.alike(hypothesis, chosen)),
+        ]
+        for hypothesis in hypotheses:
             # Measured from the chosen one: of the best one a member may not be earned.
-            hopeful = one in rivals or self.may_come_as_near(one, chosen)
-            self.fitted(one.candidates, one.fit.values, steps=None if hopeful else 0)
-        for one in rivals:
-            self.finished(self._by_label[label_of(one.candidates)])
-        for size in {len(one.members) for one in known}:
+            shortlisted = hypothesis in competing or self.may_come_as_near(hypothesis, chosen)
+            self.fitted(
+                hypothesis.candidates, hypothesis.fit.values, steps=None if shortlisted else 0
+            )
+        for hypothesis in competing:
+            self.finished(self._by_label[label_of(hypothesis.candidates)])
+        for size in {len(hypothesis.members) for hypothesis in hypotheses}:
             self.finish_near(size)
         self._resumed = not go_on
 
-    def leave_out(self, one: Hypothesis) -> None:
+    def leave_out(self, hypothesis: Hypothesis) -> None:
         """Leave a set out of all that are compared: it is known under another name."""
-        self._left_out.add(label_of(one.candidates))
+        self._left_out.add(label_of(hypothesis.candidates))
 
     def finish_near(self, size: int) -> None:
         """Fit the best sets of a size to the end, and those that may come as near.
@@ -272,40 +300,42 @@ class FittedSets:
         the sets are known from another search, only those that may come as near.
         """
         for place in range(len(self.of_size(size))):
-            same = self.of_size(size)
-            best, one = same[0], same[place]
-            last = self.enough(best) and (size > 1 or not self.held_by_sensors(best))
-            alone = self._resumed or last
-            first = place < (1 if alone else self.data.rules.most_firsts)
-            if first or self.may_come_as_near(one, best):
-                self.finished(one)
+            ranked = self.of_size(size)
+            best, hypothesis = ranked[0], ranked[place]
+            complete = self.enough(best) and (size > 1 or not self.held_by_sensors(best))
+            only_near = self._resumed or complete
+            leading = place < (1 if only_near else self.data.rules.most_firsts)
+            if leading or self.may_come_as_near(hypothesis, best):
+                self.finished(hypothesis)
 
-    def may_come_as_near(self, one: Hypothesis, best: Hypothesis) -> bool:
+    def may_come_as_near(self, hypothesis: Hypothesis, best: Hypothesis) -> bool:
         """Tell whether a set may come as near as the best once both are fitted to the end."""
         rules = self.data.rules
-        near = rules.evidence_distance * misfit_of(best, self.degrees_of_freedom)
-        if len(one.members) == 1:
+        distance = rules.evidence_distance * misfit_of(best, self.degrees_of_freedom)
+        if len(hypothesis.members) == 1:
             # Forms that leave the same are alike however far apart by evidence.
-            near = max(near, rules.form_share**2 * best.removed)
-        return one.bic - best.bic < rules.refit_margin * near
+            distance = max(distance, rules.form_share**2 * best.removed)
+        return hypothesis.bic - best.bic < rules.refit_margin * distance
 
 
-def is_special_case(one: Hypothesis, law: Hypothesis) -> bool:
+def is_special_case(hypothesis: Hypothesis, law: Hypothesis) -> bool:
     """Tell whether a law with more unknowns contains a set."""
-    return contains(law, one) and len(one.fit.values) < len(law.fit.values)
+    return contains(law, hypothesis) and len(hypothesis.fit.values) < len(law.fit.values)
 
 
 def may_be_together(effects: Effects) -> bool:
     """Tell whether a machine may have all these effects, none of them twice."""
     twice = len(label_of(effects)) < len(effects)
-    return not twice and all(one.goes_with(other) for one, other in combinations(effects, 2))
+    return not twice and all(
+        effect.goes_with(partner) for effect, partner in combinations(effects, 2)
+    )
 
 
 def is_earned(
     data: Evidence,
     base: Fit,
-    one: Hypothesis,
-    rest: Hypothesis,
+    hypothesis: Hypothesis,
+    simpler: Hypothesis,
     member: Sequence[Candidate],
 ) -> bool:
     """Tell whether a set explains most of what is left without one of its members.
@@ -317,27 +347,29 @@ def is_earned(
     excess at the port of another, and relative to the model's own error elsewhere.
     """
     rules, degrees_of_freedom = data.rules, len(base.residuals) - len(base.values)
-    if down_to_noise(rest.fit, degrees_of_freedom, rules):
+    if down_to_noise(simpler.fit, degrees_of_freedom, rules):
         return False
-    left = rest.fit.chi_square - degrees_of_freedom
-    removed = rest.fit.chi_square - one.fit.chi_square
-    if rest.exact:
-        to_noise = down_to_noise(one.fit, degrees_of_freedom, rules)
+    excess = simpler.fit.chi_square - degrees_of_freedom
+    removed = simpler.fit.chi_square - hypothesis.fit.chi_square
+    if simpler.exact:
+        to_noise = down_to_noise(hypothesis.fit, degrees_of_freedom, rules)
         share = rules.explained_part_share if to_noise else rules.explained_share
-        return left > 0.0 and removed >= share * left
-    per_degree = rest.fit.chi_square / degrees_of_freedom
+        return excess > 0.0 and removed >= share * excess
+    per_degree = simpler.fit.chi_square / degrees_of_freedom
     if per_degree > rules.contradicting_chi_square and down_to_noise(
-        one.fit, degrees_of_freedom, rules
+        hypothesis.fit, degrees_of_freedom, rules
     ):
         return True
-    before, alone, both = (data.excess(each) for each in (base, rest.fit, one.fit))
-    parts = ill_explained(before, alone, rules)
+    before, between, final = (data.excess(fitted) for fitted in (base, simpler.fit, hypothesis.fit))
+    parts = ill_explained(before, between, rules)
     if not parts:
         return False
-    same_port = any(a.beside(b) for a in member for b in rest.candidates)
+    same_port = any(a.beside(b) for a in member for b in simpler.candidates)
     least = rules.second_form_share if same_port else data.remainder
     for part in (slice(None), parts[0]):
-        whole, residual, after = (np.sum(each.of_parts[part]) for each in (before, alone, both))
+        whole, residual, after = (
+            np.sum(excess.of_parts[part]) for excess in (before, between, final)
+        )
         if residual - after >= max(rules.second_share * residual, least * whole):
             return True
     return False
