@@ -58,12 +58,12 @@ class Hypothesis:
     @property
     def freed(self) -> tuple[Candidate, ...]:
         """The base parameters out of tolerance among them."""
-        return tuple(each for each in self.candidates if each.frees is not None)
+        return tuple(candidate for candidate in self.candidates if candidate.frees is not None)
 
     @property
     def effects(self) -> tuple[Candidate, ...]:
         """The others."""
-        return tuple(each for each in self.candidates if each.frees is None)
+        return tuple(candidate for candidate in self.candidates if candidate.frees is None)
 
     @property
     def label(self) -> str:
@@ -73,12 +73,14 @@ class Hypothesis:
     @property
     def members(self) -> list[tuple[Candidate, ...]]:
         """The effects one by one; base parameters out of tolerance are one member together."""
-        alone = [(each,) for each in self.effects]
-        return alone + ([self.freed] if self.freed else [])
+        members = [(candidate,) for candidate in self.effects]
+        return members + ([self.freed] if self.freed else [])
 
-    def values_of(self, kept: Sequence[Candidate]) -> NDArray[np.float64]:
+    def values_of(self, effects: Sequence[Candidate]) -> NDArray[np.float64]:
         """Return the fitted values of the base and of some of the effects, in their order here."""
-        parts = [self.fit.values[place] for one, place in self.fit.places if one in kept]
+        parts = [
+            self.fit.values[place] for candidate, place in self.fit.places if candidate in effects
+        ]
         return np.concatenate([self.fit.values[: self.fit.n_base], *parts])
 
     @cached_property
@@ -89,7 +91,7 @@ class Hypothesis:
 
 def label_of(effects: Sequence[Candidate]) -> frozenset[str]:
     """Return what tells a set of effects from others, whatever their order."""
-    return frozenset(one.label for one in effects)
+    return frozenset(candidate.label for candidate in effects)
 
 
 def hypothesis_of(fitted: Fit, of_base: float) -> Hypothesis:
@@ -133,7 +135,7 @@ def bounded_unknowns(fitted: Fit) -> list[tuple[Candidate, dict[str, float]]]:
     A level that ended at zero is a part that the effect does not have, and a corner that ended as
     sharp as points can resolve is a sharp corner.
     """
-    found = []
+    bounded = []
     for candidate, place in fitted.places:
         values = {}
         rows = range(place.start, place.stop)
@@ -142,8 +144,8 @@ def bounded_unknowns(fitted: Fit) -> list[tuple[Candidate, dict[str, float]]]:
             none = parameter.linear and parameter.lower == 0.0 and side < 0.0
             if parameter.limited_at(side) and not none:
                 values[parameter.name] = float(fitted.values[row])
-        found.append((candidate, values))
-    return found
+        bounded.append((candidate, values))
+    return bounded
 
 
 def is_bounded(fitted: Fit) -> bool:
@@ -170,32 +172,32 @@ def expected_values(fitted: Fit, rules: Rules) -> NDArray[np.float64]:
     return np.asarray(np.clip(moved, lower, upper))
 
 
-def gains_enough(one: Hypothesis, base: Fit, rules: Rules) -> bool:
+def gains_enough(hypothesis: Hypothesis, base: Fit, rules: Rules) -> bool:
     """Tell whether a set of effects reduces the criterion of the base enough for a name."""
-    unknowns = sum(candidate.unknowns for candidate in one.candidates)
-    gain = base.chi_square - one.fit.chi_square
+    unknowns = sum(candidate.unknowns for candidate in hypothesis.candidates)
+    gain = base.chi_square - hypothesis.fit.chi_square
     return bool(gain - unknowns * np.log(len(base.residuals)) >= rules.bic_gain)
 
 
-def explains(data: Evidence, one: Hypothesis, base: Fit, degrees_of_freedom: int) -> bool:
+def explains(data: Evidence, hypothesis: Hypothesis, base: Fit, degrees_of_freedom: int) -> bool:
     """Tell whether a set of effects explains the misfit of the base, in all parts of the data."""
     rules, limit = data.rules, adequate(degrees_of_freedom, data.rules)
-    share = rules.exact_share if one.exact else rules.explained_share
-    limit = max(limit, rules.exact_chi_square) if one.exact else limit
-    if not gains_enough(one, base, rules):
+    share = rules.exact_share if hypothesis.exact else rules.explained_share
+    limit = max(limit, rules.exact_chi_square) if hypothesis.exact else limit
+    if not gains_enough(hypothesis, base, rules):
         return False
-    if one.fit.chi_square <= limit * degrees_of_freedom:
+    if hypothesis.fit.chi_square <= limit * degrees_of_freedom:
         return True
-    return one.explained >= share and not unexplained(data, base, one.fit).any()
+    return hypothesis.explained >= share and not unexplained(data, base, hypothesis.fit).any()
 
 
-def misfit_of(one: Hypothesis, degrees_of_freedom: int) -> float:
+def misfit_of(hypothesis: Hypothesis, degrees_of_freedom: int) -> float:
     """Return chi-square per degree of freedom that a set leaves, 1 at least: the unit of gains."""
-    return max(one.fit.chi_square / degrees_of_freedom, 1.0)
+    return max(hypothesis.fit.chi_square / degrees_of_freedom, 1.0)
 
 
 def alike(
-    one: Hypothesis,
+    hypothesis: Hypothesis,
     chosen: Hypothesis,
     degrees_of_freedom: int,
     rules: Rules,
@@ -212,95 +214,115 @@ def alike(
     so it does where ``one`` has a form that only stands in for a listed one: the listed form is
     compared as well, with room for its form.
     """
-    if one.names == chosen.names:
+    if hypothesis.names == chosen.names:
         return False
     misfit = misfit_of(chosen, degrees_of_freedom)
-    near = near_by_evidence(one, chosen, degrees_of_freedom, rules)
-    if len(one.candidates) != len(chosen.candidates):
-        return near and _stands_for_parameters(one, chosen)
+    close = near_by_evidence(hypothesis, chosen, degrees_of_freedom, rules)
+    if len(hypothesis.candidates) != len(chosen.candidates):
+        return close and _stands_for_parameters(hypothesis, chosen)
     residual = chosen.fit.chi_square - degrees_of_freedom
-    if not (near or one.exact or chosen.exact or contains(one, chosen) or contains(chosen, one)):
-        further = one.fit.chi_square - chosen.fit.chi_square
-        pairs = differing(one.candidates, chosen.candidates)
-        if any(mine.only_as_form for mine, _ in pairs):
+    if not (
+        close
+        or hypothesis.exact
+        or chosen.exact
+        or contains(hypothesis, chosen)
+        or contains(chosen, hypothesis)
+    ):
+        increase = hypothesis.fit.chi_square - chosen.fit.chi_square
+        pairs = differing(hypothesis.candidates, chosen.candidates)
+        if any(own.only_as_form for own, _ in pairs):
             return False
-        same = all(mine.beside(other) for mine, other in pairs)
+        same = all(own.beside(replaced) for own, replaced in pairs)
         accuracy = rules.form_share if overlap and same else rules.form_accuracy
-        exact = all(mine.exact and other.exact for mine, other in pairs)
-        near = not exact and further < accuracy**2 * (chosen.removed + residual)
-    if near or misfit <= adequate(degrees_of_freedom, rules) or (one.exact and chosen.exact):
-        return near
-    return one.fit.chi_square - degrees_of_freedom < rules.form_ratio * residual
+        exact = all(own.exact and replaced.exact for own, replaced in pairs)
+        close = not exact and increase < accuracy**2 * (chosen.removed + residual)
+    if (
+        close
+        or misfit <= adequate(degrees_of_freedom, rules)
+        or (hypothesis.exact and chosen.exact)
+    ):
+        return close
+    return hypothesis.fit.chi_square - degrees_of_freedom < rules.form_ratio * residual
 
 
 def near_by_evidence(
-    one: Hypothesis, chosen: Hypothesis, degrees_of_freedom: int, rules: Rules
+    hypothesis: Hypothesis, chosen: Hypothesis, degrees_of_freedom: int, rules: Rules
 ) -> bool:
     """Tell whether the evidence does not tell a set from the chosen one."""
     misfit = misfit_of(chosen, degrees_of_freedom)
-    return one.fit.evidence - chosen.fit.evidence < rules.evidence_distance * misfit
+    return hypothesis.fit.evidence - chosen.fit.evidence < rules.evidence_distance * misfit
 
 
-def _stands_for_parameters(one: Hypothesis, other: Hypothesis) -> bool:
+def _stands_for_parameters(hypothesis: Hypothesis, chosen: Hypothesis) -> bool:
     """Tell whether two sets with effects have as many members, and different effects.
 
     More or fewer parameters beside the same effects are no other answer.
     """
-    mine, theirs = label_of(one.effects), label_of(other.effects)
-    return bool(mine and theirs) and mine != theirs and len(one.members) == len(other.members)
+    effects, replaced = label_of(hypothesis.effects), label_of(chosen.effects)
+    return (
+        bool(effects and replaced)
+        and effects != replaced
+        and len(hypothesis.members) == len(chosen.members)
+    )
 
 
-def leave_the_same(one: Hypothesis, other: Hypothesis, rules: Rules) -> bool:
+def leave_the_same(hypothesis: Hypothesis, chosen: Hypothesis, rules: Rules) -> bool:
     """Tell whether two sets explain the data so nearly alike that the same must be missing."""
-    difference = abs(one.fit.chi_square - other.fit.chi_square)
-    return difference <= rules.trial_gain * other.fit.chi_square
+    difference = abs(hypothesis.fit.chi_square - chosen.fit.chi_square)
+    return difference <= rules.trial_gain * chosen.fit.chi_square
 
 
-def contains(one: Hypothesis, other: Hypothesis) -> bool:
+def contains(hypothesis: Hypothesis, special: Hypothesis) -> bool:
     """Tell whether a set is nested: it differs from another only by laws that contain the other's.
 
     Stribeck's friction without its excess is Coulomb's: it always explains as much. Beside its law
     a set may have further values out of tolerance; beside the same laws they are no other law.
     """
-    own, others = label_of(one.freed), label_of(other.freed)
-    if len(one.effects) != len(other.effects):
+    released, special_released = label_of(hypothesis.freed), label_of(special.freed)
+    if len(hypothesis.effects) != len(special.effects):
         return False
-    pairs = differing(one.effects, other.effects)
-    wider = all(wide.port == special.port and wide.holds(special) for wide, special in pairs)
-    return wider and (own == others or (bool(pairs) and own > others > set()))
+    pairs = differing(hypothesis.effects, special.effects)
+    wider = all(law.port == case.port and law.holds(case) for law, case in pairs)
+    return wider and (
+        released == special_released or (bool(pairs) and released > special_released > set())
+    )
 
 
 def differing(
-    mine: Sequence[Candidate], theirs: Sequence[Candidate]
+    members: Sequence[Candidate], replaced: Sequence[Candidate]
 ) -> list[tuple[Candidate, Candidate]]:
     """Return in pairs the candidates by which two sets of one size differ, by their ports."""
-    shared = Counter(_places(mine)) & Counter(_places(theirs))
-    beyond = (_beyond(each, shared) for each in (mine, theirs))
-    own, other = (sorted(left, key=lambda each: each.port) for left in beyond)
-    return list(zip(own, other, strict=True))
+    shared = Counter(_places(members)) & Counter(_places(replaced))
+    unshared = (_beyond(candidates, shared) for candidates in (members, replaced))
+    own, others = (
+        sorted(candidates, key=lambda candidate: candidate.port) for candidates in unshared
+    )
+    return list(zip(own, others, strict=True))
 
 
 def _places(candidates: Sequence[Candidate]) -> list[tuple[str, str]]:
-    return [(each.name, each.port) for each in candidates]
+    return [(candidate.name, candidate.port) for candidate in candidates]
 
 
 def _beyond(candidates: Sequence[Candidate], shared: Counter[tuple[str, str]]) -> list[Candidate]:
     """Return the candidates beyond those that are shared; a set may have one name twice."""
-    left, rest = Counter(shared), []
-    for place, each in zip(_places(candidates), candidates, strict=True):
-        if left[place]:
-            left[place] -= 1
+    remaining, beyond = Counter(shared), []
+    for place, candidate in zip(_places(candidates), candidates, strict=True):
+        if remaining[place]:
+            remaining[place] -= 1
         else:
-            rest.append(each)
-    return rest
+            beyond.append(candidate)
+    return beyond
 
 
 def fit_all(
     data: Evidence, base: Fit, chosen: Sequence[Screened], excess: float
 ) -> list[Hypothesis]:
     """Fit candidates, each jointly with the given effects; by rising BIC."""
-    found = []
-    for one in chosen:
-        fitted = fit(data, (*base.candidates, one.candidate), np.append(base.values, one.start))
-        found.append(hypothesis_of(fitted, excess))
-    return sorted(found, key=lambda one: one.bic)
+    hypotheses = []
+    for effect in chosen:
+        fitted = fit(
+            data, (*base.candidates, effect.candidate), np.append(base.values, effect.start)
+        )
+        hypotheses.append(hypothesis_of(fitted, excess))
+    return sorted(hypotheses, key=lambda hypothesis: hypothesis.bic)
