@@ -129,24 +129,24 @@ def minimum(
     promised, seen = list[float](), None
     for step in range(_STEPS_A_JACOBIAN * steps):
         # Not at the start: a part of a law that has vanished shows nothing of its other unknowns.
-        if step and any(_arrived(problem, values, residuals, jacobian, one) for one in known):
+        if step and any(_arrived(problem, values, residuals, jacobian, end) for end in known):
             break
         if hopeless < np.inf and fresh and jacobian is not seen:
             promised, seen = [*promised, _least_to_first_order(residuals, jacobian)], jacobian
             if is_hopeless(promised, hopeless):
                 break
         size = np.maximum(size, np.linalg.norm(jacobian, axis=0))
-        found = _step(problem, values, residuals, jacobian, size, damping)
+        trial = _step(problem, values, residuals, jacobian, size, damping)
         before = residuals @ residuals
-        slow = found is None or before - found.residuals @ found.residuals <= (
+        slow = trial is None or before - trial.residuals @ trial.residuals <= (
             SETTLED + settled * before
         )
-        if found is not None:
-            if not slow and found.share > _TRUSTED:
-                jacobian, fresh = _updated(problem, values, residuals, jacobian, found), False
+        if trial is not None:
+            if not slow and trial.share > _TRUSTED:
+                jacobian, fresh = _updated(problem, values, residuals, jacobian, trial), False
             elif not (slow and fresh and confirming):
-                jacobian, fresh = problem.jacobian(found.values), True
-            values, residuals, damping = found.values, found.residuals, found.damping
+                jacobian, fresh = problem.jacobian(trial.values), True
+            values, residuals, damping = trial.values, trial.residuals, trial.damping
         elif not fresh:
             jacobian, fresh = problem.jacobian(values), True
             continue
@@ -167,10 +167,10 @@ def way(problem: Differentiable, values: Vector, to: Vector) -> Vector:
     across it, divided by its amplitude there. From no amplitude there is no way across.
     """
     amplitude, phase = problem.lines.T
-    found, turn = to - values, to[phase] - values[phase]
-    found[amplitude] = to[amplitude] * np.cos(turn) - values[amplitude]
-    found[phase] = to[amplitude] * np.sin(turn) / _not_zero(values[amplitude])
-    return np.asarray(found / problem.scale)
+    step, turn = to - values, to[phase] - values[phase]
+    step[amplitude] = to[amplitude] * np.cos(turn) - values[amplitude]
+    step[phase] = to[amplitude] * np.sin(turn) / _not_zero(values[amplitude])
+    return np.asarray(step / problem.scale)
 
 
 def moved(problem: Differentiable, values: Vector, step: Vector) -> Vector:
@@ -187,14 +187,18 @@ def turned(problem: Differentiable, values: Vector, to: Vector, jacobian: Matrix
 
     For residuals that are linear in the parts of lines and in all other unknowns.
     """
-    (amplitude, phase), found = problem.lines.T, jacobian.copy()
+    (amplitude, phase), turned_jacobian = problem.lines.T, jacobian.copy()
     turn = to[phase] - values[phase]
     along = jacobian[:, amplitude] / problem.scale[amplitude]
     across = jacobian[:, phase] / problem.scale[phase] / _not_zero(values[amplitude])
-    found[:, amplitude] = (np.cos(turn) * along + np.sin(turn) * across) * problem.scale[amplitude]
-    found[:, phase] = (np.cos(turn) * across - np.sin(turn) * along) * problem.scale[phase]
-    found[:, phase] *= to[amplitude]
-    return found
+    turned_jacobian[:, amplitude] = (np.cos(turn) * along + np.sin(turn) * across) * problem.scale[
+        amplitude
+    ]
+    turned_jacobian[:, phase] = (np.cos(turn) * across - np.sin(turn) * along) * problem.scale[
+        phase
+    ]
+    turned_jacobian[:, phase] *= to[amplitude]
+    return turned_jacobian
 
 
 def _not_zero(amplitudes: Vector) -> Vector:
@@ -203,16 +207,16 @@ def _not_zero(amplitudes: Vector) -> Vector:
 
 
 def _updated(
-    problem: Differentiable, values: Vector, residuals: Vector, jacobian: Matrix, found: _Step
+    problem: Differentiable, values: Vector, residuals: Vector, jacobian: Matrix, trial: _Step
 ) -> Matrix:
     """Return derivatives where a step has ended, from those at values and what the step showed.
 
     Broyden's update (Mathematics of Computation 19, 1965), of those at values, then turned.
     """
-    step = way(problem, values, found.values)
-    error = found.residuals - residuals - jacobian @ step
+    step = way(problem, values, trial.values)
+    error = trial.residuals - residuals - jacobian @ step
     shown = jacobian + np.outer(error, step / (step @ step))
-    return turned(problem, values, found.values, shown)
+    return turned(problem, values, trial.values, shown)
 
 
 def _arrived(
@@ -224,8 +228,8 @@ def _arrived(
         jacobian @ way(problem, values, at.values),
     )
     better = residuals @ residuals < at.residuals @ at.residuals
-    most = SAME * max(float(residuals @ residuals) / len(residuals), 1.0)
-    return not better and all(change @ change <= most for change in changes)
+    limit = SAME * max(float(residuals @ residuals) / len(residuals), 1.0)
+    return not better and all(change @ change <= limit for change in changes)
 
 
 def _least_to_first_order(residuals: Vector, jacobian: Matrix) -> float:
@@ -273,12 +277,12 @@ def _step(
         if promised <= SETTLED / 10.0:
             return None
         to = moved(problem, values, step)
-        there = problem.residuals(to)
-        gain = before - there @ there
+        residuals_there = problem.residuals(to)
+        gain = before - residuals_there @ residuals_there
         if gain > 0.0:
             share = float(gain / promised)
             factor = max(1.0 - (2.0 * share - 1.0) ** 3, _LEAST_FACTOR)
-            return _Step(to, there, max(factor * damping, _LEAST_DAMPING), share)
+            return _Step(to, residuals_there, max(factor * damping, _LEAST_DAMPING), share)
         growth *= 2.0
         damping *= growth
     return None
