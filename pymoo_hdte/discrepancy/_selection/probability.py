@@ -20,7 +20,7 @@ def of_names(
     status: str,
     chosen: Hypothesis,
     equivalent: Sequence[Hypothesis],
-    found: Sequence[Hypothesis],
+    compared: Sequence[Hypothesis],
     degrees_of_freedom: int,
     rules: Rules,
 ) -> float | None:
@@ -48,7 +48,7 @@ def of_names(
     experience = experience_of(rules).get(status)
     if experience is None:
         return None
-    return experience * _share((chosen, *equivalent), found, degrees_of_freedom)
+    return experience * _share((chosen, *equivalent), compared, degrees_of_freedom)
 
 
 def experience_of(rules: Rules) -> dict[str, float]:
@@ -64,7 +64,7 @@ def experience_of(rules: Rules) -> dict[str, float]:
 def likelier(
     chosen: Hypothesis,
     equivalent: Sequence[Hypothesis],
-    found: Sequence[Hypothesis],
+    compared: Sequence[Hypothesis],
     degrees_of_freedom: int,
 ) -> list[Hypothesis]:
     """Return sets that make names improbable: all of more evidence, if these have less than half.
@@ -75,25 +75,25 @@ def likelier(
     Parameters as of `of_names`.
     """
     named = chosen, *equivalent
-    if _share(named, found, degrees_of_freedom) >= 0.5:
+    if _share(named, compared, degrees_of_freedom) >= 0.5:
         return []
-    others = (one for one in found if not _says(one, named))
-    return [one for one in others if one.fit.evidence < chosen.fit.evidence]
+    others = (hypothesis for hypothesis in compared if not _says(hypothesis, named))
+    return [hypothesis for hypothesis in others if hypothesis.fit.evidence < chosen.fit.evidence]
 
 
 def _share(
-    named: Sequence[Hypothesis], found: Sequence[Hypothesis], degrees_of_freedom: int
+    named: Sequence[Hypothesis], compared: Sequence[Hypothesis], degrees_of_freedom: int
 ) -> float:
     """Return the share of the evidence of all compared sets for a class, the chosen set first."""
     misfit = misfit_of(named[0], degrees_of_freedom)
-    evidence = np.array([one.fit.evidence for one in found])
+    evidence = np.array([hypothesis.fit.evidence for hypothesis in compared])
     weights = np.exp(-(evidence - evidence.min()) / (2.0 * misfit))
-    says = [_says(one, named) for one in found]
+    says = [_says(hypothesis, named) for hypothesis in compared]
     return float(weights[says].sum() / weights.sum())
 
 
-def _says(one: Hypothesis, named: Sequence[Hypothesis]) -> bool:
-    return any(each.names <= one.names for each in named)
+def _says(hypothesis: Hypothesis, named: Sequence[Hypothesis]) -> bool:
+    return any(claim.names <= hypothesis.names for claim in named)
 
 
 def of_nothing(screened: Sequence[Screened], n_residuals: int, rules: Rules) -> float:
@@ -104,7 +104,7 @@ def of_nothing(screened: Sequence[Screened], n_residuals: int, rules: Rules) -> 
     """
     if not screened:
         return rules.adequate_right
-    gains = np.array([one.reduction for one in screened])
-    unknowns = np.array([one.candidate.unknowns for one in screened])
+    gains = np.array([effect.reduction for effect in screened])
+    unknowns = np.array([effect.candidate.unknowns for effect in screened])
     odds = np.exp((gains - unknowns * np.log(n_residuals)) / 2.0).mean()
     return rules.adequate_right / float(1.0 + odds)
