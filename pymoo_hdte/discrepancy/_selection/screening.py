@@ -68,22 +68,22 @@ def screen(data: Evidence, fitted: Fit, candidates: Sequence[Candidate]) -> list
     orthonormal, residual = _beyond_parameters(fitted)
     response, parts = data.response(fitted), data.rows_of_parts()
     inward = _inward(fitted, orthonormal) if fitted.candidates else _NONE
-    found = []
+    screened = []
     for candidate in candidates:
         if candidate.frees is not None:
-            found.append(_freed(candidate, fitted, orthonormal, residual))
+            screened.append(_freed(candidate, fitted, orthonormal, residual))
             continue
         signatures = np.array([response(candidate.build(start)) for start in candidate.starts])
-        found.append(_screened(candidate, signatures, orthonormal, residual, parts, inward))
-    return sorted(found, key=lambda one: -one.reduction)
+        screened.append(_screened(candidate, signatures, orthonormal, residual, parts, inward))
+    return sorted(screened, key=lambda effect: -effect.reduction)
 
 
 def most_hopeful(
     data: Evidence,
     fitted: Fit,
-    others: Sequence[Candidate],
-    known: Sequence[Screened],
-    left: float,
+    candidates: Sequence[Candidate],
+    screened_before: Sequence[Screened],
+    excess: float,
     ill: Sequence[tuple[int, float]],
 ) -> list[Screened]:
     """Return the effects that may remove most of what a fit leaves, in total or in a part of it.
@@ -104,24 +104,26 @@ def most_hopeful(
         Parts of the data that it explains ill, and their excess.
     """
     rules = data.rules
-    if known:
-        others = _not_far_behind(data, fitted, known, left, ill)
-    screened = screen(data, fitted, others) if others else []
-    chosen = _hopeful(screened, [one.reduction for one in screened], left, rules)
+    if screened_before:
+        candidates = _not_far_behind(data, fitted, screened_before, excess, ill)
+    screened = screen(data, fitted, candidates) if candidates else []
+    chosen = _hopeful(screened, [effect.reduction for effect in screened], excess, rules)
     if not chosen:
-        chosen = [one for one in screened[:1] if one.reduction >= rules.promising_share * left]
+        chosen = [
+            effect for effect in screened[:1] if effect.reduction >= rules.promising_share * excess
+        ]
     for part, of_part in ill:
-        reductions = [one.by_part[part] for one in screened]
-        more = _hopeful(screened, reductions, of_part, rules)
-        chosen += [one for one in more if one not in chosen]
+        reductions = [effect.by_part[part] for effect in screened]
+        further = _hopeful(screened, reductions, of_part, rules)
+        chosen += [effect for effect in further if effect not in chosen]
     return chosen
 
 
 def _not_far_behind(
     data: Evidence,
     fitted: Fit,
-    known: Sequence[Screened],
-    left: float,
+    screened_before: Sequence[Screened],
+    excess: float,
     ill: Sequence[tuple[int, float]],
 ) -> list[Candidate]:
     """Return the effects that are worth a screening, which takes a prediction for each start.
@@ -132,41 +134,41 @@ def _not_far_behind(
     share = data.rules.promising_share * data.rules.second_hope_share
     orthonormal, residual = _beyond_parameters(fitted)
     parts, inward = data.rows_of_parts(), _inward(fitted, orthonormal)
-    found = (
-        _screened(one.candidate, one.signatures, orthonormal, residual, parts, inward)
-        for one in known
+    rescreened = (
+        _screened(effect.candidate, effect.signatures, orthonormal, residual, parts, inward)
+        for effect in screened_before
     )
     return [
-        one.candidate
-        for one in found
-        if one.reduction >= share * left
-        or any(one.by_part[part] >= share * of_part for part, of_part in ill)
+        effect.candidate
+        for effect in rescreened
+        if effect.reduction >= share * excess
+        or any(effect.by_part[part] >= share * of_part for part, of_part in ill)
     ]
 
 
 def _hopeful(
-    screened: Sequence[Screened], reductions: Sequence[float], left: float, rules: Rules
+    screened: Sequence[Screened], reductions: Sequence[float], excess: float, rules: Rules
 ) -> list[Screened]:
     """Return the best candidates, to first order, if they remove enough of what is left."""
     order = np.argsort([-reduction for reduction in reductions], kind="stable")
-    enough = [screened[k] for k in order if reductions[k] >= rules.second_hope_share * left]
+    enough = [screened[k] for k in order if reductions[k] >= rules.second_hope_share * excess]
     return varied(enough, 1)[: rules.most_seconds]
 
 
 def varied(screened: Sequence[Screened], most: int) -> list[Screened]:
     """Return at most the ``most`` best candidates of each name."""
-    names = [one.candidate.name for one in screened]
-    return [one for k, one in enumerate(screened) if names[:k].count(names[k]) < most]
+    names = [effect.candidate.name for effect in screened]
+    return [effect for k, effect in enumerate(screened) if names[:k].count(names[k]) < most]
 
 
 def reduced(
-    one: Screened, orthonormal: NDArray[np.float64], residual: NDArray[np.float64]
+    effect: Screened, orthonormal: NDArray[np.float64], residual: NDArray[np.float64]
 ) -> Screened:
     """Return a known candidate with what it could remove of another residual (n,).
 
     What is done by other directions, orthonormal (n, k), is projected out of its signatures.
     """
-    return _screened(one.candidate, one.signatures, orthonormal, residual, (), _NONE)
+    return _screened(effect.candidate, effect.signatures, orthonormal, residual, (), _NONE)
 
 
 def _beyond_parameters(fitted: Fit) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -225,15 +227,17 @@ def _best_start(
     lower = np.array([parameter.lower for parameter in candidate.parameters])
     upper = np.array([parameter.upper for parameter in candidate.parameters])
     if candidate.linear:
-        found, reduction = _least_squares(signatures, residual, inward)
-        best = found @ starts
-        harmonic = [one.name.startswith(HARMONIC_NAMES[1:]) for one in candidate.parameters]
+        strengths, reduction = _least_squares(signatures, residual, inward)
+        best = strengths @ starts
+        harmonic = [
+            parameter.name.startswith(HARMONIC_NAMES[1:]) for parameter in candidate.parameters
+        ]
         lines = np.hypot(*best[harmonic].reshape(-1, 2).T)
         if lines.size and lines.max() > np.hypot(*best[:2]):
             # A line that is weaker than its harmonic is not the fundamental of that harmonic.
-            kept = np.flatnonzero(~np.array(harmonic))
-            found, reduction = _least_squares(signatures[kept], residual, inward)
-            best = found @ starts[kept]
+            fundamental = np.flatnonzero(~np.array(harmonic))
+            strengths, reduction = _least_squares(signatures[fundamental], residual, inward)
+            best = strengths @ starts[fundamental]
     else:
         # The first parameter is the strength; the others are shapes.
         positive = bool(lower[0] >= 0.0)
@@ -252,8 +256,12 @@ def _one_by_one(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return the strength of each signature (k, n) alone, and the reduction by it, (k,)."""
     if len(inward):
-        found = [_least_squares(one[None], residual, inward, positive) for one in signatures]
-        return np.array([one for (one,), _ in found]), np.array([gain for _, gain in found])
+        solutions = [
+            _least_squares(signature[None], residual, inward, positive) for signature in signatures
+        ]
+        return np.array([strength for (strength,), _ in solutions]), np.array(
+            [gain for _, gain in solutions]
+        )
     sizes = np.einsum("ij,ij->i", signatures, signatures)
     along = -signatures @ residual
     strengths = np.divide(along, sizes, out=np.zeros_like(along), where=sizes > 1e-12)
@@ -274,19 +282,21 @@ def _least_squares(
     if moves:
         columns = np.concatenate([inward, signatures]).T
         sizes = np.maximum(np.linalg.norm(columns, axis=0), 1e-9)
-        left, right = np.linalg.qr(columns / sizes)
+        orthonormal, triangle = np.linalg.qr(columns / sizes)
         least = np.full(len(sizes), 0.0 if positive else -np.inf)
         least[:moves] = 0.0
-        found = lsq_linear(right, -left.T @ residual, (least, np.inf), "bvls").x / sizes
+        strengths = (
+            lsq_linear(triangle, -orthonormal.T @ residual, (least, np.inf), "bvls").x / sizes
+        )
     else:
-        found, *_ = np.linalg.lstsq(columns, -residual, rcond=1e-10)
-    rest = residual + columns @ found
-    return found[moves:], float(residual @ residual - rest @ rest)
+        strengths, *_ = np.linalg.lstsq(columns, -residual, rcond=1e-10)
+    unexplained = residual + columns @ strengths
+    return strengths[moves:], float(residual @ residual - unexplained @ unexplained)
 
 
 def basis_of(columns: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return an orthonormal basis of columns (n, m) that need not be independent, (n, k)."""
     sizes = np.linalg.norm(columns, axis=0)
-    kept = sizes > 0.0
-    left, values, _ = np.linalg.svd(columns[:, kept] / sizes[kept], full_matrices=False)
-    return np.asarray(left[:, values > _RANK * values.max(initial=0.0)])
+    nonzero = sizes > 0.0
+    vectors, values, _ = np.linalg.svd(columns[:, nonzero] / sizes[nonzero], full_matrices=False)
+    return np.asarray(vectors[:, values > _RANK * values.max(initial=0.0)])
