@@ -20,7 +20,10 @@ Vector = NDArray[np.float64]
 
 
 def best_fit(
-    data: Evidence, one: Hypothesis, starts: Sequence[Vector], found: Collection[Hypothesis]
+    data: Evidence,
+    hypothesis: Hypothesis,
+    starts: Sequence[Vector],
+    hypotheses: Collection[Hypothesis],
 ) -> Fit:
     """Return the best fit of a set from its values, the believed base and other starts.
 
@@ -36,7 +39,7 @@ def best_fit(
     found : collection of Hypothesis
         Sets that it may contain: where it does no better than one of them, other shapes are tried.
     """
-    fits = [fit(data, one.candidates, one.fit)]
+    fits = [fit(data, hypothesis.candidates, hypothesis.fit)]
 
     def follow(further: Iterable[Vector]) -> Fit:
         for start in further:
@@ -45,12 +48,12 @@ def best_fit(
         return _least(fits)
 
     best = follow((_from_believed(data.base, fits[0]), *starts))
-    best = follow(_other_shapes(best, _no_better(best, one, found, data.rules)))
-    return follow(_other_ends(best, _no_better(best, one, found, data.rules)))
+    best = follow(_other_shapes(best, _no_better(best, hypothesis, hypotheses, data.rules)))
+    return follow(_other_ends(best, _no_better(best, hypothesis, hypotheses, data.rules)))
 
 
 def _least(fits: Sequence[Fit]) -> Fit:
-    return min(fits, key=lambda each: each.chi_square)
+    return min(fits, key=lambda fitted: fitted.chi_square)
 
 
 def _fit_from(data: Evidence, fits: Sequence[Fit], start: Vector) -> Fit | None:
@@ -91,16 +94,16 @@ def _could_remove(best: Fit, change: Vector) -> bool:
     return bool((beside @ best.residuals) ** 2 > SAME * best.misfit * (beside @ beside))
 
 
-def other_starts(one: Hypothesis, base: Vector) -> list[Vector]:
+def other_starts(hypothesis: Hypothesis, base: Vector) -> list[Vector]:
     """Return starts of a single effect from all its own ones, beside fitted values of the base.
 
     An inertia that is larger by half moves a resonance past lines, so that chi-square does not
     decrease steadily on the way there; and values of the base that hide an effect lie far off.
     """
-    (*others, last) = one.candidates
-    if others or len(last.starts) == 1 or last.linear:
+    (*others, effect) = hypothesis.candidates
+    if others or len(effect.starts) == 1 or effect.linear:
         return []
-    return [np.append(base, start) for start in last.starts]
+    return [np.append(base, start) for start in effect.starts]
 
 
 def _from_believed(base: Sequence[Parameter], fitted: Fit) -> Vector:
@@ -110,7 +113,7 @@ def _from_believed(base: Sequence[Parameter], fitted: Fit) -> Vector:
 
 
 def _no_better(
-    best: Fit, one: Hypothesis, found: Iterable[Hypothesis], rules: Rules
+    best: Fit, hypothesis: Hypothesis, hypotheses: Iterable[Hypothesis], rules: Rules
 ) -> list[tuple[Candidate, slice]]:
     """Return the laws by which a set does no better than a special case of it.
 
@@ -118,11 +121,11 @@ def _no_better(
     """
     special = {
         name
-        for other in found
-        if one.names != other.names
-        and contains(one, other)
-        and other.fit.chi_square - best.chi_square < rules.evidence_distance
-        for name in other.names
+        for special_case in hypotheses
+        if hypothesis.names != special_case.names
+        and contains(hypothesis, special_case)
+        and special_case.fit.chi_square - best.chi_square < rules.evidence_distance
+        for name in special_case.names
     }
     return [
         (member, slice(place.start + 1, place.stop))
@@ -158,9 +161,9 @@ def _other_ends(best: Fit, laws: Iterable[tuple[Candidate, slice]]) -> list[Vect
     starts = []
     for member, place in laws:
         layout, sides = Layout(member.parameters[1:]), best.bound_sides[place]
-        first, *others = np.array(member.starts)[:, 1:]
-        moved = sides * np.any(others != first, axis=0)
-        ends = [layout.array("upper"), layout.array("lower"), first]
+        first_shape, *other_shapes = np.array(member.starts)[:, 1:]
+        moved = sides * np.any(other_shapes != first_shape, axis=0)
+        ends = [layout.array("upper"), layout.array("lower"), first_shape]
         start = best.values.copy()
         start[place] = np.select([moved < 0.0, moved > 0.0, sides != 0.0], ends, start[place])
         if moved.any():
