@@ -179,16 +179,16 @@ class Signatures:
         places, used = self._places
         count = len(self.effects)
         total = np.diagonal(unexplained)[:count]
-        residual, strength = _rest(unexplained, total, places, used)
+        residual, strength = _unimitated_by_forms(unexplained, total, places, used)
         one_sided = np.array([form.one_sided for form in self._forms])
         weaker = used.copy()
         weaker[:, 0] = False
-        without, _ = _rest(unexplained, total, places, weaker)
+        without, _ = _unimitated_by_forms(unexplained, total, places, weaker)
         # Least squares under one bound: where it is violated, the solution lies at the bound.
         return np.where(one_sided[:, None] & (strength < 0.0), without, residual)
 
 
-def _rest(
+def _unimitated_by_forms(
     unexplained: Values, total: Values, places: NDArray[np.int_], used: NDArray[np.bool_]
 ) -> tuple[Values, Values]:
     """Return what forms leave of effects, and their strengths, both (n_forms, n_effects)."""

@@ -17,13 +17,13 @@ from numpy.typing import NDArray
 
 from pymoo_hdte.discrepancy._selection.candidate import Candidate
 from pymoo_hdte.discrepancy._selection.fitting import Evidence, Fit
-from pymoo_hdte.discrepancy._selection.freed import in_free_form
 from pymoo_hdte.discrepancy._selection.hypothesis import (
     Hypothesis,
     adequate,
     down_to_noise,
     gains_enough,
 )
+from pymoo_hdte.discrepancy._selection.released import in_free_form
 from pymoo_hdte.discrepancy._selection.screening import Screened, basis_of, reduced, varied
 
 
@@ -79,23 +79,23 @@ class AnyForm:
         self._free_fits: dict[Fit, Fit] = {}
         self._forms_by_place: dict[tuple[str, str, float | None], NDArray[np.float64]] = {}
 
-    def known(self, candidates: Sequence[Candidate]) -> bool:
+    def forms_are_known(self, candidates: Sequence[Candidate]) -> bool:
         """Tell whether other forms of all these laws are known; of a user's effect they are not."""
         return all(self.data.corrections(candidate) for candidate in candidates)
 
-    def rest(self, fitted: Fit) -> UnexplainedResidual | None:
+    def unexplained(self, fitted: Fit) -> UnexplainedResidual | None:
         """Return what a fit leaves; None if that says nothing.
 
         It says nothing if no corrections of a law are known, or if parameters and forms together
         could follow any data.
         """
         if fitted not in self._residuals:
-            self._residuals[fitted] = self._unexplained(fitted)
+            self._residuals[fitted] = self._compute_unexplained(fitted)
         return self._residuals[fitted]
 
-    def rest_is_noise(self, fitted: Fit) -> bool:
+    def unexplained_is_noise(self, fitted: Fit) -> bool:
         """Tell whether a fit leaves nothing but noise and errors of form."""
-        return (unexplained := self.rest(fitted)) is not None and unexplained.is_noise
+        return (unexplained := self.unexplained(fitted)) is not None and unexplained.is_noise
 
     def explains(self, hypothesis: Hypothesis) -> bool:
         """Tell whether a set removes most of the misfit and leaves nothing but errors of form.
@@ -105,9 +105,9 @@ class AnyForm:
         rules = self.data.rules
         share = rules.exact_share if hypothesis.exact else rules.explained_share
         enough = hypothesis.explained >= share and gains_enough(hypothesis, self.base, rules)
-        return enough and self.rest_is_noise(hypothesis.fit)
+        return enough and self.unexplained_is_noise(hypothesis.fit)
 
-    def explains_in_another(self, hypothesis: Hypothesis) -> bool:
+    def explains_in_another_form(self, hypothesis: Hypothesis) -> bool:
         """Tell whether a set explains the misfit in another form, however little as listed.
 
         The base may imitate what the listed form shares with others. Friction that grows with a
@@ -124,7 +124,7 @@ class AnyForm:
         gain = removed - unknowns * np.log(len(unexplained.residual))
         return removed >= rules.partial_share * self.excess and bool(gain >= rules.bic_gain)
 
-    def share_in_another(self, hypothesis: Hypothesis) -> float:
+    def share_in_another_form(self, hypothesis: Hypothesis) -> float:
         """Return the share of the misfit that a set removes in another form of its laws, 0 to 1."""
         _, unexplained = self._closest_fit(hypothesis)
         excess = (
@@ -139,13 +139,13 @@ class AnyForm:
         noise: the true form may then be far from the listed one.
         """
         unexplained, least = (
-            self.rest(hypothesis.fit),
+            self.unexplained(hypothesis.fit),
             self.data.rules.explained_share * self.excess,
         )
         if unexplained is None or unexplained.is_noise or self.excess - unexplained.excess < least:
             return hypothesis.fit, unexplained
         fitted = self.in_free_form(hypothesis.fit)
-        return fitted, self.rest(fitted)
+        return fitted, self.unexplained(fitted)
 
     def in_free_form(self, fitted: Fit) -> Fit:
         """Return a fit with the form of its laws free, as `released.in_free_form` does."""
@@ -153,7 +153,7 @@ class AnyForm:
             self._free_fits[fitted] = in_free_form(self.data, fitted)
         return self._free_fits[fitted]
 
-    def hopeful_in_another(self, screened: Sequence[Screened]) -> list[Screened]:
+    def shortlisted_in_another_form(self, screened: Sequence[Screened]) -> list[Screened]:
         """Return the effects that may explain the misfit of the base in some form of their laws.
 
         They are ranked by what they leave to first order. The best is returned with all that leave
@@ -180,7 +180,7 @@ class AnyForm:
         """Orthonormal basis of the changes that the base's parameters can make, shape (n, k)."""
         return basis_of(self.base.jacobian[:, self.base.bound_sides == 0.0])
 
-    def earns(self, hypothesis: Hypothesis, simpler: Hypothesis) -> bool:
+    def is_significant(self, hypothesis: Hypothesis, simpler: Hypothesis) -> bool:
         """Tell whether a member is significant: what is left without it is no error of form.
 
         Either the set leaves only noise beyond its forms, and the member removes most of what the
@@ -188,7 +188,7 @@ class AnyForm:
         member in its listed form removes nearly all of what contradicts the simpler set in every
         form, and no contradiction remains. Nothing follows an error of another's form so well.
         """
-        after, before = self.rest(hypothesis.fit), self.rest(simpler.fit)
+        after, before = self.unexplained(hypothesis.fit), self.unexplained(simpler.fit)
         if after is None or before is None:
             return False
         rules, removed = self.data.rules, before.excess - after.excess
@@ -200,20 +200,24 @@ class AnyForm:
         return (
             after.excess < contradicting < before.excess
             and removed >= rules.beyond_forms_share * before.excess
-            and self.known([candidate for candidate in simpler.candidates if not candidate.exact])
-            and not self.only_in_another(hypothesis, simpler)
+            and self.forms_are_known(
+                [candidate for candidate in simpler.candidates if not candidate.exact]
+            )
+            and not self.only_in_another_form(hypothesis, simpler)
         )
 
-    def only_in_another(self, hypothesis: Hypothesis, simpler: Hypothesis) -> bool:
+    def only_in_another_form(self, hypothesis: Hypothesis, simpler: Hypothesis) -> bool:
         """Tell whether a member removes much less in its listed form than in any other form."""
-        after, before = self.rest(hypothesis.fit), self.rest(simpler.fit)
+        after, before = self.unexplained(hypothesis.fit), self.unexplained(simpler.fit)
         if after is None or before is None:
             return False
         in_any = before.excess - after.excess
         listed = simpler.fit.chi_square - hypothesis.fit.chi_square
         return listed < self.data.rules.explained_part_share * in_any
 
-    def beside(self, hypothesis: Hypothesis, screened: Sequence[Screened]) -> list[Screened]:
+    def shortlisted_beside(
+        self, hypothesis: Hypothesis, screened: Sequence[Screened]
+    ) -> list[Screened]:
         """Return the effects that may remove most of what a set leaves beyond its forms.
 
         If none does in its listed form and little is left, those that do in any form are returned.
@@ -224,7 +228,7 @@ class AnyForm:
         screened : sequence of Screened
             Effects that may be added, with their signatures beside the base.
         """
-        unexplained = self.rest(hypothesis.fit)
+        unexplained = self.unexplained(hypothesis.fit)
         if unexplained is None or not screened:
             return []
         rules = self.data.rules
@@ -267,7 +271,7 @@ class AnyForm:
         if not hypothesis.exact:
             # The corrections of a form need not span all that a real law does at the same port.
             if any(
-                candidate.beside(present)
+                candidate.shares_port_with(present)
                 for candidate in member
                 for present in hypothesis.candidates
             ):
@@ -285,7 +289,7 @@ class AnyForm:
         """Tell whether a set explains the data down to the noise in its listed forms."""
         return down_to_noise(hypothesis.fit, self.degrees_of_freedom, self.data.rules)
 
-    def _unexplained(self, fitted: Fit) -> UnexplainedResidual | None:
+    def _compute_unexplained(self, fitted: Fit) -> UnexplainedResidual | None:
         forms = [self.data.corrections(candidate) for candidate in fitted.candidates]
         if any(form is None for form in forms):
             return None

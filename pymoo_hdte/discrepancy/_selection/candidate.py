@@ -44,8 +44,8 @@ class Candidate:
     listed : bool
         Whether a verdict may name it; if not, it serves to keep the misfit that it explains from
         being attributed to another effect.
-    frees : str or None
-        Base parameter that it frees of its tolerance.
+    releases : str or None
+        Base parameter that it releases of its tolerance.
     acts_at : str
         Port at which that parameter makes a torque, if it is at a port.
     covered_by, covered_at : str
@@ -73,7 +73,7 @@ class Candidate:
     order: float | None = None
     exact: bool = False
     listed: bool = True
-    frees: str | None = None
+    releases: str | None = None
     acts_at: str = ""
     covered_by: str = ""
     covered_at: str = ""
@@ -92,7 +92,7 @@ class Candidate:
         return f"{self.name}{form}:{self.port}{order}"
 
     @property
-    def says(self) -> tuple[str, str]:
+    def named_effect(self) -> tuple[str, str]:
         """Name and port; of a value out of tolerance, those of the effect that says the same."""
         if self.covered_by:
             return self.covered_by, self.covered_at
@@ -108,7 +108,7 @@ class Candidate:
         forms = self.form != other.form and (self.name, self.port) == (other.name, other.port)
         return not (forms or self.places & other.places)
 
-    def beside(self, other: Candidate) -> bool:
+    def shares_port_with(self, other: Candidate) -> bool:
         """Tell whether both act at one port, where one may stand for the form of the other."""
         return (self.acts_at or self.port) == (other.acts_at or other.port)
 
@@ -170,12 +170,12 @@ class Candidate:
     @property
     def unknowns(self) -> int:
         """Number of parameters that it adds to a fit or sets free."""
-        return len(self.parameters) + (self.frees is not None)
+        return len(self.parameters) + (self.releases is not None)
 
     def outside(self, base: Sequence[Parameter], values: NDArray[np.float64]) -> bool:
-        """Tell whether the base parameter that it frees lies outside its tolerance."""
+        """Tell whether the base parameter that it releases lies outside its tolerance."""
         for parameter, value in zip(base, values, strict=False):
-            if parameter.name == self.frees:
+            if parameter.name == self.releases:
                 return not parameter.lower <= value <= parameter.upper
         return False
 
@@ -231,7 +231,7 @@ def candidate_of(
 def out_of_tolerance(
     name: str, words: str, acts_at: str = "", covering: Effect | None = None
 ) -> Candidate:
-    """Return the candidate that frees a base parameter, called ``words``, of its tolerance.
+    """Return the candidate that releases a base parameter, called ``words``, of its tolerance.
 
     Parameters
     ----------
@@ -248,7 +248,7 @@ def out_of_tolerance(
         _no_effect,
         out_of_tolerance_sentence(words),
         exact=True,
-        frees=name,
+        releases=name,
         acts_at=acts_at,
         covered_by=covering.name if covering else "",
         covered_at=covering.sought_at[0] if covering else "",

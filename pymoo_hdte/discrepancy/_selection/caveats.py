@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.stats import chi2, norm
 
 from pymoo_hdte.discrepancy._selection.candidate import Candidate
-from pymoo_hdte.discrepancy._selection.excess import Vote
+from pymoo_hdte.discrepancy._selection.excess import HeldOutTest
 from pymoo_hdte.discrepancy._selection.fitted_sets import beyond_stated
 from pymoo_hdte.discrepancy._selection.fitting import Fit
 from pymoo_hdte.discrepancy._selection.hypothesis import (
@@ -35,7 +35,7 @@ from pymoo_hdte.discrepancy._selection.rules import Rules
 from pymoo_hdte.discrepancy._selection.search import Search
 
 
-def reasons_of(search: Search, chosen: Hypothesis, vote: Vote | None) -> list[Reason]:
+def reasons_of(search: Search, chosen: Hypothesis, held_out: HeldOutTest | None) -> list[Reason]:
     """Return what forbids to name a set plainly; nothing if it may be named."""
     reasons, fitted = [], chosen.fit
     unsure = uncertain(fitted, search.data.rules)
@@ -44,16 +44,16 @@ def reasons_of(search: Search, chosen: Hypothesis, vote: Vote | None) -> list[Re
             reasons.append(Reason.of(AT_BOUND, candidate.label, bounded))
         elif candidate in unsure:
             reasons += holds_zero([candidate])
-    if freed := _freed_at_bounds(chosen):
-        reasons.append(Reason.of(FREED_AT_BOUND, numbers=freed))
+    if released := _released_at_bounds(chosen):
+        reasons.append(Reason.of(FREED_AT_BOUND, numbers=released))
     for name in _contradicted_in_any_form(search, chosen):
         reasons.append(Reason(SENSOR_AT_BOUND, name))
     curves = [candidate.label for candidate in chosen.candidates if not candidate.exact]
     if not search.enough(chosen):
-        if curves and chosen.freed:
+        if curves and chosen.released:
             reasons.append(Reason(STANDS_FOR_FORM, curves[0]))
         reasons += _harmonics_of_another(chosen.candidates)
-    if vote is not None and vote.denies(search.data.rules, fitted.misfit):
+    if held_out is not None and held_out.denies(search.data.rules, fitted.misfit):
         reasons.append(Reason(NOT_VALIDATED))
     per_degree = fitted.chi_square / search.degrees_of_freedom
     if per_degree > search.data.rules.contradicting_chi_square:
@@ -70,11 +70,11 @@ def other_forms(search: Search, chosen: Hypothesis) -> list[Reason]:
     labels = [
         "+".join(candidate.label for candidate in member)
         for member in members
-        if search.forms.only_in_another(chosen, search.without(chosen, member))
+        if search.forms.only_in_another_form(chosen, search.without(chosen, member))
     ]
     if not labels and not explains_as_listed(search, chosen):
         forms = search.forms
-        if forms.explains(chosen) or forms.explains_in_another(chosen):
+        if forms.explains(chosen) or forms.explains_in_another_form(chosen):
             labels = [chosen.label]
     return [Reason(NEEDS_ANOTHER_FORM, label) for label in labels]
 
@@ -114,13 +114,15 @@ def above_noise(per_degree: float) -> Reason:
     return Reason.of(ABOVE_NOISE, numbers={"times_noise": np.sqrt(per_degree)})
 
 
-def _freed_at_bounds(chosen: Hypothesis) -> dict[str, float]:
+def _released_at_bounds(chosen: Hypothesis) -> dict[str, float]:
     """Return the base values that a set frees and that ended at a bound."""
     fitted = chosen.fit
-    freed = {candidate.frees for candidate in chosen.candidates} & set(fitted.at_bounds)
+    released = {candidate.releases for candidate in chosen.candidates} & set(fitted.at_bounds)
     # Parameters of effects follow those of the base, and may have the same names.
     named = reversed([*zip(fitted.parameters, fitted.values, strict=True)])
-    return {parameter.name: float(value) for parameter, value in named if parameter.name in freed}
+    return {
+        parameter.name: float(value) for parameter, value in named if parameter.name in released
+    }
 
 
 def _contradicted_in_any_form(search: Search, chosen: Hypothesis) -> list[str]:
@@ -135,11 +137,11 @@ def _contradicted_in_any_form(search: Search, chosen: Hypothesis) -> list[str]:
     if not names or len(chosen.members) < 2:
         return names
     free_fit = forms.in_free_form(chosen.fit)
-    if not forms.rest_is_noise(free_fit) or beyond_stated(free_fit, rules).any():
+    if not forms.unexplained_is_noise(free_fit) or beyond_stated(free_fit, rules).any():
         return names
     simpler_fits = [search.without(chosen, member).fit for member in chosen.members]
     every = [*simpler_fits, *map(forms.in_free_form, simpler_fits)]
-    return names if any(map(forms.rest_is_noise, every)) else []
+    return names if any(map(forms.unexplained_is_noise, every)) else []
 
 
 def _contradicted(fitted: Fit, rules: Rules) -> list[str]:

@@ -39,14 +39,14 @@ def best_set(search: Search) -> Hypothesis:
     the set without one of them, counts too.
     """
     hypotheses: list[Hypothesis] = []
-    while hypotheses != search.found:
-        hypotheses = search.found
+    while hypotheses != search.hypotheses:
+        hypotheses = search.hypotheses
         best = _least_that(
             search,
             lambda hypothesis: (
-                explains_in_any_form(search, hypothesis) and search.earned(hypothesis)
+                explains_in_any_form(search, hypothesis) and search.is_significant(hypothesis)
             ),
-        ) or _least_that(search, search.earned)
+        ) or _least_that(search, search.is_significant)
     assert best is not None, "a single effect is earned"
     return best
 
@@ -55,7 +55,9 @@ def _least_that(search: Search, passes: Callable[[Hypothesis], bool]) -> Hypothe
     """Return the set of least BIC that passes, of all that are known once it has been judged."""
     passed: set[Hypothesis] = set()
     refused: set[Hypothesis] = set()
-    while open_sets := [hypothesis for hypothesis in search.found if hypothesis not in refused]:
+    while open_sets := [
+        hypothesis for hypothesis in search.hypotheses if hypothesis not in refused
+    ]:
         if open_sets[0] in passed:
             return open_sets[0]
         (passed if passes(open_sets[0]) else refused).add(open_sets[0])
@@ -74,7 +76,7 @@ def special_case(search: Search, best: Hypothesis) -> Hypothesis:
         error = np.inf
     simpler = (
         search.finished(hypothesis)
-        for hypothesis in search.found
+        for hypothesis in search.hypotheses
         if hypothesis.names != best.names and contains(best, hypothesis)
     )
     good = (
@@ -86,7 +88,7 @@ def special_case(search: Search, best: Hypothesis) -> Hypothesis:
         (
             hypothesis
             for hypothesis in good
-            if explains_in_any_form(search, hypothesis) and search.earned(hypothesis)
+            if explains_in_any_form(search, hypothesis) and search.is_significant(hypothesis)
         ),
         best,
     )
@@ -104,9 +106,9 @@ def confirmed(search: Search, chosen: Hypothesis) -> Hypothesis:
         reduced = search.without(chosen, member)
         if not search.enough(reduced):
             continue
-        vote = search.data.held_out_vote(reduced.fit, chosen.fit)
+        held_out = search.data.held_out_test(reduced.fit, chosen.fit)
         gain = reduced.fit.chi_square - chosen.fit.chi_square
-        denied = vote and gain + vote.before - vote.after < rules.single_effect_gain
+        denied = held_out and gain + held_out.before - held_out.after < rules.single_effect_gain
         unsure = any(candidate in doubted for candidate in member)
         if denied or (unsure and explains_in_any_form(search, reduced)):
             smaller.append(reduced)
@@ -126,12 +128,12 @@ def simpler_law(search: Search, chosen: Hypothesis) -> Hypothesis:
     limit = search.data.rules.form_ratio * left_beyond_noise(search, chosen)
     special = (
         hypothesis
-        for hypothesis in search.found
+        for hypothesis in search.hypotheses
         if hypothesis.names != chosen.names
         and contains(chosen, hypothesis)
         and left_beyond_noise(search, hypothesis) < limit
     )
-    return next((hypothesis for hypothesis in special if search.earned(hypothesis)), chosen)
+    return next((hypothesis for hypothesis in special if search.is_significant(hypothesis)), chosen)
 
 
 def left_beyond_noise(search: Search, hypothesis: Hypothesis) -> float:
@@ -139,7 +141,7 @@ def left_beyond_noise(search: Search, hypothesis: Hypothesis) -> float:
     return hypothesis.fit.chi_square - search.degrees_of_freedom
 
 
-def twins(search: Search, chosen: Hypothesis) -> list[Hypothesis]:
+def competing_by_evidence(search: Search, chosen: Hypothesis) -> list[Hypothesis]:
     """Return the sets of as many effects and values as the chosen one that no evidence tells apart.
 
     A law that contains the chosen one follows more of any form, and is none.
@@ -149,10 +151,10 @@ def twins(search: Search, chosen: Hypothesis) -> list[Hypothesis]:
         for hypothesis in search.of_size(len(chosen.members))
         if hypothesis.names != chosen.names
         and len(hypothesis.candidates) == len(chosen.candidates)
-        and bool(hypothesis.freed) == bool(chosen.freed)
+        and bool(hypothesis.released) == bool(chosen.released)
         and near_by_evidence(hypothesis, chosen, search.degrees_of_freedom, search.data.rules)
         and not (contains(hypothesis, chosen) or contains(chosen, hypothesis))
-        and search.earned(hypothesis)
+        and search.is_significant(hypothesis)
     ]
 
 
@@ -242,11 +244,13 @@ def in_another_form(
     """
     if any(search.data.corrections(candidate) is None for candidate in search.candidates[:1]):
         return []
-    effects = [effect for effect in screened if effect.candidate.frees is None]
-    for effect in search.forms.hopeful_in_another(effects) if effects else ():
+    effects = [effect for effect in screened if effect.candidate.releases is None]
+    for effect in search.forms.shortlisted_in_another_form(effects) if effects else ():
         search.alone(effect)
     singles = [
-        hypothesis for hypothesis in search.found if hypothesis.listed and _is_effect(hypothesis)
+        hypothesis
+        for hypothesis in search.hypotheses
+        if hypothesis.listed and _is_effect(hypothesis)
     ]
     finished = [
         hypothesis if hypothesis is chosen else search.finished(hypothesis)
@@ -264,7 +268,7 @@ def _explains(search: Search, hypothesis: Hypothesis) -> bool:
     A load on a soft sensor moves as further inertia would in some form, of which none is there: the
     strength of an effect of exact form has to be certain beside its corrections.
     """
-    if not search.forms.explains_in_another(hypothesis):
+    if not search.forms.explains_in_another_form(hypothesis):
         return False
     free_fit, rules = search.forms.in_free_form(hypothesis.fit), search.data.rules
     places = zip(hypothesis.candidates, free_fit.places, strict=True)
@@ -277,7 +281,7 @@ def _explains(search: Search, hypothesis: Hypothesis) -> bool:
 
 def _is_effect(hypothesis: Hypothesis) -> bool:
     """Tell whether a set is a single effect, and no base parameter."""
-    return len(hypothesis.candidates) == 1 and hypothesis.candidates[0].frees is None
+    return len(hypothesis.candidates) == 1 and hypothesis.candidates[0].releases is None
 
 
 def in_one_law(search: Search, chosen: Hypothesis) -> list[Hypothesis]:

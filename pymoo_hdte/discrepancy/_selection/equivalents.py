@@ -18,12 +18,12 @@ from pymoo_hdte.discrepancy._selection.caveats import (
 )
 from pymoo_hdte.discrepancy._selection.choice import (
     best_set,
+    competing_by_evidence,
     confirmed,
     in_another_form,
     simpler_law,
     special_case,
     stands_out,
-    twins,
 )
 from pymoo_hdte.discrepancy._selection.fitted_sets import may_be_together
 from pymoo_hdte.discrepancy._selection.fitting import Fit
@@ -71,19 +71,15 @@ def answer_of(search: Search, chosen: Hypothesis, screened: Sequence[Screened]) 
         chosen, certain = foreign[0], True
     else:
         extended = with_one_more(search, chosen) if certain else []
-        reported = [*extended, chosen, *rivals(search, chosen)]
+        reported = [*extended, chosen, *competing_sets(search, chosen)]
         chosen, equivalent = reported[0], reported[1:]
-    together = [] if certain else twins(search, chosen)
+    together = [] if certain else competing_by_evidence(search, chosen)
     in_part = not certain and stands_out(search, chosen, together)
     equivalent += together if in_part else []
-    if not chosen.listed and (
-        listed := [hypothesis for hypothesis in equivalent if hypothesis.listed]
-    ):
-        equivalent = [
-            chosen,
-            *(hypothesis for hypothesis in equivalent if hypothesis is not listed[0]),
-        ]
-        chosen = listed[0]
+    listed = [hypothesis for hypothesis in equivalent if hypothesis.listed]
+    if not chosen.listed and listed:
+        others = [hypothesis for hypothesis in equivalent if hypothesis is not listed[0]]
+        chosen, equivalent = listed[0], [chosen, *others]
     return Answer(chosen, equivalent, certain, bool(foreign), in_part)
 
 
@@ -92,18 +88,18 @@ def chosen_of(search: Search) -> Hypothesis:
     return confirmed(search, special_case(search, best_set(search)))
 
 
-def rivals(search: Search, chosen: Hypothesis) -> list[Hypothesis]:
+def competing_sets(search: Search, chosen: Hypothesis) -> list[Hypothesis]:
     """Return the sets that explain the data as well as the chosen one by something else.
 
     What contains one of them is a further one only where it comes near that, too.
     """
     competing = [
         hypothesis
-        for hypothesis in search.found
+        for hypothesis in search.hypotheses
         if hypothesis is not chosen
         and _comes_near(search, hypothesis, chosen)
         and explains_in_any_form(search, hypothesis)
-        and search.earned(hypothesis)
+        and search.is_significant(hypothesis)
     ]
     return [
         hypothesis
@@ -122,7 +118,9 @@ def _comes_near(search: Search, hypothesis: Hypothesis, chosen: Hypothesis) -> b
     A law that contains the other one and ends at its bound is the other one. Where its further
     unknowns are determined, the evidence has told; where they are not, it is a rival.
     """
-    near = search.alike(hypothesis, chosen) or undecided(hypothesis, chosen, search.data.rules)
+    near = search.indistinguishable(hypothesis, chosen) or undecided(
+        hypothesis, chosen, search.data.rules
+    )
     near = near or _needs_fewer_values(search, hypothesis, chosen)
     return near and not (contains(hypothesis, chosen) and is_bounded(hypothesis.fit))
 
@@ -138,13 +136,13 @@ def _needs_fewer_values(search: Search, hypothesis: Hypothesis, chosen: Hypothes
         [effect for effect in effects if effect.label not in shared]
         for effects in (hypothesis.effects, chosen.effects)
     )
-    fewer = label_of(hypothesis.freed) < label_of(chosen.freed)
+    fewer = label_of(hypothesis.released) < label_of(chosen.released)
     if not fewer or not own or len(own) != len(replaced):
         return False
-    same = all(any(effect.beside(law) for law in replaced) for effect in own)
+    same = all(any(effect.shares_port_with(law) for law in replaced) for effect in own)
     increase = hypothesis.fit.chi_square - chosen.fit.chi_square
     limit = search.data.rules.form_share**2 * search.excess
-    return same and increase < limit and search.forms.rest_is_noise(hypothesis.fit)
+    return same and increase < limit and search.forms.unexplained_is_noise(hypothesis.fit)
 
 
 def with_one_more(search: Search, chosen: Hypothesis) -> list[Hypothesis]:
@@ -155,17 +153,17 @@ def with_one_more(search: Search, chosen: Hypothesis) -> list[Hypothesis]:
     either may be true. The best first, and those that no evidence tells from it.
     """
     rules, freedom = search.data.rules, search.degrees_of_freedom
-    labels, freed = label_of(chosen.candidates), label_of(chosen.freed)
+    labels, released = label_of(chosen.candidates), label_of(chosen.released)
     larger = [
         hypothesis
         for hypothesis in search.of_size(len(chosen.members) + 1)
         if label_of(hypothesis.candidates) > labels
-        and label_of(hypothesis.freed) == freed
+        and label_of(hypothesis.released) == released
         and hypothesis.listed
         and chosen.bic - hypothesis.bic >= rules.bic_gain
     ]
     # Where forms are not known, only what is listed was compared.
-    any_form = search.forms.known(chosen.effects)
+    any_form = search.forms.forms_are_known(chosen.effects)
     if not (larger and any_form) or not reasons_of(search, chosen, None):
         return []
     extended = [
@@ -185,11 +183,8 @@ def with_one_more(search: Search, chosen: Hypothesis) -> list[Hypothesis]:
 
 def distinct(chosen: Hypothesis, equivalent: Sequence[Hypothesis]) -> list[Hypothesis]:
     """Return the sets that name other effects, each once: one order or another is one effect."""
-    of_names = {
-        hypothesis.names: hypothesis
-        for hypothesis in reversed(equivalent)
-        if hypothesis.names != chosen.names
-    }
+    others = [hypothesis for hypothesis in equivalent if hypothesis.names != chosen.names]
+    of_names = {hypothesis.names: hypothesis for hypothesis in reversed(others)}
     return list(reversed(of_names.values()))
 
 
@@ -274,14 +269,16 @@ def _with_other_parts(search: Search, chosen: Hypothesis) -> None:
     """
     whole, rules = label_of(chosen.candidates), search.data.rules
     for part in [
-        hypothesis for hypothesis in search.found if label_of(hypothesis.candidates) < whole
+        hypothesis for hypothesis in search.hypotheses if label_of(hypothesis.candidates) < whole
     ]:
         remaining = [
             candidate for candidate in chosen.candidates if candidate not in part.candidates
         ]
         for substitute in search.of_size(len(part.members)):
             effects = (*substitute.candidates, *remaining)
-            close = leave_the_same(substitute, part, rules) or search.alike(substitute, part)
+            close = leave_the_same(substitute, part, rules) or search.indistinguishable(
+                substitute, part
+            )
             if substitute is not part and close and may_be_together(effects):
                 start = chosen.values_of(remaining)[len(search.base.values) :]
                 search.fitted(effects, np.append(substitute.fit.values, start))
@@ -296,14 +293,14 @@ def _with_other_laws(search: Search, chosen: Hypothesis) -> None:
     Only where another form can take most of what such a set leaves, or all but noise: not for
     machines whose laws have no known forms.
     """
-    for competitor in _rivals_at_its_ports(search, chosen):
-        if search.forms.rest_is_noise(competitor.fit) or search.leaves_forms(competitor):
+    for competitor in _competing_at_its_ports(search, chosen):
+        if search.forms.unexplained_is_noise(competitor.fit) or search.leaves_forms(competitor):
             best = competitor
             for member, _ in differing(competitor.candidates, chosen.candidates):
                 best = _from_all_starts(search, best, member)
 
 
-def _rivals_at_its_ports(search: Search, chosen: Hypothesis) -> list[Hypothesis]:
+def _competing_at_its_ports(search: Search, chosen: Hypothesis) -> list[Hypothesis]:
     """Return the best set of each names that has other laws at the same ports, told from it so far.
 
     One that is not told from the chosen set is in its class already.
@@ -317,10 +314,10 @@ def _rivals_at_its_ports(search: Search, chosen: Hypothesis) -> list[Hypothesis]
         hypothesis
         for hypothesis in of_names.values()
         if all(
-            member.beside(replaced)
+            member.shares_port_with(replaced)
             for member, replaced in differing(hypothesis.candidates, chosen.candidates)
         )
-        and not search.alike(hypothesis, chosen)
+        and not search.indistinguishable(hypothesis, chosen)
     ]
 
 

@@ -66,7 +66,7 @@ class Excess:
 
 
 @dataclass(frozen=True)
-class Vote:
+class HeldOutTest:
     """What records kept out of a fit say of a change of the model.
 
     Attributes

@@ -14,10 +14,10 @@ from pymoo_hdte.discrepancy._selection.excess import Excess
 from pymoo_hdte.discrepancy._selection.fitting import Evidence, Fit, Vector, fit
 from pymoo_hdte.discrepancy._selection.hypothesis import (
     Hypothesis,
-    alike,
     contains,
     down_to_noise,
     hypothesis_of,
+    indistinguishable,
     is_bounded,
     label_of,
     misfit_of,
@@ -58,7 +58,7 @@ class FittedSets:
         self._resumed = self._whole_only = False
 
     @property
-    def found(self) -> list[Hypothesis]:
+    def hypotheses(self) -> list[Hypothesis]:
         """All sets fitted so far that are no others under another name, by rising BIC."""
         hypotheses = [
             hypothesis
@@ -73,12 +73,12 @@ class FittedSets:
 
     def of_size(self, size: int) -> list[Hypothesis]:
         """Return the sets of so many members, by rising BIC."""
-        return [hypothesis for hypothesis in self.found if len(hypothesis.members) == size]
+        return [hypothesis for hypothesis in self.hypotheses if len(hypothesis.members) == size]
 
     @property
     def hopeless(self) -> float:
         """Chi-square beyond which a fit will not come near a set that leaves no more than noise."""
-        best, rules = self.found[:1], self.data.rules
+        best, rules = self.hypotheses[:1], self.data.rules
         if not (best and self.enough(best[0])):
             return np.inf
         share = rules.outdone_share * self.base.chi_square
@@ -107,7 +107,7 @@ class FittedSets:
 
     def leave_out_lacking(self) -> None:
         """Leave out all sets that lack what is evident, if any has it."""
-        self._whole_only = not all(map(self.lacks_evident, self.found))
+        self._whole_only = not all(map(self.lacks_evident, self.hypotheses))
 
     def could_count(self, hypothesis: Hypothesis) -> bool:
         """Tell whether a further effect could be justified.
@@ -130,7 +130,7 @@ class FittedSets:
         if self.enough(hypothesis) and not is_bounded(hypothesis.fit):
             return False
         unexplained, excess = (
-            self.forms.rest(hypothesis.fit),
+            self.forms.unexplained(hypothesis.fit),
             hypothesis.fit.chi_square - self.degrees_of_freedom,
         )
         limit = 1.0 - self.data.rules.explained_part_share
@@ -144,32 +144,37 @@ class FittedSets:
         """
         return self.leaves_forms(hypothesis) or (member.remembers and not self.enough(hypothesis))
 
-    def alike(self, hypothesis: Hypothesis, chosen: Hypothesis) -> bool:
-        """Tell whether the data do not tell a set from another: see `hypothesis.alike`."""
-        same_values = label_of(hypothesis.freed) == label_of(chosen.freed)
-        overlap = same_values and self.forms.known((*hypothesis.effects, *chosen.effects))
-        return alike(hypothesis, chosen, self.degrees_of_freedom, self.data.rules, overlap)
+    def indistinguishable(self, hypothesis: Hypothesis, chosen: Hypothesis) -> bool:
+        """Tell whether the data do not separate two sets, as the function of this name does."""
+        same_values = label_of(hypothesis.released) == label_of(chosen.released)
+        overlap = same_values and self.forms.forms_are_known((*hypothesis.effects, *chosen.effects))
+        return indistinguishable(
+            hypothesis, chosen, self.degrees_of_freedom, self.data.rules, overlap
+        )
 
-    def earned(self, hypothesis: Hypothesis) -> bool:
+    def is_significant(self, hypothesis: Hypothesis) -> bool:
         """Tell whether each member is earned: without it the rest explains clearly less."""
         members = hypothesis.members
         if len(members) == 1:
             return True
         return all(
-            self._earns(hypothesis, member, self.without(hypothesis, member)) for member in members
+            self._member_is_significant(hypothesis, member, self.without(hypothesis, member))
+            for member in members
         )
 
-    def _earns(self, hypothesis: Hypothesis, member: Effects, simpler: Hypothesis) -> bool:
+    def _member_is_significant(
+        self, hypothesis: Hypothesis, member: Effects, simpler: Hypothesis
+    ) -> bool:
         """Tell whether a member is earned, as the listed laws go or in any form of the others.
 
         What is evident is.
         """
         if self.lacks_evident(simpler) and not self.lacks_evident(hypothesis):
             return True
-        earned = is_earned(self.data, self.base, hypothesis, simpler, member)
+        earned = is_significant(self.data, self.base, hypothesis, simpler, member)
         return (
             earned
-            or self.forms.earns(hypothesis, simpler)
+            or self.forms.is_significant(hypothesis, simpler)
             or self._brings_sensors_back(hypothesis, simpler)
         )
 
@@ -275,7 +280,11 @@ class FittedSets:
         chosen = hypotheses[0]
         competing = [
             chosen,
-            *(hypothesis for hypothesis in hypotheses[1:] if self.alike(hypothesis, chosen)),
+            *(
+                hypothesis
+                for hypothesis in hypotheses[1:]
+                if self.indistinguishable(hypothesis, chosen)
+            ),
         ]
         for hypothesis in hypotheses:
             # Measured from the chosen one: of the best one a member may not be earned.
@@ -331,7 +340,7 @@ def may_be_together(effects: Effects) -> bool:
     )
 
 
-def is_earned(
+def is_significant(
     data: Evidence,
     base: Fit,
     hypothesis: Hypothesis,
@@ -364,7 +373,7 @@ def is_earned(
     parts = ill_explained(before, between, rules)
     if not parts:
         return False
-    same_port = any(a.beside(b) for a in member for b in simpler.candidates)
+    same_port = any(a.shares_port_with(b) for a in member for b in simpler.candidates)
     least = rules.second_form_share if same_port else data.remainder
     for part in (slice(None), parts[0]):
         whole, residual, after = (

@@ -56,14 +56,14 @@ class Hypothesis:
         return all(candidate.exact for candidate in self.candidates)
 
     @property
-    def freed(self) -> tuple[Candidate, ...]:
+    def released(self) -> tuple[Candidate, ...]:
         """The base parameters out of tolerance among them."""
-        return tuple(candidate for candidate in self.candidates if candidate.frees is not None)
+        return tuple(candidate for candidate in self.candidates if candidate.releases is not None)
 
     @property
     def effects(self) -> tuple[Candidate, ...]:
         """The others."""
-        return tuple(candidate for candidate in self.candidates if candidate.frees is None)
+        return tuple(candidate for candidate in self.candidates if candidate.releases is None)
 
     @property
     def label(self) -> str:
@@ -74,7 +74,7 @@ class Hypothesis:
     def members(self) -> list[tuple[Candidate, ...]]:
         """The effects one by one; base parameters out of tolerance are one member together."""
         members = [(candidate,) for candidate in self.effects]
-        return members + ([self.freed] if self.freed else [])
+        return members + ([self.released] if self.released else [])
 
     def values_of(self, effects: Sequence[Candidate]) -> NDArray[np.float64]:
         """Return the fitted values of the base and of some of the effects, in their order here."""
@@ -86,7 +86,7 @@ class Hypothesis:
     @cached_property
     def names(self) -> frozenset[tuple[str, str]]:
         """Name and port of each; a value out of tolerance and the effect it stands for are one."""
-        return frozenset(candidate.says for candidate in self.candidates)
+        return frozenset(candidate.named_effect for candidate in self.candidates)
 
 
 def label_of(effects: Sequence[Candidate]) -> frozenset[str]:
@@ -114,7 +114,7 @@ def down_to_noise(fitted: Fit, degrees_of_freedom: int, rules: Rules) -> bool:
     return fitted.chi_square <= adequate(degrees_of_freedom, rules) * degrees_of_freedom
 
 
-def unexplained(data: Evidence, base: Fit, fitted: Fit) -> NDArray[np.bool_]:
+def contradicted_parts(data: Evidence, base: Fit, fitted: Fit) -> NDArray[np.bool_]:
     """Tell which parts of the data that contradict the base clearly contradict a fit, too.
 
     Shape (parts,), as `Excess` has them. If there are several records, the worst is left out: it
@@ -188,7 +188,9 @@ def explains(data: Evidence, hypothesis: Hypothesis, base: Fit, degrees_of_freed
         return False
     if hypothesis.fit.chi_square <= limit * degrees_of_freedom:
         return True
-    return hypothesis.explained >= share and not unexplained(data, base, hypothesis.fit).any()
+    return (
+        hypothesis.explained >= share and not contradicted_parts(data, base, hypothesis.fit).any()
+    )
 
 
 def misfit_of(hypothesis: Hypothesis, degrees_of_freedom: int) -> float:
@@ -196,7 +198,7 @@ def misfit_of(hypothesis: Hypothesis, degrees_of_freedom: int) -> float:
     return max(hypothesis.fit.chi_square / degrees_of_freedom, 1.0)
 
 
-def alike(
+def indistinguishable(
     hypothesis: Hypothesis,
     chosen: Hypothesis,
     degrees_of_freedom: int,
@@ -232,7 +234,7 @@ def alike(
         pairs = differing(hypothesis.candidates, chosen.candidates)
         if any(own.only_as_form for own, _ in pairs):
             return False
-        same = all(own.beside(replaced) for own, replaced in pairs)
+        same = all(own.shares_port_with(replaced) for own, replaced in pairs)
         accuracy = rules.form_share if overlap and same else rules.form_accuracy
         exact = all(own.exact and replaced.exact for own, replaced in pairs)
         close = not exact and increase < accuracy**2 * (chosen.removed + residual)
@@ -278,7 +280,7 @@ def contains(hypothesis: Hypothesis, special: Hypothesis) -> bool:
     Stribeck's friction without its excess is Coulomb's: it always explains as much. Beside its law
     a set may have further values out of tolerance; beside the same laws they are no other law.
     """
-    released, special_released = label_of(hypothesis.freed), label_of(special.freed)
+    released, special_released = label_of(hypothesis.released), label_of(special.released)
     if len(hypothesis.effects) != len(special.effects):
         return False
     pairs = differing(hypothesis.effects, special.effects)

@@ -70,15 +70,15 @@ def screen(data: Evidence, fitted: Fit, candidates: Sequence[Candidate]) -> list
     inward = _inward(fitted, orthonormal) if fitted.candidates else _NONE
     screened = []
     for candidate in candidates:
-        if candidate.frees is not None:
-            screened.append(_freed(candidate, fitted, orthonormal, residual))
+        if candidate.releases is not None:
+            screened.append(_released(candidate, fitted, orthonormal, residual))
             continue
         signatures = np.array([response(candidate.build(start)) for start in candidate.starts])
         screened.append(_screened(candidate, signatures, orthonormal, residual, parts, inward))
     return sorted(screened, key=lambda effect: -effect.reduction)
 
 
-def most_hopeful(
+def shortlist(
     data: Evidence,
     fitted: Fit,
     candidates: Sequence[Candidate],
@@ -107,14 +107,14 @@ def most_hopeful(
     if screened_before:
         candidates = _not_far_behind(data, fitted, screened_before, excess, ill)
     screened = screen(data, fitted, candidates) if candidates else []
-    chosen = _hopeful(screened, [effect.reduction for effect in screened], excess, rules)
+    chosen = _shortlist(screened, [effect.reduction for effect in screened], excess, rules)
     if not chosen:
         chosen = [
             effect for effect in screened[:1] if effect.reduction >= rules.promising_share * excess
         ]
     for part, of_part in ill:
         reductions = [effect.by_part[part] for effect in screened]
-        further = _hopeful(screened, reductions, of_part, rules)
+        further = _shortlist(screened, reductions, of_part, rules)
         chosen += [effect for effect in further if effect not in chosen]
     return chosen
 
@@ -146,7 +146,7 @@ def _not_far_behind(
     ]
 
 
-def _hopeful(
+def _shortlist(
     screened: Sequence[Screened], reductions: Sequence[float], excess: float, rules: Rules
 ) -> list[Screened]:
     """Return the best candidates, to first order, if they remove enough of what is left."""
@@ -202,14 +202,14 @@ def _screened(
     return replace(best, by_part=by_part, signatures=signatures)
 
 
-def _freed(
+def _released(
     candidate: Candidate,
     fitted: Fit,
     orthonormal: NDArray[np.float64],
     residual: NDArray[np.float64],
 ) -> Screened:
     """Return the reduction by a parameter at its bound if it could go beyond."""
-    place = [parameter.name for parameter in fitted.parameters].index(str(candidate.frees))
+    place = [parameter.name for parameter in fitted.parameters].index(str(candidate.releases))
     signature = fitted.jacobian[:, place] * fitted.bound_sides[place]
     signature = signature - orthonormal @ (orthonormal.T @ signature)
     along, size = float(-signature @ residual), float(signature @ signature)

@@ -19,14 +19,14 @@ from pymoo_hdte.discrepancy._selection.fitted_sets import (
     may_be_together,
 )
 from pymoo_hdte.discrepancy._selection.fitting import Evidence, Fit
-from pymoo_hdte.discrepancy._selection.freed import freed_together, gain_of_freed
 from pymoo_hdte.discrepancy._selection.hypothesis import (
     Hypothesis,
     label_of,
     leave_the_same,
     misfit_of,
 )
-from pymoo_hdte.discrepancy._selection.screening import Screened, most_hopeful, varied
+from pymoo_hdte.discrepancy._selection.released import gain_of_released, released_together
+from pymoo_hdte.discrepancy._selection.screening import Screened, shortlist, varied
 
 
 class Search(FittedSets):
@@ -64,18 +64,18 @@ class Search(FittedSets):
         shortlisted = [effect for effect in screened if effect.reduction >= least]
         for effect in varied(shortlisted, rules.most_of_one_name)[: rules.most_fitted]:
             self.alone(effect)
-        if self.found and self.found[0].explained < rules.explained_share:
+        if self.hypotheses and self.hypotheses[0].explained < rules.explained_share:
             self.from_other_starts(self.of_size(1))
         self._parameters()
         self.finish_near(1)
-        if not self.enough(self.found[0]):
-            self.from_other_starts(self.found[:1])
-        self._exchange_forms(self.found[0])
+        if not self.enough(self.hypotheses[0]):
+            self.from_other_starts(self.hypotheses[:1])
+        self._exchange_forms(self.hypotheses[0])
         self.finish_near(1)
 
     def grow(self) -> None:
         """Fit sets of more effects as long as what is left could be that of a further one."""
-        rules, leading = self.data.rules, self.found[0]
+        rules, leading = self.data.rules, self.hypotheses[0]
         done = self.enough(leading) and not self.held_by_sensors(leading)
         if done or not self.could_count(leading):
             self._extend_beyond_forms(leading)
@@ -104,21 +104,21 @@ class Search(FittedSets):
         Those that stay within once others are free, or that gain nothing, keep their tolerances.
         If all of them together do no better than one effect, fewer are not tried.
         """
-        released, fitted = freed_together(self.data, self.base)
+        released, fitted = released_together(self.data, self.base)
         needed = tuple(
             parameter for parameter in released if parameter.outside(self.data.base, fitted.values)
         )
-        best = self.found[0].bic if self.found else np.inf
+        best = self.hypotheses[0].bic if self.hypotheses else np.inf
         if not needed or fitted.chi_square > best:
             return
-        for parameter in self._prune(self.fitted(needed, fitted.values)).freed:
+        for parameter in self._prune(self.fitted(needed, fitted.values)).released:
             if not self._covered((parameter,)):
                 self.fitted((parameter,), fitted.values)
 
-    def _covered(self, freed: Effects) -> frozenset[str]:
+    def _covered(self, released: Effects) -> frozenset[str]:
         """Return the labels of parameters that an effect in the list covers under another name."""
         names = {candidate.name for candidate in self.candidates}
-        return frozenset(parameter.label for parameter in freed if parameter.covered_by in names)
+        return frozenset(parameter.label for parameter in released if parameter.covered_by in names)
 
     def _prune(self, hypothesis: Hypothesis) -> Hypothesis:
         """Return a set without its needless base parameters, of which one stays.
@@ -126,23 +126,23 @@ class Search(FittedSets):
         Sets of the same effects with covered parameters alone, or with needless ones beside them,
         are left out.
         """
-        best, covered = hypothesis, self._covered(hypothesis.freed)
-        while len(best.freed) > 1:
+        best, covered = hypothesis, self._covered(hypothesis.released)
+        while len(best.released) > 1:
             # Another way may have led the same fewer to a worse minimum before.
-            every = [self.without(best, (parameter,), again=True) for parameter in best.freed]
+            every = [self.without(best, (parameter,), again=True) for parameter in best.released]
             fewer = min(every, key=lambda hypothesis: hypothesis.bic)
             if not self._needless(best, fewer):
                 break
             best = fewer
-        if len(best.freed) == 1 and label_of(best.freed) <= covered:
+        if len(best.released) == 1 and label_of(best.released) <= covered:
             self._by_its_effect(best)
-        needed = label_of(best.freed)
-        for competitor in self.found:
-            freed = label_of(competitor.freed)
-            needless = len(freed) == 1 or needed < freed
+        needed = label_of(best.released)
+        for competitor in self.hypotheses:
+            released = label_of(competitor.released)
+            needless = len(released) == 1 or needed < released
             if (
                 label_of(competitor.effects) == label_of(hypothesis.effects)
-                and freed & covered
+                and released & covered
                 and needless
             ):
                 self.leave_out(competitor)
@@ -161,31 +161,33 @@ class Search(FittedSets):
         return less or (bool(hypothesis.effects) and self.enough(fewer))
 
     def _by_its_effect(self, hypothesis: Hypothesis) -> None:
-        """Fit a set with the effect that covers its one freed parameter, beside where that led."""
-        (freed,) = hypothesis.freed
+        """Fit a set with the effect that covers its one released parameter, from where that led."""
+        (released,) = hypothesis.released
         for effect in self.candidates:
-            if effect.name == freed.covered_by and may_be_together((*hypothesis.effects, effect)):
+            if effect.name == released.covered_by and may_be_together(
+                (*hypothesis.effects, effect)
+            ):
                 values = hypothesis.values_of(hypothesis.effects)
                 for start in effect.starts:
                     self.fitted((*hypothesis.effects, effect), np.append(values, start), again=True)
 
-    def _free_beside(self, hypothesis: Hypothesis) -> None:
+    def _release_beside(self, hypothesis: Hypothesis) -> None:
         """Fit a set of effects with the base parameters that it leaves at their bounds, free.
 
         Beside an effect others may be out of tolerance than those that carry its misfit alone.
         Where the best set of its size explains the misfit in another form of its laws, or where no
-        forms are known, an amplitude out of tolerance may stand for the form: none is freed.
+        forms are known, an amplitude out of tolerance may stand for the form: none is released.
         """
         rules = self.data.rules
         least = rules.explained_part_share * (hypothesis.fit.chi_square - self.degrees_of_freedom)
         least = max(least, rules.single_effect_gain)
         bounded = self.data.out_of_tolerance(hypothesis.fit.at_bounds, together=True)
-        if hypothesis.freed or not bounded or gain_of_freed(hypothesis.fit, bounded) < least:
+        if hypothesis.released or not bounded or gain_of_released(hypothesis.fit, bounded) < least:
             return
         best = self.of_size(len(hypothesis.members))[0]
-        if self.forms.rest(best.fit) is None or self.forms.explains(best):
+        if self.forms.unexplained(best.fit) is None or self.forms.explains(best):
             return
-        released, fitted = freed_together(self.data, hypothesis.fit)
+        released, fitted = released_together(self.data, hypothesis.fit)
         names = {candidate.name for candidate in hypothesis.candidates}
         uncovered = [candidate for candidate in released if candidate.covered_by not in names]
         needed = tuple(
@@ -195,21 +197,21 @@ class Search(FittedSets):
             self.fitted((*hypothesis.candidates, *needed), fitted.values)
 
     def _prune_near(self, size: int) -> None:
-        """Fit the best sets of effects and freed parameters without the needless parameters."""
+        """Fit the best sets of effects and released parameters without the needless parameters."""
         for hypothesis in self.of_size(size):
-            mixed = hypothesis.freed and hypothesis.effects
+            mixed = hypothesis.released and hypothesis.effects
             if not mixed or label_of(hypothesis.candidates) in self._left_out:
                 continue
             if self.may_come_as_near(hypothesis, self.of_size(size)[0]):
                 self._prune(self.finished(hypothesis))
 
     def _extend(self, hypothesis: Hypothesis, by_part: bool = True) -> None:
-        """Fit a set with each effect that removes most of what it leaves, or with freed bounds."""
+        """Fit a set with each effect that removes most of what it leaves, or with bounds released."""
         label = label_of(hypothesis.candidates)
         if label in self._extended or label in self._left_out:
             return
         self._extended.add(label)
-        self._free_beside(hypothesis)
+        self._release_beside(hypothesis)
         if not (candidates := self._further(hypothesis)):
             return
         self.add_evident(hypothesis, candidates)
@@ -224,7 +226,7 @@ class Search(FittedSets):
         before, after = (self.data.excess(fitted) for fitted in (self.base, hypothesis.fit))
         ill = ill_explained(before, after, rules) if by_part and not hypothesis.exact else []
         of_ill = [(part, float(after.of_parts[part])) for part in ill]
-        chosen = most_hopeful(
+        chosen = shortlist(
             self.data, hypothesis.fit, candidates, self._known(candidates), excess, of_ill
         )
         for effect in chosen:
@@ -239,7 +241,7 @@ class Search(FittedSets):
         return [
             candidate
             for candidate in self.candidates
-            if candidate.frees is None
+            if candidate.releases is None
             and all(candidate.goes_with(member) for member in hypothesis.candidates)
         ]
 
@@ -247,7 +249,9 @@ class Search(FittedSets):
         """Fit a set with effects that remove what its laws do not explain in any form."""
         small = len(hypothesis.members) < self.data.rules.most_effects
         effects = (
-            self.forms.beside(hypothesis, self._known(self._further(hypothesis))) if small else []
+            self.forms.shortlisted_beside(hypothesis, self._known(self._further(hypothesis)))
+            if small
+            else []
         )
         for effect in effects:
             self.fitted(
@@ -282,7 +286,7 @@ class Search(FittedSets):
         An inertia moves resonances past lines: to first order it does next to nothing for them.
         """
         rules = self.data.rules
-        if misfit_of(self.found[0], self.degrees_of_freedom) <= rules.contradicting_chi_square:
+        if misfit_of(self.hypotheses[0], self.degrees_of_freedom) <= rules.contradicting_chi_square:
             return
         for candidate in self._further(leading):
             if candidate.exact and len(candidate.parameters) == 1 and len(candidate.starts) > 1:
@@ -297,7 +301,7 @@ class Search(FittedSets):
         are replaced by each other one, too, where effects alone leave more than noise: only those
         that to first order take most of the rest were tried before.
         """
-        open_to_curves = not (self.enough(hypothesis) or hypothesis.freed)
+        open_to_curves = not (self.enough(hypothesis) or hypothesis.released)
         for member in hypothesis.candidates:
             others = tuple(
                 candidate for candidate in hypothesis.candidates if candidate is not member

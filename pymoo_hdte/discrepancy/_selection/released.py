@@ -27,13 +27,14 @@ def in_free_form(data: Evidence, fitted: Fit) -> Fit:
     """Return a set of effects fitted further with the sizes of its corrections as unknowns.
 
     So far as to rank it: around the end, what forms could still do is taken to first order. The
-    same fit if none of them can be larger: see `_freed`.
+    same fit if none of them can be larger: see `_with_free_form`.
     """
-    freed = [
-        _freed(candidate, data.corrections(candidate) or ()) for candidate in fitted.candidates
+    released = [
+        _with_free_form(candidate, data.corrections(candidate) or ())
+        for candidate in fitted.candidates
     ]
     start = [fitted.values[: fitted.n_base]]
-    for (candidate, place), corrected in zip(fitted.places, freed, strict=True):
+    for (candidate, place), corrected in zip(fitted.places, released, strict=True):
         start += [
             fitted.values[place],
             np.zeros(len(corrected.parameters) - len(candidate.parameters)),
@@ -41,10 +42,10 @@ def in_free_form(data: Evidence, fitted: Fit) -> Fit:
     values = np.concatenate(start)
     if len(values) == len(fitted.values):
         return fitted
-    return fit(data, freed, values, settled=data.rules.trial_gain)
+    return fit(data, released, values, settled=data.rules.trial_gain)
 
 
-def _freed(candidate: Candidate, corrections: Sequence[Any]) -> Candidate:
+def _with_free_form(candidate: Candidate, corrections: Sequence[Any]) -> Candidate:
     """Return a candidate with the sizes of its corrections as unknowns beside its own.
 
     Those that have no ``times``, or none but themselves, are left out: data are close to linear in
@@ -71,34 +72,37 @@ def _freed(candidate: Candidate, corrections: Sequence[Any]) -> Candidate:
     return replace(candidate, parameters=parameters, starts=starts, build=build)
 
 
-def freed_together(data: Evidence, fitted: Fit) -> tuple[tuple[Candidate, ...], Fit]:
+def released_together(data: Evidence, fitted: Fit) -> tuple[tuple[Candidate, ...], Fit]:
     """Return the parameters that a fit leaves at a bound, free, and its set fitted with them.
 
-    Freeing some may carry others to their bounds, which are freed in a further round.
+    Freeing some may carry others to their bounds, which are released in a further round.
     """
-    freed: tuple[Candidate, ...] = ()
+    released: tuple[Candidate, ...] = ()
     released_fit = fitted
     for _ in range(data.rules.most_freed_rounds):
-        names = {candidate.frees for candidate in freed}
+        names = {candidate.releases for candidate in released}
         bounded = data.out_of_tolerance(released_fit.at_bounds, together=True)
-        further = [candidate for candidate in bounded if candidate.frees not in names]
+        further = [candidate for candidate in bounded if candidate.releases not in names]
         if not further:
             break
-        freed = (*freed, *further)
+        released = (*released, *further)
         released_fit = fit(
-            data, (*fitted.candidates, *freed), released_fit.values, settled=data.rules.trial_gain
+            data,
+            (*fitted.candidates, *released),
+            released_fit.values,
+            settled=data.rules.trial_gain,
         )
-    return freed, released_fit
+    return released, released_fit
 
 
-def gain_of_freed(fitted: Fit, freed: Sequence[Candidate]) -> float:
+def gain_of_released(fitted: Fit, released: Sequence[Candidate]) -> float:
     """Return by how much chi-square would fall if parameters that a fit left at bounds were free.
 
     To first order. For 22 of 25 sets of the blind bench that was right to 0.05 of the chi-square
     that they left beyond the noise, for the others to 0.27.
     """
     movable = fitted.bound_sides == 0.0
-    names = {candidate.frees for candidate in freed}
+    names = {candidate.releases for candidate in released}
     wider = movable | [parameter.name in names for parameter in fitted.parameters]
     removed = [
         float(np.sum((basis_of(fitted.jacobian[:, columns]).T @ fitted.residuals) ** 2))
