@@ -1,4 +1,4 @@
-"""What forbids to name a set of effects plainly."""
+"""Reasons why a set of effects cannot be named without qualification."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ from pymoo_hdte.discrepancy._selection.search import Search
 
 
 def reasons_of(search: Search, chosen: Hypothesis, held_out: HeldOutTest | None) -> list[Reason]:
-    """Return what forbids to name a set plainly; nothing if it may be named."""
+    """Return why a set cannot be named without qualification; nothing if it can."""
     reasons, fitted = [], chosen.fit
     unsure = uncertain(fitted, search.data.rules)
     for candidate, bounded in bounded_unknowns(fitted):
@@ -62,9 +62,9 @@ def reasons_of(search: Search, chosen: Hypothesis, held_out: HeldOutTest | None)
 
 
 def other_forms(search: Search, chosen: Hypothesis) -> list[Reason]:
-    """Return which members stand for what their listed forms do not explain.
+    """Return which members explain the misfit only in another form than the listed one.
 
-    All together where the listed forms contradict a part of the data and only others do not.
+    It is all members together if the listed forms contradict a part of the data and others do not.
     """
     members = chosen.members if len(chosen.members) > 1 else []
     labels = [
@@ -90,7 +90,7 @@ def explains_as_listed(search: Search, hypothesis: Hypothesis) -> bool:
 
 
 def _harmonics_of_another(candidates: Sequence[Candidate]) -> list[Reason]:
-    """Return which effects may be no more than harmonics of the form of another.
+    """Return which effects may be mere harmonics of another effect's form.
 
     A clearance that varies once in some angle need not do so as a cosine; its harmonics look like
     an error of their order. Effects that fit down to the noise as listed leave no such choice.
@@ -110,12 +110,12 @@ def is_harmonic(higher: float, order: float) -> bool:
 
 
 def above_noise(per_degree: float) -> Reason:
-    """Return what a chi-square per degree of freedom means."""
+    """Return that more than noise is left, for a chi-square per degree of freedom."""
     return Reason.of(ABOVE_NOISE, numbers={"times_noise": np.sqrt(per_degree)})
 
 
 def _released_at_bounds(chosen: Hypothesis) -> dict[str, float]:
-    """Return the base values that a set frees and that ended at a bound."""
+    """Return the base values that a set releases and that ended at a bound."""
     fitted = chosen.fit
     released = {candidate.releases for candidate in chosen.candidates} & set(fitted.at_bounds)
     # Parameters of effects follow those of the base, and may have the same names.
@@ -126,11 +126,11 @@ def _released_at_bounds(chosen: Hypothesis) -> dict[str, float]:
 
 
 def _contradicted_in_any_form(search: Search, chosen: Hypothesis) -> list[str]:
-    """Return what is `_contradicted` by a set, and not by the listed forms of its laws alone.
+    """Return which sensors a set contradicts in every form of its laws.
 
-    A friction that falls as no listed one does is fitted best with a wrong gain. If in a free form
-    of several laws all sensors are as stated and noise is left, which is so in no form without one
-    of these laws, the gain stood for their forms. One law in any form follows too much alone.
+    Friction that falls as no listed one does is fitted best with a wrong gain. If several laws in a
+    free form leave only noise with all sensors as stated, and fewer laws do not, the gain stood for
+    the form. A single law in a free form can follow too much to show this.
     """
     rules, forms = search.data.rules, search.forms
     names = _contradicted(chosen.fit, rules)
@@ -145,9 +145,9 @@ def _contradicted_in_any_form(search: Search, chosen: Hypothesis) -> list[str]:
 
 
 def _contradicted(fitted: Fit, rules: Rules) -> list[str]:
-    """Return what ended at a bound far beyond its stated deviation: a sensor's zero or gain.
+    """Return the zeros and gains of sensors that ended at a bound far beyond what is stated.
 
-    It then takes what the effects leave, and what they are is not known.
+    They then absorb what the effects leave, so that the effects are not certain.
     """
     excess = beyond_stated(fitted, rules)
     return [
@@ -162,9 +162,10 @@ def _contradicted(fitted: Fit, rules: Rules) -> list[str]:
 def uncertain(
     fitted: Fit, rules: Rules, covariance: NDArray[np.float64] | None = None
 ) -> list[Candidate]:
-    """Return the candidates of a fit whose strength may be nothing.
+    """Return the candidates of a fit whose strength may be zero.
 
-    By its own covariance, or by another one that reports state, shape (n_parameters, n_parameters).
+    ``covariance``, shape (n_parameters, n_parameters), is that of the fit unless a report states
+    another one.
     """
     return [
         candidate
@@ -185,10 +186,10 @@ def strength_is_certain(
     rules: Rules,
     covariance: NDArray[np.float64] | None = None,
 ) -> bool:
-    """Tell whether the strength of an effect differs from nothing, by the noise of the records.
+    """Tell whether the strength of an effect differs from zero by more than the noise.
 
-    Strengths are the unknowns that may be zero, lines with both their parts; one of them is enough:
-    friction that falls with speed may have no level. Shapes, which are not zero, do not count.
+    Strengths are the unknowns that may be zero; a line counts with both its parts. One strength
+    suffices: friction that falls with speed may have no level. Shapes do not count.
     """
     if not candidate.parameters:
         return True
@@ -207,7 +208,7 @@ def strength_is_certain(
 def varies(
     law: Candidate, values: NDArray[np.float64], covariance: NDArray[np.float64], rules: Rules
 ) -> bool:
-    """Tell whether any line of a law differs from nothing, by values (k,) and covariance (k, k)."""
+    """Tell whether any line of a law differs from zero, by values (k,) and covariance (k, k)."""
     limit = chi2.isf(2.0 * norm.sf(rules.certain_deviations), 2)
     return any(
         values[pair] @ np.linalg.solve(covariance[np.ix_(pair, pair)], values[pair]) > limit
