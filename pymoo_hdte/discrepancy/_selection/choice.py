@@ -1,9 +1,9 @@
-"""Which of the sets that a search has found a verdict chooses.
+"""How a verdict chooses among the sets that a search has fitted.
 
-The one of least BIC that explains the misfit, or a special case of it that does as well, without
-small members that the data deny. Where none explains the misfit, the one effect that does so in
-another form of its law than the library holds: the listed form may remove next to nothing of what
-another form does, where the base imitates what most forms of the law share.
+It chooses the set of least BIC that explains the misfit, or a special case of it that does as well,
+without small members that the data deny. If no set explains the misfit, it chooses a single effect
+that does so in another form than the listed one. The listed form may then remove next to nothing,
+since the base imitates what most forms of the law share.
 """
 
 from __future__ import annotations
@@ -33,10 +33,10 @@ from pymoo_hdte.discrepancy._selection.search import Search
 
 
 def best_set(search: Search) -> Hypothesis:
-    """Return the set of least BIC of those that explain the misfit, of all if none does.
+    """Return the set of least BIC that explains the misfit, or of least BIC if none does.
 
-    A set of several effects counts only if each of them is earned. What is fitted on the way, as
-    the set without one of them, counts too.
+    A set of several effects counts only if each member is significant. Sets that are fitted in the
+    course of this, such as those without one member, count too.
     """
     hypotheses: list[Hypothesis] = []
     while hypotheses != search.hypotheses:
@@ -47,12 +47,12 @@ def best_set(search: Search) -> Hypothesis:
                 explains_in_any_form(search, hypothesis) and search.is_significant(hypothesis)
             ),
         ) or _least_that(search, search.is_significant)
-    assert best is not None, "a single effect is earned"
+    assert best is not None, "a single effect is always significant"
     return best
 
 
 def _least_that(search: Search, passes: Callable[[Hypothesis], bool]) -> Hypothesis | None:
-    """Return the set of least BIC that passes, of all that are known once it has been judged."""
+    """Return the set of least BIC that passes, among all that are known after its test."""
     passed: set[Hypothesis] = set()
     refused: set[Hypothesis] = set()
     while open_sets := [
@@ -65,11 +65,11 @@ def _least_that(search: Search, passes: Callable[[Hypothesis], bool]) -> Hypothe
 
 
 def special_case(search: Search, best: Hypothesis) -> Hypothesis:
-    """Return the special case of a set that does as well as the forms of laws allow to tell.
+    """Return the special case of a set that does as well, if there is one; otherwise the set.
 
-    What it leaves beyond the set is then the model's own error, or the set ended at a bound: there
-    lies a simpler law, or one that these data do not show. Dry friction that falls within less than
-    the slowest speed is dry friction; one that falls by a hundredth may be, and is in its class.
+    The special case leaves no more than the model's own error beyond the set, or the set ended at a
+    bound. There the law is its special case, or these data do not show what it adds. Dry friction
+    that falls within less than the slowest speed is plain dry friction.
     """
     error = search.data.rules.model_accuracy**2 * search.excess
     if is_bounded(best.fit):
@@ -97,8 +97,8 @@ def special_case(search: Search, best: Hypothesis) -> Hypothesis:
 def confirmed(search: Search, chosen: Hypothesis) -> Hypothesis:
     """Return a set without small members that held-out records or their own intervals deny.
 
-    What a member removes beside others that leave no more than noise, fitted and held-out records
-    taken together, has to be more than noise gives, and its strength has to differ from nothing.
+    This concerns members beside others that leave only noise. On fitted and held-out records
+    together such a member has to remove more than noise gives, and its strength must not be zero.
     """
     rules, smaller = search.data.rules, []
     doubted = uncertain(chosen.fit, rules)
@@ -120,10 +120,10 @@ def confirmed(search: Search, chosen: Hypothesis) -> Hypothesis:
 
 
 def simpler_law(search: Search, chosen: Hypothesis) -> Hypothesis:
-    """Return the special case of a set that leaves about as little, where neither explains enough.
+    """Return the special case of a set that leaves about as little, if neither explains enough.
 
-    A law with more unknowns follows more of the form of any other law: that it leaves less of a
-    misfit that is no noise does not show it.
+    A law with more unknowns also follows more of the form of any other law. That it leaves less of
+    a misfit that is not noise does not show that it is there.
     """
     limit = search.data.rules.form_ratio * left_beyond_noise(search, chosen)
     special = (
@@ -142,9 +142,9 @@ def left_beyond_noise(search: Search, hypothesis: Hypothesis) -> float:
 
 
 def competing_by_evidence(search: Search, chosen: Hypothesis) -> list[Hypothesis]:
-    """Return the sets of as many effects and values as the chosen one that no evidence tells apart.
+    """Return the sets of as many effects and values that evidence cannot separate from the chosen.
 
-    A law that contains the chosen one follows more of any form, and is none.
+    A law that contains the chosen one is left out, since it follows more of any form.
     """
     return [
         hypothesis
@@ -159,11 +159,11 @@ def competing_by_evidence(search: Search, chosen: Hypothesis) -> list[Hypothesis
 
 
 def stands_out(search: Search, chosen: Hypothesis, together: Sequence[Hypothesis] = ()) -> bool:
-    """Tell whether a set is certain as far as it goes, alone or ``together`` with its twins.
+    """Tell whether a set is certain as far as it goes, alone or ``together`` with competing sets.
 
-    It removes most of the misfit, and all other sets of its size leave plainly more: what is left
-    may be the form of a law, or a further effect. Sets that say the same and more do not count as
-    others; those that the screening left out are far behind.
+    It removes most of the misfit, and all other sets of its size leave clearly more. What remains
+    may be the form of a law or a further effect. Sets that contain its effects do not count as
+    others, and those that the screening left out are far behind.
     """
     rules = search.data.rules
     competing = (
@@ -185,16 +185,16 @@ def replaced(
 ) -> list[Hypothesis]:
     """Return sets that explain the misfit with another effect in the place of some members.
 
-    What could follow the form of any law in a part of the data is no explanation unless it leaves
-    plainly less than what it replaces, or noise: elsewhere the sets are left out.
+    A replacement that could follow the form of any law has to leave clearly less than the effects
+    that it replaces, or only noise. Sets in which it does not are left out of all comparisons.
 
     Parameters
     ----------
     search : Search
     chosen : Hypothesis
-        The set that it found: if that leaves no more than noise, only its members are replaced.
-    others : sequence of Candidate
-        Which effects they may replace, they say.
+        Chosen set; if it leaves only noise, only its members are replaced.
+    replacements : sequence of Candidate
+        Effects that may replace others, by `Candidate.replaces`.
     """
     rules = search.data.rules
     leading = [
@@ -229,18 +229,18 @@ def replaced(
 def in_another_form(
     search: Search, chosen: Hypothesis, screened: Sequence[Screened]
 ) -> list[Hypothesis]:
-    """Return what explains the misfit in another form, the best as listed first.
+    """Return the sets that explain the misfit in another form, by rising BIC of their listed form.
 
-    Single effects, or else the chosen set.
+    They are single effects, or the chosen set if no single effect does.
 
     Parameters
     ----------
     search : Search
-        In which no set explains the misfit.
+        Search in which no set explains the misfit.
     chosen : Hypothesis
-        The set that comes nearest to it.
+        Set that comes closest to explaining it.
     screened : sequence of Screened
-        All candidates beside its base; none if only the sets that it knows are compared.
+        All candidates, screened beside the base; empty if only known sets are compared.
     """
     if any(search.data.corrections(candidate) is None for candidate in search.candidates[:1]):
         return []
@@ -265,8 +265,8 @@ def in_another_form(
 def _explains(search: Search, hypothesis: Hypothesis) -> bool:
     """Tell whether a set explains the misfit in another form, and is more than that form.
 
-    A load on a soft sensor moves as further inertia would in some form, of which none is there: the
-    strength of an effect of exact form has to be certain beside its corrections.
+    The strength of an effect of exact form has to be certain beside its corrections: a load on a
+    soft sensor moves like an added inertia in some form, although there is none.
     """
     if not search.forms.explains_in_another_form(hypothesis):
         return False
@@ -285,10 +285,10 @@ def _is_effect(hypothesis: Hypothesis) -> bool:
 
 
 def in_one_law(search: Search, chosen: Hypothesis) -> list[Hypothesis]:
-    """Return single effects that explain in another form what a set has a curve and lines for.
+    """Return single effects that explain in another form what a set explains by a curve and lines.
 
-    A clearance that varies once in some angle need not do so as a cosine: its harmonics are lines
-    at its port, beside a play that does not vary.
+    A clearance that varies once in some angle need not do so as a cosine. In a set it then appears
+    as a constant play and lines at the harmonics.
     """
     hypotheses = []
     for law in search.candidates:
@@ -300,7 +300,7 @@ def in_one_law(search: Search, chosen: Hypothesis) -> list[Hypothesis]:
 
 
 def _consists_of(chosen: Hypothesis, law: Candidate, order: float) -> bool:
-    """Tell whether a set is a law or its special case and lines of harmonics at the same port."""
+    """Tell whether a set is a law, or its special case, with lines of its harmonics at one port."""
     curves = [
         candidate
         for candidate in chosen.candidates
