@@ -1,6 +1,7 @@
-"""What a search tells: its chosen set, and sets that explain the data as well by something else.
+"""The chosen set of a search, and the sets that explain the data equally well by other effects.
 
-And whether data tell a law from its special case: a play that varies from one that does not.
+It also decides whether data separate a law from its special case, such as a play that varies from
+one that does not.
 """
 
 from __future__ import annotations
@@ -42,10 +43,10 @@ from pymoo_hdte.discrepancy._selection.search import Search
 
 
 class Answer(NamedTuple):
-    """A chosen set, sets that may be told with it, and what is certain of them.
+    """A chosen set, the sets equivalent to it, and what is certain of them.
 
-    ``certain`` is that it explains the data, ``foreign`` that another form of its law does, and
-    ``in_part`` that it stands out although more is left.
+    ``certain`` says that it explains the data, ``foreign`` that only another form of its law does,
+    and ``in_part`` that it stands out although more is left.
     """
 
     chosen: Hypothesis
@@ -56,7 +57,7 @@ class Answer(NamedTuple):
 
 
 def answer_of(search: Search, chosen: Hypothesis, screened: Sequence[Screened]) -> Answer:
-    """Return what a search tells of its chosen set: itself, or what stands for it."""
+    """Return the answer of a search: its chosen set, or the set that replaces it."""
     certain = explains_in_any_form(search, chosen)
     if not certain:
         chosen = simpler_law(search, chosen)
@@ -64,7 +65,7 @@ def answer_of(search: Search, chosen: Hypothesis, screened: Sequence[Screened]) 
     if not (certain and chosen.listed):
         foreign = in_another_form(search, chosen, screened)
         if not certain and explains_in_any_form(search, best_set(search)):
-            # One of the effects that were fitted only now does so as it is listed.
+            # An effect that was fitted only now explains the misfit in its listed form.
             chosen, certain, foreign = chosen_of(search), True, []
     if foreign:
         equivalent = [*foreign[1:], *([chosen] if certain else [])]
@@ -84,14 +85,14 @@ def answer_of(search: Search, chosen: Hypothesis, screened: Sequence[Screened]) 
 
 
 def chosen_of(search: Search) -> Hypothesis:
-    """Return the best set, or its special case that does as well, without doubted members."""
+    """Return the best set, or a special case that does as well, without uncertain members."""
     return confirmed(search, special_case(search, best_set(search)))
 
 
 def competing_sets(search: Search, chosen: Hypothesis) -> list[Hypothesis]:
     """Return the sets that explain the data as well as the chosen one by something else.
 
-    What contains one of them is a further one only where it comes near that, too.
+    A set that contains another of them counts only if it comes close to that one as well.
     """
     competing = [
         hypothesis
@@ -113,10 +114,10 @@ def competing_sets(search: Search, chosen: Hypothesis) -> list[Hypothesis]:
 
 
 def _comes_near(search: Search, hypothesis: Hypothesis, chosen: Hypothesis) -> bool:
-    """Tell whether a set says something else than another that the data do not tell from it.
+    """Tell whether a set competes with the chosen one: the data do not separate them.
 
-    A law that contains the other one and ends at its bound is the other one. Where its further
-    unknowns are determined, the evidence has told; where they are not, it is a rival.
+    A more general law whose extra parameter sits at its bound reduces to the special case and does
+    not compete. If the extra parameter is well determined, the evidence decides.
     """
     near = search.indistinguishable(hypothesis, chosen) or undecided(
         hypothesis, chosen, search.data.rules
@@ -126,10 +127,10 @@ def _comes_near(search: Search, hypothesis: Hypothesis, chosen: Hypothesis) -> b
 
 
 def _needs_fewer_values(search: Search, hypothesis: Hypothesis, chosen: Hypothesis) -> bool:
-    """Tell whether a set explains, in another form and with fewer values free, what another does.
+    """Tell whether a set explains in another form what the chosen one does with more values.
 
-    Of two laws at one port the values beside one may stand for the form of the other: a soft
-    wind-up with an error of the gears too large is nearly a play with a soft skin.
+    Released values beside a law may stand for the form of another law at the same port: a soft
+    wind-up with too large an error of the gears is nearly a play with a soft skin.
     """
     shared = label_of(hypothesis.effects) & label_of(chosen.effects)
     own, replaced = (
@@ -146,11 +147,11 @@ def _needs_fewer_values(search: Search, hypothesis: Hypothesis, chosen: Hypothes
 
 
 def with_one_more(search: Search, chosen: Hypothesis) -> list[Hypothesis]:
-    """Return what may be told before a set that leaves doubts: itself and one more effect.
+    """Return sets to prefer to a chosen one with caveats: its effects and one more.
 
-    Such a set leaves no more than noise with all its laws as they are listed, and no doubts. A drag
-    of any form holds a dry friction: where the drag alone needs sensors far from what is stated,
-    either may be true. The best first, and those that no evidence tells from it.
+    Such a set leaves only noise in the listed forms of its laws and has no caveats. A drag of any
+    form can imitate dry friction: if the drag alone needs sensors far from what is stated, either
+    may be true. The best set comes first, with those that the evidence does not separate from it.
     """
     rules, freedom = search.data.rules, search.degrees_of_freedom
     labels, released = label_of(chosen.candidates), label_of(chosen.released)
@@ -162,7 +163,7 @@ def with_one_more(search: Search, chosen: Hypothesis) -> list[Hypothesis]:
         and hypothesis.listed
         and chosen.bic - hypothesis.bic >= rules.bic_gain
     ]
-    # Where forms are not known, only what is listed was compared.
+    # Where forms are not known, only listed forms were compared.
     any_form = search.forms.forms_are_known(chosen.effects)
     if not (larger and any_form) or not reasons_of(search, chosen, None):
         return []
@@ -182,18 +183,18 @@ def with_one_more(search: Search, chosen: Hypothesis) -> list[Hypothesis]:
 
 
 def distinct(chosen: Hypothesis, equivalent: Sequence[Hypothesis]) -> list[Hypothesis]:
-    """Return the sets that name other effects, each once: one order or another is one effect."""
+    """Return the sets that name other effects, one for each names; orders are not told apart."""
     others = [hypothesis for hypothesis in equivalent if hypothesis.names != chosen.names]
     of_names = {hypothesis.names: hypothesis for hypothesis in reversed(others)}
     return list(reversed(of_names.values()))
 
 
 def undecided(hypothesis: Hypothesis, chosen: Hypothesis, rules: Rules) -> bool:
-    """Tell whether a set and the chosen one are a law and its special case, and either may be true.
+    """Tell whether two sets are a law and its special case, and either may be true.
 
-    A special case is not shown where its law may vary as much as it is strong: flanks that are held
-    by a load show a play that varies as a line of the static error, which has a tolerance. And a
-    law is not shown by a part of it so small that its special case in another form has it too.
+    The special case is not shown if the law may vary as much as it is strong. Flanks that a load
+    holds together show a varying play as a line of the static error, which has a tolerance. The
+    law is not shown if what it adds is so small that its special case in another form has it too.
     """
     if contains(hypothesis, chosen):
         pairs = differing(hypothesis.effects, chosen.effects)
@@ -211,7 +212,10 @@ def undecided(hypothesis: Hypothesis, chosen: Hypothesis, rules: Rules) -> bool:
 def _may_vary_as_much(
     of_law: Fit, law: Candidate, of_case: Fit, case: Candidate, rules: Rules
 ) -> bool:
-    """Tell whether a line that a law adds may be as strong as its special case, by its interval."""
+    """Tell whether the interval of a line that a law adds reaches the strength of its special case.
+
+    ``of_law`` and ``of_case`` are the fits of both.
+    """
     place, strength = _place(of_law, law), _strength(of_case, case)
     for line in law.lines:
         pair = place.start + line
@@ -223,10 +227,10 @@ def _may_vary_as_much(
 
 
 def _is_its_form(of_law: Fit, law: Candidate, of_case: Fit, case: Candidate, rules: Rules) -> bool:
-    """Tell whether what a law has beyond its special case is a small part of that.
+    """Tell whether what a law adds to its special case is a small part of it.
 
-    Of a law that varies as lines do: whether these may be nothing. What else the law is free in, as
-    the width of a play where the input was locked, does not show that it varies.
+    For a law with lines: whether all lines may be zero. Its other unknowns, such as the width of a
+    play where the input was locked, do not show that it varies.
     """
     place = _place(of_law, law)
     if law.lines:
@@ -242,19 +246,19 @@ def _is_its_form(of_law: Fit, law: Candidate, of_case: Fit, case: Candidate, rul
 
 
 def _place(fitted: Fit, candidate: Candidate) -> slice:
-    """Return where the values of a candidate stand in a fit."""
+    """Return the place of a candidate's values in a fit."""
     return next(place for member, place in fitted.places if member is candidate)
 
 
 def _strength(fitted: Fit, candidate: Candidate) -> float:
-    """Return the fitted strength of an effect, the first of its unknowns."""
+    """Return the fitted strength of an effect, which is its first unknown."""
     return abs(float(fitted.values[_place(fitted, candidate).start]))
 
 
 def complete(search: Search, chosen: Hypothesis) -> None:
     """Fit the sets that may explain as much as a chosen one of several members by other laws.
 
-    Single effects need none: the best were fitted in other forms and from other starts.
+    Single effects need no such fits: the best were fitted in other forms and from other starts.
     """
     _with_other_parts(search, chosen)
     _with_other_laws(search, chosen)
@@ -262,10 +266,10 @@ def complete(search: Search, chosen: Hypothesis) -> None:
 
 
 def _with_other_parts(search: Search, chosen: Hypothesis) -> None:
-    """Fit the sets in which a part of a chosen one is another that comes near it by itself.
+    """Fit the chosen set with a part of it replaced by a set that does nearly as well by itself.
 
-    Only the better one was extended: a screening beside the other would find the same further
-    effects, and takes longest where a line beats with those of the error.
+    The search extended only the better of the two. A screening beside the other would find the same
+    further effects, and takes longest if a line beats with those of the error.
     """
     whole, rules = label_of(chosen.candidates), search.data.rules
     for part in [
@@ -285,13 +289,11 @@ def _with_other_parts(search: Search, chosen: Hypothesis) -> None:
 
 
 def _with_other_laws(search: Search, chosen: Hypothesis) -> None:
-    """Fit sets with another law at the port of a member in all forms of it, from all starts.
+    """Fit sets with another law at the port of a member, in all its forms and from all starts.
 
-    Beside other members only one form was tried, from one start: those that do most by themselves.
-    A second spring beyond a torsion was named a soft wind-up, since only a cubic one was tried
-    beside the drag. A drift was named a new zero, since its fit had ended where it settles at once.
-    Only where another form can take most of what such a set leaves, or all but noise: not for
-    machines whose laws have no known forms.
+    Beside other members the search tries one form from one start. A second spring beyond a torsion
+    was thus named a soft wind-up, since only a cubic one was tried beside the drag. A set is fitted
+    only if other forms can remove most of what it leaves, or leave only noise.
     """
     for competitor in _competing_at_its_ports(search, chosen):
         if search.forms.unexplained_is_noise(competitor.fit) or search.leaves_forms(competitor):
@@ -301,9 +303,9 @@ def _with_other_laws(search: Search, chosen: Hypothesis) -> None:
 
 
 def _competing_at_its_ports(search: Search, chosen: Hypothesis) -> list[Hypothesis]:
-    """Return the best set of each names that has other laws at the same ports, told from it so far.
+    """Return for other names at the same ports the best set that does not compete so far.
 
-    One that is not told from the chosen set is in its class already.
+    A set that the data do not separate from the chosen one is in its class already.
     """
     of_names: dict[frozenset[tuple[str, str]], Hypothesis] = {}
     for hypothesis in search.of_size(len(chosen.members)):
@@ -322,7 +324,7 @@ def _competing_at_its_ports(search: Search, chosen: Hypothesis) -> list[Hypothes
 
 
 def _from_all_starts(search: Search, hypothesis: Hypothesis, member: Candidate) -> Hypothesis:
-    """Fit a set with each form of a member, from each start of it; return the best of them."""
+    """Return the best fit of a set with any form of a member, from any of its starts."""
     hypotheses, base = [hypothesis], hypothesis.fit.values[: hypothesis.fit.n_base]
     forms = [form for form in search.candidates if form.is_form_of(member)]
     for law in (member, *forms):
