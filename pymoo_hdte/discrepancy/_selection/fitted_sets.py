@@ -1,4 +1,4 @@
-"""Sets of effects fitted jointly with the base: first so far as to rank them, then to the end."""
+"""Sets of effects fitted jointly with the base: first just enough to rank them, then to the end."""
 
 from __future__ import annotations
 
@@ -29,21 +29,22 @@ Effects = tuple[Candidate, ...]
 
 
 class FittedSets:
-    """Sets of effects, what each explains, and whether their members are earned.
+    """Sets of effects, what each explains, and whether their members are significant.
 
     Parameters
     ----------
     data : Evidence
     base : Fit
-        Without any effect.
+        Fit without any effect.
 
     Attributes
     ----------
     forms : AnyForm
         What sets leave in any form of their laws.
     degrees_of_freedom : int
+        Degrees of freedom of the base.
     excess : float
-        Of the base, as of ``forms``.
+        Chi-square of the base beyond its degrees of freedom.
     """
 
     def __init__(self, data: Evidence, base: Fit) -> None:
@@ -59,7 +60,7 @@ class FittedSets:
 
     @property
     def hypotheses(self) -> list[Hypothesis]:
-        """All sets fitted so far that are no others under another name, by rising BIC."""
+        """All sets fitted so far except those left out, by rising BIC."""
         hypotheses = [
             hypothesis
             for label, hypothesis in self._by_label.items()
@@ -72,12 +73,12 @@ class FittedSets:
         return sorted(hypotheses, key=lambda hypothesis: hypothesis.bic)
 
     def of_size(self, size: int) -> list[Hypothesis]:
-        """Return the sets of so many members, by rising BIC."""
+        """Return the sets with this number of members, by rising BIC."""
         return [hypothesis for hypothesis in self.hypotheses if len(hypothesis.members) == size]
 
     @property
     def hopeless(self) -> float:
-        """Chi-square beyond which a fit will not come near a set that leaves no more than noise."""
+        """Chi-square beyond which a fit cannot compete with a set that leaves only noise."""
         best, rules = self.hypotheses[:1], self.data.rules
         if not (best and self.enough(best[0])):
             return np.inf
@@ -85,18 +86,18 @@ class FittedSets:
         return max(rules.contradicting_chi_square * best[0].fit.chi_square, share)
 
     def enough(self, hypothesis: Hypothesis) -> bool:
-        """Tell whether a set explains the data down to the noise, and has what is evident."""
+        """Tell whether a set explains the data down to the noise, with any evident effect."""
         return self.forms.leaves_noise(hypothesis) and not self.lacks_evident(hypothesis)
 
     def lacks_evident(self, hypothesis: Hypothesis) -> bool:
-        """Tell whether an effect is evident, and a set has none of those that it may be."""
+        """Tell whether a set lacks an evident effect, that is, has none that it may be."""
         evident = self.data.evident
         return bool(evident) and not any(
             candidate.name in evident for candidate in hypothesis.candidates
         )
 
     def add_evident(self, hypothesis: Hypothesis, candidates: Sequence[Candidate]) -> None:
-        """Fit a set that lacks what is evident with each of the others that it may be."""
+        """Fit a set that lacks an evident effect with each candidate that it may be."""
         for candidate in candidates if self.lacks_evident(hypothesis) else ():
             for start in candidate.starts if candidate.name in self.data.evident else ():
                 self.fitted(
@@ -106,13 +107,13 @@ class FittedSets:
                 )
 
     def leave_out_lacking(self) -> None:
-        """Leave out all sets that lack what is evident, if any has it."""
+        """Leave out all sets that lack an evident effect, if any set has it."""
         self._whole_only = not all(map(self.lacks_evident, self.hypotheses))
 
     def could_count(self, hypothesis: Hypothesis) -> bool:
         """Tell whether a further effect could be justified.
 
-        One at a bound may stand for two, and so may a zero or gain far beyond what is stated.
+        An effect at a bound may stand for two, as may a zero or gain far beyond what is stated.
         """
         if self.held_by_sensors(hypothesis) or self.lacks_evident(hypothesis):
             return True
@@ -123,9 +124,9 @@ class FittedSets:
         )
 
     def leaves_forms(self, hypothesis: Hypothesis) -> bool:
-        """Tell whether most of what a set leaves is what other forms of its laws do, at first.
+        """Tell whether other forms of its laws do most of what a set leaves, to first order.
 
-        Not where it leaves no more than noise with each of its laws within its listed form.
+        They do not if it leaves only noise and no unknown ended at a bound.
         """
         if self.enough(hypothesis) and not is_bounded(hypothesis.fit):
             return False
@@ -137,10 +138,10 @@ class FittedSets:
         return unexplained is not None and unexplained.excess <= limit * excess
 
     def leaves_form_of(self, hypothesis: Hypothesis, member: Candidate) -> bool:
-        """Tell whether another form may do better in the place of a member of a set.
+        """Tell whether another form of a member may do better in a set.
 
-        Where forms are most of what it leaves. And where it leaves more than noise beside a law
-        with memory: a loop that forgets is no sum of springs that slip, not even to first order.
+        It may if forms are most of what the set leaves, or if a law with memory leaves more than
+        noise: a loop that forgets is no sum of springs that slip, not even to first order.
         """
         return self.leaves_forms(hypothesis) or (member.remembers and not self.enough(hypothesis))
 
@@ -153,7 +154,7 @@ class FittedSets:
         )
 
     def is_significant(self, hypothesis: Hypothesis) -> bool:
-        """Tell whether each member is earned: without it the rest explains clearly less."""
+        """Tell whether each member is significant: without it a set explains clearly less."""
         members = hypothesis.members
         if len(members) == 1:
             return True
@@ -165,9 +166,9 @@ class FittedSets:
     def _member_is_significant(
         self, hypothesis: Hypothesis, member: Effects, simpler: Hypothesis
     ) -> bool:
-        """Tell whether a member is earned, as the listed laws go or in any form of the others.
+        """Tell whether a member is significant beside the others, as listed or in any form.
 
-        What is evident is.
+        An evident effect always is. ``simpler`` is the set without the member.
         """
         if self.lacks_evident(simpler) and not self.lacks_evident(hypothesis):
             return True
@@ -179,9 +180,9 @@ class FittedSets:
         )
 
     def _brings_sensors_back(self, hypothesis: Hypothesis, simpler: Hypothesis) -> bool:
-        """Tell whether sensors are as stated in a set, and in no form of the rest.
+        """Tell whether sensors are as stated in a set, and in no form of the simpler set.
 
-        A friction that grows with the load is a gain of the torque sensor nearly as well.
+        Friction that grows with the load is nearly a gain of the torque sensor.
         """
         least = self.data.rules.single_effect_gain * misfit_of(hypothesis, self.degrees_of_freedom)
         clear = simpler.fit.chi_square - hypothesis.fit.chi_square >= least
@@ -190,20 +191,20 @@ class FittedSets:
         return clear and back and self.beyond_stated(self.forms.in_free_form(simpler.fit)) > 0.0
 
     def held_by_sensors(self, hypothesis: Hypothesis) -> float:
-        """Return `beyond_stated` of a set that could be named plainly; 0 of others.
+        """Return `beyond_stated` of a set that could be named without qualification, else 0.
 
-        Where more is left, sensors take a share of it whatever is missing.
+        If more is left, sensors absorb a share of it whatever is missing.
         """
         misfit = misfit_of(hypothesis, self.degrees_of_freedom)
         plain = misfit <= self.data.rules.contradicting_chi_square
         return self.beyond_stated(hypothesis.fit) if plain else 0.0
 
     def beyond_stated(self, fitted: Fit) -> float:
-        """Return the chi-square of sensors' zeros and gains far beyond what is stated of them."""
+        """Return the chi-square of zeros and gains of sensors far from what is stated."""
         return float(beyond_stated(fitted, self.data.rules).sum())
 
     def without(self, hypothesis: Hypothesis, member: Effects, again: bool = False) -> Hypothesis:
-        """Return a set without one of its members, fitted to the end; ``again`` as of `fitted`."""
+        """Return a set without one member, fitted to the end; ``again`` as in `fitted`."""
         effects = tuple(candidate for candidate in hypothesis.candidates if candidate not in member)
         return self.finished(self.fitted(effects, hypothesis.values_of(effects), again))
 
@@ -215,10 +216,10 @@ class FittedSets:
         steps: int | None = None,
         hopeless: float = np.inf,
     ) -> Hypothesis:
-        """Return a set fitted from a start so far as to rank it, in ``steps`` as of `fit`.
+        """Return a set fitted from a start just enough to rank it.
 
-        A set that is known already is fitted ``again`` only where that is asked for, at most until
-        it arrives at the known fit; the better of both is kept. ``hopeless`` is as of `fit`.
+        A known set is returned as it is, or fitted ``again`` until it arrives at the known fit; the
+        better of both is stored. ``steps`` and ``hopeless`` are as in `fit`.
         """
         label = label_of(effects)
         known = self._by_label.get(label)
@@ -241,7 +242,7 @@ class FittedSets:
                 self._from_all_starts.add(label)
 
     def finished(self, hypothesis: Hypothesis, *starts: Vector) -> Hypothesis:
-        """Return a set fitted to the end: from its values and, unless resumed, other starts."""
+        """Return a set fitted to the end, from its values and, unless resumed, from other starts."""
         label = label_of(hypothesis.candidates)
         if label not in self._finished or starts:
             fitted_before = self._resumed or label in self._finished
@@ -257,13 +258,13 @@ class FittedSets:
         return self._by_label[label]
 
     def _finish_special_cases(self, hypothesis: Hypothesis) -> None:
-        """Fit special cases to the end that may come as near as a set, for `best_fit` to know."""
+        """Fit to the end the special cases that may come as near as a set, for `best_fit`."""
         for special in list(self._by_label.values()):
             if is_special_case(special, hypothesis) and self.may_come_as_near(special, hypothesis):
                 self.finished(special)
 
     def _reopen(self, special: Hypothesis) -> None:
-        """Let laws be fitted to the end again that do no better than this special case of them."""
+        """Mark for another fit the laws that do no better than this special case of them."""
         limit = special.fit.chi_square - self.data.rules.evidence_distance
         for label in list(self._finished):
             law = self._by_label[label]
@@ -271,10 +272,10 @@ class FittedSets:
                 self._finished.discard(label)
 
     def resume(self, hypotheses: Sequence[Hypothesis], go_on: bool = False) -> None:
-        """Fit sets from the values that another search has found on nearly the same data.
+        """Fit sets from the values that another search found on nearly the same data.
 
-        The chosen one first. Those that came nowhere near it are only evaluated.
-        Where the search is to ``go_on``, what it fits afterwards is fitted as in any search.
+        The first set is the chosen one. Sets that came nowhere near it are only evaluated. If the
+        search is to ``go_on``, all later fits are as in any search.
         """
         self._resumed = True
         chosen = hypotheses[0]
@@ -287,7 +288,7 @@ class FittedSets:
             ),
         ]
         for hypothesis in hypotheses:
-            # Measured from the chosen one: of the best one a member may not be earned.
+            # Measured from the chosen set: in the best one a member may not be significant.
             shortlisted = hypothesis in competing or self.may_come_as_near(hypothesis, chosen)
             self.fitted(
                 hypothesis.candidates, hypothesis.fit.values, steps=None if shortlisted else 0
@@ -299,14 +300,14 @@ class FittedSets:
         self._resumed = not go_on
 
     def leave_out(self, hypothesis: Hypothesis) -> None:
-        """Leave a set out of all that are compared: it is known under another name."""
+        """Leave a set out of all comparisons: it is known under another name."""
         self._left_out.add(label_of(hypothesis.candidates))
 
     def finish_near(self, size: int) -> None:
         """Fit the best sets of a size to the end, and those that may come as near.
 
-        If the best set leaves no more than noise (a single one with sensors as they are stated), or
-        the sets are known from another search, only those that may come as near.
+        Only the latter are fitted if the search was resumed, or if the best set leaves only noise
+        (and, for a single effect, all sensors are as stated).
         """
         for place in range(len(self.of_size(size))):
             ranked = self.of_size(size)
@@ -322,18 +323,18 @@ class FittedSets:
         rules = self.data.rules
         distance = rules.evidence_distance * misfit_of(best, self.degrees_of_freedom)
         if len(hypothesis.members) == 1:
-            # Forms that leave the same are alike however far apart by evidence.
+            # Forms that leave about the same compete, however far apart by evidence.
             distance = max(distance, rules.form_share**2 * best.removed)
         return hypothesis.bic - best.bic < rules.refit_margin * distance
 
 
 def is_special_case(hypothesis: Hypothesis, law: Hypothesis) -> bool:
-    """Tell whether a law with more unknowns contains a set."""
+    """Tell whether a set is a special case of a law that has more unknowns."""
     return contains(law, hypothesis) and len(hypothesis.fit.values) < len(law.fit.values)
 
 
 def may_be_together(effects: Effects) -> bool:
-    """Tell whether a machine may have all these effects, none of them twice."""
+    """Tell whether a machine may have all these effects together, none of them twice."""
     twice = len(label_of(effects)) < len(effects)
     return not twice and all(
         effect.goes_with(partner) for effect, partner in combinations(effects, 2)
@@ -347,13 +348,12 @@ def is_significant(
     simpler: Hypothesis,
     member: Sequence[Candidate],
 ) -> bool:
-    """Tell whether a set explains most of what is left without one of its members.
+    """Tell whether a set explains most of what is left by the ``simpler`` set without a member.
 
-    Beside laws of exact form whatever leads from a misfit down to the noise is earned, if it is
-    most of what they leave.
-    What a law without exact form leaves may be an error of its form: unless the whole set
-    explains the data down to the noise, a member must also be large relative to the base's
-    excess at the port of another, and relative to the model's own error elsewhere.
+    Beside laws of exact form a member that leads down to the noise is significant if it removes
+    most of what they leave. What other laws leave may be an error of their form. Unless the set
+    explains the data down to the noise, the member must then also be large compared with the base's
+    excess, at the port of another member, or with the model's own error elsewhere.
     """
     rules, degrees_of_freedom = data.rules, len(base.residuals) - len(base.values)
     if down_to_noise(simpler.fit, degrees_of_freedom, rules):
@@ -387,7 +387,7 @@ def is_significant(
 def ill_explained(before: Excess, after: Excess, rules: Rules) -> list[int]:
     """Return the parts of the data that contradict both a base and a fit, the worst first.
 
-    The worst one, and all others that the fit explains by no more than half.
+    They are the worst part and all others of which the fit explains less than half.
     """
     wrong = np.flatnonzero(before.significant(rules) & after.significant(rules))
     residual = after.of_parts[wrong] / before.of_parts[wrong]
@@ -396,9 +396,9 @@ def ill_explained(before: Excess, after: Excess, rules: Rules) -> list[int]:
 
 
 def beyond_stated(fitted: Fit, rules: Rules) -> NDArray[np.float64]:
-    """Return the chi-square by which zeros and gains of sensors are far beyond what is stated.
+    """Return by parameter the chi-square of values far beyond what is stated of them.
 
-    Of each parameter, shape (n_parameters,); zero where it is near or nothing is stated.
+    Shape (n_parameters,); zero where a value is near, or nothing is stated.
     """
     away = from_stated(fitted)
     return np.where(np.abs(away) > rules.false_alarm_deviations, away**2, 0.0)
