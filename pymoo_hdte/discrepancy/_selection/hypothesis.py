@@ -1,7 +1,7 @@
 """Hypotheses: sets of effects fitted jointly with the base, and the misfit that each explains.
 
-An effect that explains only one part of the data must not count as the cause of the others: see
-`excess`.
+An effect that explains only one part of the data must not count as the cause of the others, so that
+the excess is compared by part.
 """
 
 from __future__ import annotations
@@ -28,11 +28,11 @@ class Hypothesis:
     ----------
     fit : Fit
     bic : float
-        Chi-square + parameters x ln(residuals).
+        Bayesian information criterion: chi-square + parameters x ln(residuals).
     explained : float
-        Share of the base's excess chi-square that it removes; 1 leaves nothing but noise.
+        Share of the base's excess chi-square that the set removes; at 1 only noise is left.
     removed : float
-        By how much its chi-square is less than the base's.
+        Difference of the base's chi-square and that of the set.
     """
 
     fit: Fit
@@ -42,42 +42,42 @@ class Hypothesis:
 
     @property
     def candidates(self) -> tuple[Candidate, ...]:
-        """The effects."""
+        """Effects and released base parameters of the set."""
         return self.fit.candidates
 
     @property
     def listed(self) -> bool:
-        """Whether a verdict may name all of them."""
+        """Whether a verdict may name all candidates."""
         return all(candidate.listed for candidate in self.candidates)
 
     @property
     def exact(self) -> bool:
-        """Whether the forms of all of them are known exactly."""
+        """Whether the forms of all candidates are known exactly."""
         return all(candidate.exact for candidate in self.candidates)
 
     @property
     def released(self) -> tuple[Candidate, ...]:
-        """The base parameters out of tolerance among them."""
+        """Candidates that are base parameters released from their tolerance."""
         return tuple(candidate for candidate in self.candidates if candidate.releases is not None)
 
     @property
     def effects(self) -> tuple[Candidate, ...]:
-        """The others."""
+        """Candidates that are effects, not base parameters."""
         return tuple(candidate for candidate in self.candidates if candidate.releases is None)
 
     @property
     def label(self) -> str:
-        """Their labels in one word."""
+        """Labels of all candidates, joined by plus signs."""
         return "+".join(candidate.label for candidate in self.candidates)
 
     @property
     def members(self) -> list[tuple[Candidate, ...]]:
-        """The effects one by one; base parameters out of tolerance are one member together."""
+        """The effects one by one; released base parameters form one member together."""
         members = [(candidate,) for candidate in self.effects]
         return members + ([self.released] if self.released else [])
 
     def values_of(self, effects: Sequence[Candidate]) -> NDArray[np.float64]:
-        """Return the fitted values of the base and of some of the effects, in their order here."""
+        """Return the fitted values of the base and of some of its effects, in the order of both."""
         parts = [
             self.fit.values[place] for candidate, place in self.fit.places if candidate in effects
         ]
@@ -85,12 +85,12 @@ class Hypothesis:
 
     @cached_property
     def names(self) -> frozenset[tuple[str, str]]:
-        """Name and port of each; a value out of tolerance and the effect it stands for are one."""
+        """Name and port of each candidate, where a released value has those of its effect."""
         return frozenset(candidate.named_effect for candidate in self.candidates)
 
 
 def label_of(effects: Sequence[Candidate]) -> frozenset[str]:
-    """Return what tells a set of effects from others, whatever their order."""
+    """Return the labels of a set of effects, which identify it whatever their order."""
     return frozenset(candidate.label for candidate in effects)
 
 
@@ -105,20 +105,20 @@ def hypothesis_of(fitted: Fit, of_base: float) -> Hypothesis:
 
 
 def adequate(degrees_of_freedom: int, rules: Rules) -> float:
-    """Return chi-square per degree of freedom up to which a model is adequate; 1.15 for 1400."""
+    """Return the largest chi-square per degree of freedom of an adequate model; 1.15 for 1400."""
     return float(1.0 + rules.false_alarm_deviations * np.sqrt(2.0 / degrees_of_freedom))
 
 
 def down_to_noise(fitted: Fit, degrees_of_freedom: int, rules: Rules) -> bool:
-    """Tell whether a fit is `adequate`."""
+    """Tell whether the chi-square of a fit is that of noise, as of `adequate`."""
     return fitted.chi_square <= adequate(degrees_of_freedom, rules) * degrees_of_freedom
 
 
 def contradicted_parts(data: Evidence, base: Fit, fitted: Fit) -> NDArray[np.bool_]:
-    """Tell which parts of the data that contradict the base clearly contradict a fit, too.
+    """Tell which parts of the data contradict both the base and a fit, shape (parts,).
 
-    Shape (parts,), as `Excess` has them. If there are several records, the worst is left out: it
-    may be at a resonance, where no form is exact.
+    If there are several records, the worst of each part is left out: it may be at a resonance,
+    where no form is exact.
     """
     before, after, rules = data.excess(base), data.excess(fitted), data.rules
     worst = after.worst
@@ -132,8 +132,8 @@ def contradicted_parts(data: Evidence, base: Fit, fitted: Fit) -> NDArray[np.boo
 def bounded_unknowns(fitted: Fit) -> list[tuple[Candidate, dict[str, float]]]:
     """Return for each candidate of a fit its unknowns that ended at a bound, with their values.
 
-    A level that ended at zero is a part that the effect does not have, and a corner that ended as
-    sharp as points can resolve is a sharp corner.
+    A level of zero does not count, since the effect then lacks this part. Neither does a corner
+    that is as sharp as points can resolve.
     """
     bounded = []
     for candidate, place in fitted.places:
@@ -154,11 +154,11 @@ def is_bounded(fitted: Fit) -> bool:
 
 
 def expected_values(fitted: Fit, rules: Rules) -> NDArray[np.float64]:
-    """Return the values to be expected by a fit and its bounds, those around which intervals lie.
+    """Return the expected values by a fit and its bounds, shape (n_parameters,).
 
-    A base parameter that no record determines ends anywhere between its bounds, often at one of
-    them: to be expected is the middle. What an effect has beyond it, as an inertia beyond the
-    believed one, moves along. Shape (n_parameters,).
+    Intervals lie around these. A base parameter that no record determines ends anywhere between its
+    bounds; its expectation is the middle. Correlated values, such as an inertia beyond the nominal
+    one, move along.
     """
     n, variance = fitted.n_base, np.diag(fitted.covariance)
     layout = Layout(fitted.parameters)
@@ -173,7 +173,7 @@ def expected_values(fitted: Fit, rules: Rules) -> NDArray[np.float64]:
 
 
 def gains_enough(hypothesis: Hypothesis, base: Fit, rules: Rules) -> bool:
-    """Tell whether a set of effects reduces the criterion of the base enough for a name."""
+    """Tell whether a set of effects reduces the BIC of the base enough to be named."""
     unknowns = sum(candidate.unknowns for candidate in hypothesis.candidates)
     gain = base.chi_square - hypothesis.fit.chi_square
     return bool(gain - unknowns * np.log(len(base.residuals)) >= rules.bic_gain)
@@ -194,7 +194,7 @@ def explains(data: Evidence, hypothesis: Hypothesis, base: Fit, degrees_of_freed
 
 
 def misfit_of(hypothesis: Hypothesis, degrees_of_freedom: int) -> float:
-    """Return chi-square per degree of freedom that a set leaves, 1 at least: the unit of gains."""
+    """Return the chi-square per degree of freedom of a set, at least 1: the unit of gains."""
     return max(hypothesis.fit.chi_square / degrees_of_freedom, 1.0)
 
 
@@ -205,16 +205,15 @@ def indistinguishable(
     rules: Rules,
     overlap: bool = False,
 ) -> bool:
-    """Tell whether another hypothesis is indistinguishable from the chosen one with these data.
+    """Tell whether these data do not separate a hypothesis from the chosen one.
 
-    The true form of an effect may differ from the listed one. Two sets are therefore alike if what
-    one leaves beyond the other is no more than such forms leave, unless they differ by effects of
-    exact form only, or one is a special case of the other. Where even the chosen form leaves more
-    than noise, differences of chi-square are compared with this residual. Two laws at one port
-    ``overlap`` where other forms of both are known, beside the same values out of tolerance. Where
-    an effect of one stands for several base parameters of the other, the evidence alone tells. And
-    so it does where ``one`` has a form that only stands in for a listed one: the listed form is
-    compared as well, with room for its form.
+    The true form of an effect may differ from the listed one. Two sets therefore compete if one
+    leaves no more beyond the other than such forms do, unless they differ only by effects of exact
+    form or one is a special case of the other. If the chosen set leaves more than noise,
+    differences of chi-square are compared with what it leaves. The evidence alone decides if an
+    effect stands for several base parameters, or if the hypothesis has a form that only stands in
+    for a listed one. Two laws at one port ``overlap`` if other forms of both are known and the same
+    values are out of tolerance.
     """
     if hypothesis.names == chosen.names:
         return False
@@ -250,15 +249,15 @@ def indistinguishable(
 def near_by_evidence(
     hypothesis: Hypothesis, chosen: Hypothesis, degrees_of_freedom: int, rules: Rules
 ) -> bool:
-    """Tell whether the evidence does not tell a set from the chosen one."""
+    """Tell whether the evidence does not separate a set from the chosen one."""
     misfit = misfit_of(chosen, degrees_of_freedom)
     return hypothesis.fit.evidence - chosen.fit.evidence < rules.evidence_distance * misfit
 
 
 def _stands_for_parameters(hypothesis: Hypothesis, chosen: Hypothesis) -> bool:
-    """Tell whether two sets with effects have as many members, and different effects.
+    """Tell whether two sets have equally many members, but different effects.
 
-    More or fewer parameters beside the same effects are no other answer.
+    Other numbers of parameters beside the same effects are no other answer.
     """
     effects, replaced = label_of(hypothesis.effects), label_of(chosen.effects)
     return (
@@ -269,16 +268,16 @@ def _stands_for_parameters(hypothesis: Hypothesis, chosen: Hypothesis) -> bool:
 
 
 def leave_the_same(hypothesis: Hypothesis, chosen: Hypothesis, rules: Rules) -> bool:
-    """Tell whether two sets explain the data so nearly alike that the same must be missing."""
+    """Tell whether two sets leave so nearly the same that the same effect must be missing."""
     difference = abs(hypothesis.fit.chi_square - chosen.fit.chi_square)
     return difference <= rules.trial_gain * chosen.fit.chi_square
 
 
 def contains(hypothesis: Hypothesis, special: Hypothesis) -> bool:
-    """Tell whether a set is nested: it differs from another only by laws that contain the other's.
+    """Tell whether a set contains another: it differs only by laws that contain the other's.
 
-    Stribeck's friction without its excess is Coulomb's: it always explains as much. Beside its law
-    a set may have further values out of tolerance; beside the same laws they are no other law.
+    Stribeck friction without its excess is Coulomb friction, so that it always explains as much.
+    Beside a law that contains the other's a set may release further values.
     """
     released, special_released = label_of(hypothesis.released), label_of(special.released)
     if len(hypothesis.effects) != len(special.effects):
@@ -293,7 +292,7 @@ def contains(hypothesis: Hypothesis, special: Hypothesis) -> bool:
 def differing(
     members: Sequence[Candidate], replaced: Sequence[Candidate]
 ) -> list[tuple[Candidate, Candidate]]:
-    """Return in pairs the candidates by which two sets of one size differ, by their ports."""
+    """Return pairs of the candidates by which two sets of one size differ, ordered by port."""
     shared = Counter(_places(members)) & Counter(_places(replaced))
     unshared = (_beyond(candidates, shared) for candidates in (members, replaced))
     own, others = (
@@ -307,7 +306,7 @@ def _places(candidates: Sequence[Candidate]) -> list[tuple[str, str]]:
 
 
 def _beyond(candidates: Sequence[Candidate], shared: Counter[tuple[str, str]]) -> list[Candidate]:
-    """Return the candidates beyond those that are shared; a set may have one name twice."""
+    """Return the candidates beyond those that are shared; a set may hold a name twice."""
     remaining, beyond = Counter(shared), []
     for place, candidate in zip(_places(candidates), candidates, strict=True):
         if remaining[place]:
@@ -320,7 +319,7 @@ def _beyond(candidates: Sequence[Candidate], shared: Counter[tuple[str, str]]) -
 def fit_all(
     data: Evidence, base: Fit, chosen: Sequence[Screened], excess: float
 ) -> list[Hypothesis]:
-    """Fit candidates, each jointly with the given effects; by rising BIC."""
+    """Return the fits of each candidate jointly with those of the base, by rising BIC."""
     hypotheses = []
     for effect in chosen:
         fitted = fit(
