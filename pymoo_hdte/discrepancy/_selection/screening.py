@@ -1,10 +1,9 @@
 """Screening: which candidates could explain a misfit, by comparing their signatures with it.
 
-The signature of a candidate is the change of the features by a typical strength of it. The part
-that base parameters can imitate is projected out; the share of the misfit along the remainder is
-what the candidate could remove, to first order, with a free strength. This is wrong for strongly
-nonlinear effects only, so that several strengths are tried and the best candidates are then fitted
-without linearisation.
+The signature of a candidate is the change of the residuals by a typical strength of it. The part
+that base parameters can imitate is projected out. The misfit along the remainder is what the
+candidate could remove, to first order, with a free strength. Strongly nonlinear effects deviate
+from this: several strengths are tried, and the best candidates are fitted without linearisation.
 """
 
 from __future__ import annotations
@@ -22,9 +21,9 @@ from pymoo_hdte.discrepancy._selection.rules import Rules
 from pymoo_hdte.effects.unknowns import HARMONIC_NAMES
 
 _NONE = np.empty((0, 0))
-"""No signatures, and no moves."""
+"""Stands for no signatures, and for no moves."""
 _RANK = 1e-5
-"""Share of the largest singular value from which a direction counts."""
+"""Share of the largest singular value above which a direction counts."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,10 +34,11 @@ class Screened:
     ----------
     candidate : Candidate
     reduction : float
-        Of the whole chi-square.
+        Reduction of the whole chi-square, to first order.
     start : tuple of float
+        Values from which to fit it.
     by_part : tuple of float
-        The same for each part of the data alone, with parameters at bounds held there; empty for a
+        Reduction in each part of the data alone, with parameters at bounds held there; empty for a
         parameter out of tolerance.
     signatures : ndarray, shape (n_starts, n_residuals)
         Change of the residuals by each of its starts; empty for a parameter out of tolerance.
@@ -52,17 +52,17 @@ class Screened:
 
 
 def screen(data: Evidence, fitted: Fit, candidates: Sequence[Candidate]) -> list[Screened]:
-    """Return all candidates, the most promising first.
+    """Return all candidates as screened, by falling reduction.
 
-    Beside effects, parameters that ended at a bound may leave it inward: with an effect missing the
-    gain of a sensor goes to its bound, and comes back with the effect. Without effects they stay
-    there, so that noise alone removes no more than `Rules.single_effect_gain` says.
+    Beside effects, parameters that ended at a bound may move inward: the gain of a sensor goes to
+    its bound if an effect is missing, and comes back with the effect. Without effects they stay at
+    their bounds, so that noise alone removes no more than `Rules.single_effect_gain`.
 
     Parameters
     ----------
     data : Evidence
     fitted : Fit
-        The present model, perhaps with effects, whose misfit is to be explained.
+        Present model, perhaps with effects, whose misfit is to be explained.
     candidates : sequence of Candidate
     """
     orthonormal, residual = _beyond_parameters(fitted)
@@ -88,20 +88,20 @@ def shortlist(
 ) -> list[Screened]:
     """Return the effects that may remove most of what a fit leaves, in total or in a part of it.
 
-    If to first order none does in total, the best one is tried where it is promising.
+    If none does in total to first order, the best one is returned if it removes enough.
 
     Parameters
     ----------
     data : Evidence
     fitted : Fit
-    others : sequence of Candidate
-        Effects.
-    known : sequence of Screened
-        The same, as screened beside another model of these data; or nothing.
-    left : float
+    candidates : sequence of Candidate
+        Effects that may be added.
+    screened_before : sequence of Screened
+        The same effects as screened beside another model of these data, or nothing.
+    excess : float
         Excess chi-square of the fit.
     ill : sequence of (int, float)
-        Parts of the data that it explains ill, and their excess.
+        Parts of the data that the fit explains badly, with their excess.
     """
     rules = data.rules
     if screened_before:
@@ -128,8 +128,8 @@ def _not_far_behind(
 ) -> list[Candidate]:
     """Return the effects that are worth a screening, which takes a prediction for each start.
 
-    Their signatures beside another fit tell without any prediction. Effects that move a resonance
-    or take contact away change them, so that only candidates that stay far behind are left out.
+    Their signatures beside another fit take no prediction. Effects that move a resonance or take
+    contact away change them, so that only candidates far behind are left out.
     """
     share = data.rules.promising_share * data.rules.second_hope_share
     orthonormal, residual = _beyond_parameters(fitted)
@@ -149,7 +149,7 @@ def _not_far_behind(
 def _shortlist(
     screened: Sequence[Screened], reductions: Sequence[float], excess: float, rules: Rules
 ) -> list[Screened]:
-    """Return the best candidates, to first order, if they remove enough of what is left."""
+    """Return the best candidates to first order, if they remove enough of an excess."""
     order = np.argsort([-reduction for reduction in reductions], kind="stable")
     enough = [screened[k] for k in order if reductions[k] >= rules.second_hope_share * excess]
     return varied(enough, 1)[: rules.most_seconds]
@@ -164,22 +164,22 @@ def varied(screened: Sequence[Screened], most: int) -> list[Screened]:
 def reduced(
     effect: Screened, orthonormal: NDArray[np.float64], residual: NDArray[np.float64]
 ) -> Screened:
-    """Return a known candidate with what it could remove of another residual (n,).
+    """Return a screened candidate with what it could remove of another residual (n,).
 
-    What is done by other directions, orthonormal (n, k), is projected out of its signatures.
+    Orthonormal directions (n, k) that others can do are projected out of its signatures.
     """
     return _screened(effect.candidate, effect.signatures, orthonormal, residual, (), _NONE)
 
 
 def _beyond_parameters(fitted: Fit) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return what parameters can do, shape (n, k), orthonormal, and what they leave, (n,)."""
+    """Return an orthonormal basis of the parameters' changes (n, k), and what they leave (n,)."""
     # A parameter at its bound cannot move beyond it.
     orthonormal, _ = np.linalg.qr(fitted.jacobian[:, fitted.bound_sides == 0.0])
     return orthonormal, fitted.residuals - orthonormal @ (orthonormal.T @ fitted.residuals)
 
 
 def _inward(fitted: Fit, orthonormal: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return what parameters at bounds do beyond the others if they leave these, shape (k, n)."""
+    """Return the changes by parameters that leave their bounds, beyond the others, shape (k, n)."""
     bounded = fitted.bound_sides != 0.0
     moves = -(fitted.jacobian[:, bounded] * fitted.bound_sides[bounded])
     return np.asarray((moves - orthonormal @ (orthonormal.T @ moves)).T)
@@ -193,7 +193,7 @@ def _screened(
     parts: Sequence[NDArray[np.int_]],
     inward: NDArray[np.float64],
 ) -> Screened:
-    """Return what a candidate could remove, as a whole and in each part."""
+    """Return what a candidate could remove in total and in each part."""
     beyond = signatures - (signatures @ orthonormal) @ orthonormal.T
     by_part = tuple(
         _best_start(candidate, beyond[:, rows], residual[rows], _NONE).reduction for rows in parts
@@ -208,7 +208,7 @@ def _released(
     orthonormal: NDArray[np.float64],
     residual: NDArray[np.float64],
 ) -> Screened:
-    """Return the reduction by a parameter at its bound if it could go beyond."""
+    """Return the reduction by a parameter at its bound if it could move beyond it."""
     place = [parameter.name for parameter in fitted.parameters].index(str(candidate.releases))
     signature = fitted.jacobian[:, place] * fitted.bound_sides[place]
     signature = signature - orthonormal @ (orthonormal.T @ signature)
@@ -222,7 +222,7 @@ def _best_start(
     residual: NDArray[np.float64],
     inward: NDArray[np.float64],
 ) -> Screened:
-    """Return the reduction by the candidate, and the strengths that give it."""
+    """Return the largest reduction by a candidate, with the values that give it as start."""
     starts = np.array(candidate.starts)
     lower = np.array([parameter.lower for parameter in candidate.parameters])
     upper = np.array([parameter.upper for parameter in candidate.parameters])
@@ -254,14 +254,13 @@ def _one_by_one(
     inward: NDArray[np.float64],
     positive: bool,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the strength of each signature (k, n) alone, and the reduction by it, (k,)."""
+    """Return the strength of each signature (k, n) alone, and its reduction, both (k,)."""
     if len(inward):
         solutions = [
             _least_squares(signature[None], residual, inward, positive) for signature in signatures
         ]
-        return np.array([strength for (strength,), _ in solutions]), np.array(
-            [gain for _, gain in solutions]
-        )
+        gains = np.array([gain for _, gain in solutions])
+        return np.array([strength for (strength,), _ in solutions]), gains
     sizes = np.einsum("ij,ij->i", signatures, signatures)
     along = -signatures @ residual
     strengths = np.divide(along, sizes, out=np.zeros_like(along), where=sizes > 1e-12)
@@ -276,7 +275,8 @@ def _least_squares(
 ) -> tuple[NDArray[np.float64], float]:
     """Return the strengths of signatures (k, n) with the largest reduction, and that reduction.
 
-    Those of moves ``inward`` (m, n) are positive, of signatures only where they are ``positive``.
+    Strengths of moves ``inward`` (m, n) cannot be negative, nor can those of signatures if
+    ``positive``.
     """
     moves, columns = len(inward), signatures.T
     if moves:
@@ -295,7 +295,7 @@ def _least_squares(
 
 
 def basis_of(columns: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return an orthonormal basis of columns (n, m) that need not be independent, (n, k)."""
+    """Return an orthonormal basis (n, k) of columns (n, m), which may be dependent."""
     sizes = np.linalg.norm(columns, axis=0)
     nonzero = sizes > 0.0
     vectors, values, _ = np.linalg.svd(columns[:, nonzero] / sizes[nonzero], full_matrices=False)
