@@ -100,11 +100,7 @@ class FittedSets:
         """Fit a set that lacks an evident effect with each candidate that it may be."""
         for candidate in candidates if self.lacks_evident(hypothesis) else ():
             for start in candidate.starts if candidate.name in self.data.evident else ():
-                self.fitted(
-                    (*hypothesis.candidates, candidate),
-                    np.append(hypothesis.fit.values, start),
-                    again=True,
-                )
+                self.extended(hypothesis, candidate, start, again=True)
 
     def leave_out_lacking(self) -> None:
         """Leave out all sets that lack an evident effect, if any set has it."""
@@ -232,6 +228,17 @@ class FittedSets:
                 self._by_label[label] = trial
                 self._finished.discard(label)
         return self._by_label[label]
+
+    def extended(
+        self,
+        hypothesis: Hypothesis,
+        candidate: Candidate,
+        start: Sequence[float],
+        again: bool = False,
+    ) -> Hypothesis:
+        """Return a set with one more effect, fitted from its values and a start of the effect."""
+        values = np.append(hypothesis.fit.values, start)
+        return self.fitted((*hypothesis.candidates, candidate), values, again)
 
     def from_other_starts(self, sets: Sequence[Hypothesis]) -> None:
         """Fit single effects from all their starts, each once."""

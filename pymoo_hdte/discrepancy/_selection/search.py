@@ -1,8 +1,8 @@
 """Search for the set of effects that explains a misfit; sets that decide are fitted to the end.
 
-Sets grow by the effects that could remove most of what is left, in total, in the part of the data
-that is explained worst, or beyond all forms of their laws, and by the base parameters that they
-leave at bounds. Members are tried by exchange, too, and each has to be earned.
+Sets grow by the effects that could remove most of what is left: in total, in the part of the data
+that is explained worst, or beyond all forms of their laws. Base parameters that they leave at
+bounds are released as well. Members are also exchanged, and each has to be significant.
 """
 
 from __future__ import annotations
@@ -36,13 +36,13 @@ class Search(FittedSets):
     ----------
     data : Evidence
     base : Fit
-        Without any of them.
+        Fit without any effect.
     candidates : sequence of Candidate
         Effects that may be missing, and base parameters that may be out of tolerance.
     screened : sequence of Screened
-        The same beside the base, where they were screened.
+        These candidates as screened beside the base, if they were.
     forms_only : sequence of Candidate
-        Further forms of theirs, tried only in the place of another.
+        Further forms of effects, tried only instead of another form.
     """
 
     def __init__(
@@ -58,7 +58,7 @@ class Search(FittedSets):
         self._extended: set[frozenset[str]] = set()
 
     def singles(self) -> None:
-        """Fit the most promising single effects, and the base parameters out of tolerance."""
+        """Fit the shortlisted single effects, and the base parameters out of tolerance."""
         rules, screened = self.data.rules, self.screened
         least = rules.promising_share * screened[0].reduction
         shortlisted = [effect for effect in screened if effect.reduction >= least]
@@ -66,7 +66,7 @@ class Search(FittedSets):
             self.alone(effect)
         if self.hypotheses and self.hypotheses[0].explained < rules.explained_share:
             self.from_other_starts(self.of_size(1))
-        self._parameters()
+        self._release_parameters()
         self.finish_near(1)
         if not self.enough(self.hypotheses[0]):
             self.from_other_starts(self.hypotheses[:1])
@@ -74,7 +74,7 @@ class Search(FittedSets):
         self.finish_near(1)
 
     def grow(self) -> None:
-        """Fit sets of more effects as long as what is left could be that of a further one."""
+        """Fit sets of more effects as long as a further one could explain what is left."""
         rules, leading = self.data.rules, self.hypotheses[0]
         done = self.enough(leading) and not self.held_by_sensors(leading)
         if done or not self.could_count(leading):
@@ -94,14 +94,14 @@ class Search(FittedSets):
             self.finish_near(size + 1)
 
     def alone(self, effect: Screened) -> Hypothesis:
-        """Return a single effect, fitted so far as to rank it, beside one that leaves noise."""
+        """Return a single effect fitted just enough to rank it."""
         start = np.append(self.base.values, effect.start)
         return self.fitted((effect.candidate,), start, hopeless=self.hopeless)
 
-    def _parameters(self) -> None:
-        """Fit all base parameters that want to leave their tolerances together.
+    def _release_parameters(self) -> None:
+        """Fit all base parameters together that the data push out of their tolerances.
 
-        Those that stay within once others are free, or that gain nothing, keep their tolerances.
+        Those that stay within once others are released, or that gain nothing, keep their tolerances.
         If all of them together do no better than one effect, fewer are not tried.
         """
         released, fitted = released_together(self.data, self.base)
@@ -116,26 +116,26 @@ class Search(FittedSets):
                 self.fitted((parameter,), fitted.values)
 
     def _covered(self, released: Effects) -> frozenset[str]:
-        """Return the labels of parameters that an effect in the list covers under another name."""
+        """Return the labels of the released parameters that an effect in the list covers."""
         names = {candidate.name for candidate in self.candidates}
         return frozenset(parameter.label for parameter in released if parameter.covered_by in names)
 
     def _prune(self, hypothesis: Hypothesis) -> Hypothesis:
-        """Return a set without its needless base parameters, of which one stays.
+        """Return a set without needless released parameters, of which at least one stays.
 
-        Sets of the same effects with covered parameters alone, or with needless ones beside them,
-        are left out.
+        Sets of the same effects in which covered parameters stand alone, or with needless ones, are
+        left out.
         """
         best, covered = hypothesis, self._covered(hypothesis.released)
         while len(best.released) > 1:
-            # Another way may have led the same fewer to a worse minimum before.
+            # An earlier fit of the same fewer parameters may have ended at a worse minimum.
             every = [self.without(best, (parameter,), again=True) for parameter in best.released]
             fewer = min(every, key=lambda hypothesis: hypothesis.bic)
             if not self._needless(best, fewer):
                 break
             best = fewer
         if len(best.released) == 1 and label_of(best.released) <= covered:
-            self._by_its_effect(best)
+            self._replace_by_effect(best)
         needed = label_of(best.released)
         for competitor in self.hypotheses:
             released = label_of(competitor.released)
@@ -151,8 +151,8 @@ class Search(FittedSets):
     def _needless(self, hypothesis: Hypothesis, fewer: Hypothesis) -> bool:
         """Tell whether the parameter that a set has beyond ``fewer`` costs more than it removes.
 
-        Where more than noise is left, it has to remove as many times more. Beside an effect it is
-        needless, too, where without it no more than noise is left: it may stand for a law's form.
+        The cost grows with the misfit. Beside an effect a parameter is also needless if only noise
+        is left without it, since it may stand for the form of a law.
         """
         cost = misfit_of(hypothesis, self.degrees_of_freedom) * np.log(
             len(hypothesis.fit.residuals)
@@ -160,7 +160,7 @@ class Search(FittedSets):
         less = fewer.fit.chi_square - hypothesis.fit.chi_square <= cost
         return less or (bool(hypothesis.effects) and self.enough(fewer))
 
-    def _by_its_effect(self, hypothesis: Hypothesis) -> None:
+    def _replace_by_effect(self, hypothesis: Hypothesis) -> None:
         """Fit a set with the effect that covers its one released parameter, from where that led."""
         (released,) = hypothesis.released
         for effect in self.candidates:
@@ -172,11 +172,11 @@ class Search(FittedSets):
                     self.fitted((*hypothesis.effects, effect), np.append(values, start), again=True)
 
     def _release_beside(self, hypothesis: Hypothesis) -> None:
-        """Fit a set of effects with the base parameters that it leaves at their bounds, free.
+        """Fit a set of effects with the base parameters released that it leaves at their bounds.
 
-        Beside an effect others may be out of tolerance than those that carry its misfit alone.
-        Where the best set of its size explains the misfit in another form of its laws, or where no
-        forms are known, an amplitude out of tolerance may stand for the form: none is released.
+        Beside an effect other parameters may be out of tolerance than without it. None is released
+        if the best set of this size explains the misfit in another form of its laws, or if no forms
+        are known: an amplitude out of tolerance may then stand for the form.
         """
         rules = self.data.rules
         least = rules.explained_part_share * (hypothesis.fit.chi_square - self.degrees_of_freedom)
@@ -197,7 +197,7 @@ class Search(FittedSets):
             self.fitted((*hypothesis.candidates, *needed), fitted.values)
 
     def _prune_near(self, size: int) -> None:
-        """Fit the best sets of effects and released parameters without the needless parameters."""
+        """Fit the best sets of effects and released parameters without needless parameters."""
         for hypothesis in self.of_size(size):
             mixed = hypothesis.released and hypothesis.effects
             if not mixed or label_of(hypothesis.candidates) in self._left_out:
@@ -206,38 +206,40 @@ class Search(FittedSets):
                 self._prune(self.finished(hypothesis))
 
     def _extend(self, hypothesis: Hypothesis, by_part: bool = True) -> None:
-        """Fit a set with each effect that removes most of what it leaves, or with bounds released."""
+        """Fit a set with each effect that removes most of what it leaves, or with released values."""
         label = label_of(hypothesis.candidates)
         if label in self._extended or label in self._left_out:
             return
         self._extended.add(label)
         self._release_beside(hypothesis)
-        if not (candidates := self._further(hypothesis)):
+        if not (candidates := self._addable(hypothesis)):
             return
         self.add_evident(hypothesis, candidates)
         if len(hypothesis.members) > 1 and self.forms.explains(hypothesis):
-            # A third effect shows beside two only in what no form of theirs explains.
+            # A third effect shows only in what no form of two others explains.
             self._extend_beyond_forms(hypothesis)
             return
         rules, excess = self.data.rules, hypothesis.fit.chi_square - self.degrees_of_freedom
         if sensor_excess := self.held_by_sensors(hypothesis):
-            # What brings a sensor back to what is stated removes at least that, of noise as well.
+            # An effect that brings a sensor back to what is stated removes at least its excess.
             excess = sensor_excess if self.enough(hypothesis) else min(excess, sensor_excess)
         before, after = (self.data.excess(fitted) for fitted in (self.base, hypothesis.fit))
         ill = ill_explained(before, after, rules) if by_part and not hypothesis.exact else []
         of_ill = [(part, float(after.of_parts[part])) for part in ill]
         chosen = shortlist(
-            self.data, hypothesis.fit, candidates, self._known(candidates), excess, of_ill
+            self.data,
+            hypothesis.fit,
+            candidates,
+            self._screened_beside_base(candidates),
+            excess,
+            of_ill,
         )
         for effect in chosen:
-            self.fitted(
-                (*hypothesis.candidates, effect.candidate),
-                np.append(hypothesis.fit.values, effect.start),
-            )
+            self.extended(hypothesis, effect.candidate, effect.start)
         self._extend_beyond_forms(hypothesis)
 
-    def _further(self, hypothesis: Hypothesis) -> list[Candidate]:
-        """Return the effects that may stand beside a set."""
+    def _addable(self, hypothesis: Hypothesis) -> list[Candidate]:
+        """Return the effects that may be added to a set."""
         return [
             candidate
             for candidate in self.candidates
@@ -247,22 +249,17 @@ class Search(FittedSets):
 
     def _extend_beyond_forms(self, hypothesis: Hypothesis) -> None:
         """Fit a set with effects that remove what its laws do not explain in any form."""
-        small = len(hypothesis.members) < self.data.rules.most_effects
-        effects = (
-            self.forms.shortlisted_beside(hypothesis, self._known(self._further(hypothesis)))
-            if small
-            else []
-        )
+        if len(hypothesis.members) >= self.data.rules.most_effects:
+            return
+        screened = self._screened_beside_base(self._addable(hypothesis))
+        effects = self.forms.shortlisted_beside(hypothesis, screened)
         for effect in effects:
-            self.fitted(
-                (*hypothesis.candidates, effect.candidate),
-                np.append(hypothesis.fit.values, effect.start),
-            )
+            self.extended(hypothesis, effect.candidate, effect.start)
         if effects:
             self.finish_near(len(hypothesis.members) + 1)
 
-    def _known(self, candidates: Sequence[Candidate]) -> list[Screened]:
-        """Return effects as screened beside the base; none where none was."""
+    def _screened_beside_base(self, candidates: Sequence[Candidate]) -> list[Screened]:
+        """Return candidates as screened beside the base; nothing if none was screened."""
         by_label = {effect.candidate.label: effect for effect in self.screened}
         return [by_label[candidate.label] for candidate in candidates] if by_label else []
 
@@ -272,34 +269,33 @@ class Search(FittedSets):
         while (sets := self.of_size(size)) and (best := label_of(sets[0].candidates)) != varied:
             varied = best
             if size == 2:
-                self._exchange(sets[0])
+                self._exchange_members(sets[0])
             self._exchange_forms(sets[0])
 
-    def _exchange(self, hypothesis: Hypothesis) -> None:
-        """Fit sets in which something else is in the place of one member."""
+    def _exchange_members(self, hypothesis: Hypothesis) -> None:
+        """Fit sets in which another effect replaces one member."""
         for member in hypothesis.members:
             self._extend(self.without(hypothesis, member), by_part=False)
 
     def _past_resonances(self, leading: Hypothesis) -> None:
-        """Fit the first effect with an inertia from all its starts, if all sets fail plainly.
+        """Fit the leading effect with an inertia from all its starts, if no set comes near noise.
 
-        An inertia moves resonances past lines: to first order it does next to nothing for them.
+        An inertia moves resonances past lines, which to first order has hardly any effect on them.
         """
         rules = self.data.rules
         if misfit_of(self.hypotheses[0], self.degrees_of_freedom) <= rules.contradicting_chi_square:
             return
-        for candidate in self._further(leading):
+        for candidate in self._addable(leading):
             if candidate.exact and len(candidate.parameters) == 1 and len(candidate.starts) > 1:
                 for start in candidate.starts:
-                    values = np.append(leading.fit.values, start)
-                    self.fitted((*leading.candidates, candidate), values, again=True)
+                    self.extended(leading, candidate, start, again=True)
 
     def _exchange_forms(self, hypothesis: Hypothesis) -> None:
-        """Fit sets in which one member is another form or a special case of it, at its port.
+        """Fit sets in which another form or a special case replaces a member at its port.
 
-        Or a form of the effect that covers a base parameter, in place of all that are free. Curves
-        are replaced by each other one, too, where effects alone leave more than noise: only those
-        that to first order take most of the rest were tried before.
+        All released parameters are replaced by a form of the effect that covers one of them. If
+        effects alone leave more than noise, every curve also replaces every other: so far only
+        those were tried that remove most of what is left to first order.
         """
         open_to_curves = not (self.enough(hypothesis) or hypothesis.released)
         for member in hypothesis.candidates:
@@ -307,15 +303,13 @@ class Search(FittedSets):
                 candidate for candidate in hypothesis.candidates if candidate is not member
             )
             remaining = hypothesis.effects if member.covered_by else others
+            values = hypothesis.values_of(remaining)
             for replacement in (*self.candidates, *self.forms_only):
-                suitable = replacement.stands_for(member, open_to_curves) and may_be_together(
-                    (*remaining, replacement)
-                )
-                # What only stands for listed forms is tried where these leave some.
-                if suitable and (
-                    not replacement.only_as_form or self.leaves_form_of(hypothesis, member)
-                ):
-                    self.fitted(
-                        (*remaining, replacement),
-                        np.append(hypothesis.values_of(remaining), replacement.starts[0]),
-                    )
+                effects = (*remaining, replacement)
+                suitable = replacement.stands_for(member, open_to_curves)
+                suitable = suitable and may_be_together(effects)
+                if suitable and replacement.only_as_form:
+                    # Such a form only stands for listed ones, and only if these leave some of it.
+                    suitable = self.leaves_form_of(hypothesis, member)
+                if suitable:
+                    self.fitted(effects, np.append(values, replacement.starts[0]))

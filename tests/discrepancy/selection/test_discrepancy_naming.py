@@ -296,7 +296,7 @@ def test_a_set_that_only_the_removal_of_a_member_gives_is_named(monkeypatch):
 
     monkeypatch.setattr(search, "shortlist", hopeful)
     monkeypatch.setattr(AnyForm, "shortlisted_beside", lambda *_: [])
-    monkeypatch.setattr(search.Search, "_exchange", lambda *_: None)
+    monkeypatch.setattr(search.Search, "_exchange_members", lambda *_: None)
     data = planted({RIPPLE: (0.003, 0.001), SOFT: (0.3, 5e-4, 4.0)})
     verdict = verdict_on(data, [RIPPLE, DRAG, SOFT])
     assert verdict.status == "named"

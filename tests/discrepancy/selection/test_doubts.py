@@ -384,7 +384,7 @@ def test_all_sets_of_a_size_may_be_known_under_another_name():
     known.degrees_of_freedom = FREEDOM
     known.data, known.candidates = JUDGED, [a_law("load_inertia")]
     # The effect in its place is no better.
-    known._by_its_effect = lambda one: None
+    known._replace_by_effect = lambda one: None
     ripple, covered = a_law("ripple"), freed("load_inertia")
     covered = tuple(replace(one, covered_by="load_inertia") for one in covered)
     sets = [set_of(ripple, *covered, *more, left=1.0) for more in ((), freed("damping"))]
