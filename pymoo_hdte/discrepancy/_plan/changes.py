@@ -35,10 +35,10 @@ def signatures_of(data: Data, limits: PlanLimits, rated_torque: float) -> Signat
     Parameters
     ----------
     data : Data
-        Of imagined records: running ones, then sweeps.
+        Data of imagined records: running ones, then sweeps.
     limits : PlanLimits
     rated_torque : float
-        Scale of torques where all loads are zero, N.m.
+        Scale of torques if all loads are zero, N.m.
     """
     objective = Objective(data, ())
     residuals, jacobian = objective.residuals(objective.start), objective.jacobian(objective.start)
@@ -62,7 +62,7 @@ def signatures_of(data: Data, limits: PlanLimits, rated_torque: float) -> Signat
     ]
     layout = Layout(data.base)
     widths = (layout.array("upper") - layout.array("lower")) / layout.array("scale")
-    # What bounds tell counts as a uniform distribution between them, as in `Fit.covariance`.
+    # Bounds count as a uniform distribution between them, as in `Fit.covariance`.
     known = 12.0 / widths**2 + (layout.array("scale") / layout.array("prior")) ** 2
     signatures = Signatures.of(
         list(wanted),
@@ -85,7 +85,7 @@ def _label(name: str, port: str) -> str:
 
 
 def _candidates(data: Data, limits: PlanLimits, rated_torque: float) -> list[Candidate]:
-    """Return candidates at the sizes that matter, lines at the orders of the stated effects."""
+    """Return candidates of the sizes that matter, with lines at the orders of stated effects."""
     believed, features = data.campaign.believed, data.features
     paths = [float(np.abs(sweep.path).max()) for sweep in data.torsion]
     torque = max([float(np.abs(features.conditions.output_torque).max()), *paths])
@@ -122,7 +122,7 @@ def stated_orders(effects: Sequence[DriveEffect], ratio: float) -> list[float]:
 def _wanted(
     limits: PlanLimits, by_port: dict[str, list[Candidate]]
 ) -> dict[str, tuple[DriveEffect, ...]]:
-    """Return the effects to be found by their label; stated ones of one label act together."""
+    """Return the effects to be found by label; stated effects with the same label act together."""
     if not limits.effects:
         return {
             label: candidates[0].build([parameter.start for parameter in candidates[0].parameters])
@@ -155,16 +155,16 @@ def _forms(candidate: Candidate, change: Change) -> list[tuple[list[Values], boo
 
 
 def _strongest(candidate: Candidate) -> list[tuple[float, ...]]:
-    """Return the starts of a candidate with a larger strength, where its form is another one.
+    """Return the starts of a candidate with a larger strength, at which its form is another one.
 
-    A wind-up that is as soft as it may be is nearly a play.
+    A wind-up as soft as its bound allows is nearly a play.
     """
     strongest = candidate.parameters[0].upper
     return [(min(_STRONGER * start[0], strongest), *start[1:]) for start in candidate.starts]
 
 
 def _by_test(data: Data, rows: Sequence[Values]) -> list[Values]:
-    """Return whitened changes as arrays of tests, (n_tests, f), padded with zeros."""
+    """Return whitened changes by test, shape (n_tests, f) each, padded with zeros."""
     records, size = data.features.values.shape
     widest = max([size, *(len(sweep.angle) - 1 for sweep in data.torsion)])
     changes = []

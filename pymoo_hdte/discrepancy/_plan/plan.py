@@ -1,4 +1,4 @@
-"""The plan: tests to make, the power they give, and what no test within the limits separates."""
+"""The plan: tests to make, their power, and effects that no test within the limits separates."""
 
 from __future__ import annotations
 
@@ -32,13 +32,13 @@ class Chance:
     Attributes
     ----------
     effect : str
-        With its port.
+        Label of the effect, with its port.
     rival : str
-        Empty for detection.
+        Label of the rival; empty for detection.
     power : float
-        Of the planned tests; for two effects to be found that of the one that is harder to tell.
+        Power of the planned tests; for two effects to be found, the smaller of both.
     possible : float
-        No set of as many tests within the limits gives more.
+        Largest power of any set of as many tests within the limits.
     """
 
     effect: str
@@ -49,20 +49,20 @@ class Chance:
 
 @dataclass(frozen=True)
 class Plan:
-    """What to measure, and what that tells.
+    """What to measure, and which effects that detects and separates.
 
     Attributes
     ----------
     tests : tuple of PlannedTest
-        To be fitted, in the order to make them.
+        Tests to be fitted, in the order to make them.
     held_out : tuple of PlannedTest
-        Running tests of other conditions, where there are any, to prove what the fit names.
+        Running tests at other conditions, if there are any, to validate what the fit names.
     detected : tuple of Chance
-        One of each effect to be found.
+        Chance to detect each effect.
     separated : tuple of Chance
-        Of the effects that are detected from each other one.
+        Chance to separate each detected effect from each rival.
     wanted : float
-        Probability that was wanted as power.
+        Wanted power.
 
     Examples
     --------
@@ -78,9 +78,9 @@ class Plan:
 
     @property
     def missed(self) -> list[str]:
-        """A sentence for each effect that is not detected, or not told from others.
+        """A sentence for each effect that is not detected, or not separated from others.
 
-        What is not detected is not told from anything either, and not in `separated`.
+        An effect that is not detected is not in `separated`.
         """
         unseen = {chance.effect: chance for chance in self.detected if chance.power < self.wanted}
         sentences = [_missed([chance], self.wanted) for chance in unseen.values()]
@@ -120,16 +120,16 @@ def plan_tests(
 ) -> Plan:
     """Return the smallest set of tests that separates the effects that matter.
 
-    Changes of the readings are linear in the unknowns of a rival about its typical values, so that
-    the power is that of small effects.
+    Readings are taken as linear in the unknowns of a rival around its typical values, so that the
+    power holds for small effects.
 
     Parameters
     ----------
     model : DriveModel
-        What is believed of the drive.
+        Nominal model of the drive.
     limits : PlanLimits
     rng : Generator, optional
-        For phases and noise of the imagined records; by default of seed 0.
+        Generator for phases and noise of the imagined records; by default with seed 0.
     rules : Rules
 
     Returns
@@ -139,7 +139,7 @@ def plan_tests(
     Raises
     ------
     InvalidInput
-        If records within the limits could not be analysed: see `Campaign` and `expected_orders`.
+        If records within the limits could not be analysed, as `Campaign` checks them.
 
     Examples
     --------
@@ -183,7 +183,10 @@ def _chances(
 
 
 def _enough(counts: Counts, tests: Sequence[PlannedTest], least: int) -> Counts:
-    """Add running tests, unlike those chosen, up to the least number that can be analysed."""
+    """Return counts with running tests added, up to the least number that can be analysed.
+
+    Each added test is the one whose condition differs most from those chosen.
+    """
     counts = counts.copy()
     running = [k for k, test in enumerate(tests) if test.kind == "running"]
     while sum(counts[running]) < least:
@@ -196,7 +199,7 @@ def _enough(counts: Counts, tests: Sequence[PlannedTest], least: int) -> Counts:
 def _held_out(
     made: Sequence[PlannedTest], tests: Sequence[PlannedTest], number: int
 ) -> tuple[PlannedTest, ...]:
-    """Return running tests as unlike those made, and each other, as the limits allow."""
+    """Return running tests that differ as much as possible from those made, and from each other."""
     running = [test for test in tests if test.kind == "running"]
     held_out: list[PlannedTest] = []
     for _ in range(number):
@@ -208,7 +211,7 @@ def _held_out(
 def _distance(
     test: PlannedTest, others: Sequence[PlannedTest], tests: Sequence[PlannedTest]
 ) -> float:
-    """Return the distance of a condition to the nearest other one, in units of the limits."""
+    """Return the distance of a condition to the nearest of others, in units of the limits."""
     speed = max(abs(test.speed) for test in tests)
     load = max(max(abs(test.load) for test in tests), 1e-12)
     time = max(max(test.elapsed for test in tests), 1e-12)
@@ -237,7 +240,7 @@ def _ordered(tests: Sequence[PlannedTest]) -> tuple[PlannedTest, ...]:
 
 
 def chance_words(chance: float) -> str:
-    """Return a chance in per cent, rounded down: what falls short of 80 % is not shown as 80 %.
+    """Return a chance in per cent, rounded down, so that 79.6 % is not shown as 80 %.
 
     >>> chance_words(0.796), chance_words(0.004), chance_words(0.9999)
     ('79 %', 'less than 1 %', 'over 99 %')
@@ -250,7 +253,7 @@ def chance_words(chance: float) -> str:
 
 
 def _missed(chances: Sequence[Chance], wanted: float) -> str:
-    """Say what tests do not tell of one effect, of which all ``ones`` are."""
+    """Return a sentence on what tests do not show of the effect of all ``chances``."""
     effect = chances[0].effect
     rivals = ", nor from ".join(chance.rival for chance in chances)
     if max(chance.possible for chance in chances) < wanted:
@@ -282,5 +285,5 @@ def _test(role: str, test: PlannedTest) -> dict[str, Any]:
 
 
 def _rounded(power: float) -> float:
-    # Down, so that a power that is written reaches what is wanted only where the power does.
+    # Rounded down, so that a printed power reaches the wanted one only if the power does.
     return math.floor(1e4 * power + 1e-9) / 1e4

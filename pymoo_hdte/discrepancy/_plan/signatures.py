@@ -1,4 +1,4 @@
-"""What effects change in every possible test, and how far others can imitate it."""
+"""The changes that effects cause in every possible test, and how far others can imitate them."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ Values = NDArray[np.float64]
 Counts = NDArray[np.int_]
 
 _RIDGE = 1e-10
-"""Information on the directions of a rival, relative to what all tests together tell: it keeps
-equations solvable where two directions are the same."""
+"""Information on the directions of a rival, relative to that of all tests together. It keeps
+equations solvable if two directions are the same."""
 
 
 @dataclass(frozen=True)
@@ -28,7 +28,7 @@ class Imitation:
     ----------
     columns : tuple of int
     one_sided : bool
-        Whether the first of them, a strength, cannot be negative.
+        Whether the first column, a strength, cannot be negative.
     """
 
     columns: tuple[int, ...]
@@ -39,25 +39,25 @@ class Imitation:
 class Signatures:
     """Inner products of whitened changes, test by test.
 
-    Columns are those of the effects to be found, then of the rivals' imitations, then of the base
-    parameters in units of their scale.
+    Columns are those of the effects to be found, of the rivals' imitations, and of the base
+    parameters in units of their scale, in this order.
 
     Attributes
     ----------
     effects : tuple of str
-        Effects to be found, each with its port.
+        Labels of the effects to be found, with their ports.
     rivals : tuple of str
-        Effects that may imitate them, each with its port.
+        Labels of the effects that may imitate them, with their ports.
     imitations : tuple of tuple of Imitation
-        For each of the rivals its forms.
+        Forms of each rival.
     grams : ndarray, shape (n_tests, n, n)
     known : ndarray, shape (n,)
         Information on the columns before any test.
     held : ndarray of bool, shape (n_tests,), optional
         Tests whose load holds the tooth flanks together. In the others a drive with a clearance
-        rattles, and what it does then is predicted for no model.
+        rattles, which no model predicts.
     rattling : frozenset of str
-        Effects and rivals with a clearance, which only tests in ``held`` tell from others.
+        Effects and rivals with a clearance, which only tests in ``held`` separate from others.
     """
 
     effects: tuple[str, ...]
@@ -113,7 +113,7 @@ class Signatures:
         return cls(tuple(effects), names, tuple(imitations), grams, known)
 
     def noncentralities(self, counts: Counts) -> tuple[Values, Values]:
-        """Return what a set of tests leaves of each effect, to no rival and to each of them.
+        """Return what a set of tests leaves of each effect, alone and beside each rival.
 
         Parameters
         ----------
@@ -123,9 +123,9 @@ class Signatures:
         Returns
         -------
         alone : ndarray, shape (n_effects,)
-            Not imitated by the base parameters.
+            Part that the base parameters cannot imitate.
         beside : ndarray, shape (n_effects, n_rivals)
-            Nor by a rival that is fitted with them: its best form.
+            Part that the best form of a rival cannot imitate either, fitted with them.
         """
         alone, beside = self._of(counts)
         if self.held is not None and self.rattling and np.any(counts[~self.held]):
@@ -139,7 +139,7 @@ class Signatures:
         return alone, beside
 
     def _of(self, counts: Counts) -> tuple[Values, Values]:
-        """Return `noncentralities` of all effects by the same tests."""
+        """Return the `noncentralities` of all effects if every test counts for all of them."""
         flat = counts @ self.grams.reshape(len(self.grams), -1)
         together = flat.reshape(self.grams.shape[1:]) + np.diag(self.known)
         count = len(self.effects)
@@ -165,7 +165,7 @@ class Signatures:
 
     @cached_property
     def _places(self) -> tuple[NDArray[np.int_], NDArray[np.bool_]]:
-        """Columns of each form, padded to the largest number, and which are no padding."""
+        """Columns of each form, padded to the largest number, and a mask without the padding."""
         most = max(len(form.columns) for form in self._forms)
         places = np.zeros((len(self._forms), most), dtype=int)
         used = np.zeros(places.shape, dtype=bool)
@@ -202,10 +202,10 @@ def _unimitated_by_forms(
 
 
 def is_rival(effect: str, rival: str) -> bool:
-    """Tell whether a rival is another explanation than an effect, and no wider one that holds it.
+    """Tell whether a rival is another explanation than an effect, and does not contain it.
 
-    Both as labels ``name:port``. What contains the effect imitates it in every test; the special
-    case is then named.
+    Both are labels ``name:port``. A law that contains the effect imitates it in every test; the
+    special case is then named.
     """
     (name, port), (rival_name, rival_port) = effect.split(":"), rival.split(":")
     return effect != rival and not (port == rival_port and is_contained(name, rival_name))

@@ -249,7 +249,7 @@ class FittedSets:
                 self._from_all_starts.add(label)
 
     def finished(self, hypothesis: Hypothesis, *starts: Vector) -> Hypothesis:
-        """Return a set fitted to the end, from its values and, unless resumed, from other starts."""
+        """Return a set fitted to the end: from its values and, unless resumed, other starts."""
         label = label_of(hypothesis.candidates)
         if label not in self._finished or starts:
             fitted_before = self._resumed or label in self._finished

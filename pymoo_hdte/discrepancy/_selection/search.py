@@ -101,7 +101,7 @@ class Search(FittedSets):
     def _release_parameters(self) -> None:
         """Fit all base parameters together that the data push out of their tolerances.
 
-        Those that stay within once others are released, or that gain nothing, keep their tolerances.
+        Those that stay within once others are released, or that gain nothing, keep tolerances.
         If all of them together do no better than one effect, fewer are not tried.
         """
         released, fitted = released_together(self.data, self.base)
@@ -206,7 +206,7 @@ class Search(FittedSets):
                 self._prune(self.finished(hypothesis))
 
     def _extend(self, hypothesis: Hypothesis, by_part: bool = True) -> None:
-        """Fit a set with each effect that removes most of what it leaves, or with released values."""
+        """Fit a set with each effect that removes most of what it leaves, or releasing values."""
         label = label_of(hypothesis.candidates)
         if label in self._extended or label in self._left_out:
             return
