@@ -114,7 +114,7 @@ def imagined_campaign(
         np.array([test.load for test in running]),
         np.array([test.elapsed for test in running]),
         np.zeros((len(running), 3, 1 + len(orders)), dtype=complex),
-        # Phases refer to the middle of a record of this length, as those of a measured one do.
+        # A line is fitted at the nearest analysed order, as in a record of this length.
         input_angle=np.sign(speed) * travel / 2.0,
         travel=np.full(len(running), travel),
     )
