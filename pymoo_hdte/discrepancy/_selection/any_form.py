@@ -138,10 +138,8 @@ class AnyForm:
         This is the fit of the listed form, unless little is left to first order, but more than
         noise: the true form may then be far from the listed one.
         """
-        unexplained, least = (
-            self.unexplained(hypothesis.fit),
-            self.data.rules.explained_share * self.excess,
-        )
+        unexplained = self.unexplained(hypothesis.fit)
+        least = self.data.rules.explained_share * self.excess
         if unexplained is None or unexplained.is_noise or self.excess - unexplained.excess < least:
             return hypothesis.fit, unexplained
         fitted = self.in_free_form(hypothesis.fit)

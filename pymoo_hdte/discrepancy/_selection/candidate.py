@@ -103,14 +103,17 @@ class Candidate:
         """Places of its effects in a drive model; each place takes one effect of a name."""
         return frozenset(place_of(effect) for effect in self.build(self.starts[0]))
 
-    def goes_with(self, other: Candidate) -> bool:
+    def goes_with(self, candidate: Candidate) -> bool:
         """Tell whether a drive may have both: no two effects at one place, nor forms of one."""
-        forms = self.form != other.form and (self.name, self.port) == (other.name, other.port)
-        return not (forms or self.places & other.places)
+        forms = self.form != candidate.form and (self.name, self.port) == (
+            candidate.name,
+            candidate.port,
+        )
+        return not (forms or self.places & candidate.places)
 
-    def shares_port_with(self, other: Candidate) -> bool:
+    def shares_port_with(self, candidate: Candidate) -> bool:
         """Tell whether both act at one port, where one may stand for the form of the other."""
-        return (self.acts_at or self.port) == (other.acts_at or other.port)
+        return (self.acts_at or self.port) == (candidate.acts_at or candidate.port)
 
     def replaces(self, member: Candidate) -> bool:
         """Tell whether it may replace an effect, which is at the same port or has a memory."""
@@ -122,10 +125,10 @@ class Candidate:
         """Whether it is tried only instead of another form of the same effect."""
         return self.name in self.instead_of
 
-    def holds(self, other: Candidate) -> bool:
+    def holds(self, special: Candidate) -> bool:
         """Tell whether another effect is a special case of this one, or of this form of it."""
-        return is_contained(other.name, self.name) or (
-            self.form != "" and is_contained(other.name, f"{self.name}/{self.form}")
+        return is_contained(special.name, self.name) or (
+            self.form != "" and is_contained(special.name, f"{self.name}/{self.form}")
         )
 
     def is_form_of(self, member: Candidate) -> bool:

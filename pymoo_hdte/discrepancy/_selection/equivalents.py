@@ -98,7 +98,7 @@ def competing_sets(search: Search, chosen: Hypothesis) -> list[Hypothesis]:
         hypothesis
         for hypothesis in search.hypotheses
         if hypothesis is not chosen
-        and _comes_near(search, hypothesis, chosen)
+        and _competes(search, hypothesis, chosen)
         and explains_in_any_form(search, hypothesis)
         and search.is_significant(hypothesis)
     ]
@@ -106,24 +106,25 @@ def competing_sets(search: Search, chosen: Hypothesis) -> list[Hypothesis]:
         hypothesis
         for hypothesis in competing
         if all(
-            _comes_near(search, hypothesis, special)
+            _competes(search, hypothesis, special)
             for special in competing
             if special.names != hypothesis.names and contains(hypothesis, special)
         )
     ]
 
 
-def _comes_near(search: Search, hypothesis: Hypothesis, chosen: Hypothesis) -> bool:
+def _competes(search: Search, hypothesis: Hypothesis, chosen: Hypothesis) -> bool:
     """Tell whether a set competes with the chosen one: the data do not separate them.
 
     A more general law whose extra parameter sits at its bound reduces to the special case and does
     not compete. If the extra parameter is well determined, the evidence decides.
     """
-    near = search.indistinguishable(hypothesis, chosen) or undecided(
-        hypothesis, chosen, search.data.rules
+    competes = (
+        search.indistinguishable(hypothesis, chosen)
+        or undecided(hypothesis, chosen, search.data.rules)
+        or _needs_fewer_values(search, hypothesis, chosen)
     )
-    near = near or _needs_fewer_values(search, hypothesis, chosen)
-    return near and not (contains(hypothesis, chosen) and is_bounded(hypothesis.fit))
+    return competes and not (contains(hypothesis, chosen) and is_bounded(hypothesis.fit))
 
 
 def _needs_fewer_values(search: Search, hypothesis: Hypothesis, chosen: Hypothesis) -> bool:

@@ -126,10 +126,8 @@ class FittedSets:
         """
         if self.enough(hypothesis) and not is_bounded(hypothesis.fit):
             return False
-        unexplained, excess = (
-            self.forms.unexplained(hypothesis.fit),
-            hypothesis.fit.chi_square - self.degrees_of_freedom,
-        )
+        unexplained = self.forms.unexplained(hypothesis.fit)
+        excess = hypothesis.fit.chi_square - self.degrees_of_freedom
         limit = 1.0 - self.data.rules.explained_part_share
         return unexplained is not None and unexplained.excess <= limit * excess
 
@@ -168,9 +166,8 @@ class FittedSets:
         """
         if self.lacks_evident(simpler) and not self.lacks_evident(hypothesis):
             return True
-        earned = is_significant(self.data, self.base, hypothesis, simpler, member)
         return (
-            earned
+            is_significant(self.data, self.base, hypothesis, simpler, member)
             or self.forms.is_significant(hypothesis, simpler)
             or self._brings_sensors_back(hypothesis, simpler)
         )
@@ -285,21 +282,16 @@ class FittedSets:
         search is to ``go_on``, all later fits are as in any search.
         """
         self._resumed = True
-        chosen = hypotheses[0]
+        chosen, *others = hypotheses
         competing = [
             chosen,
-            *(
-                hypothesis
-                for hypothesis in hypotheses[1:]
-                if self.indistinguishable(hypothesis, chosen)
-            ),
+            *(rival for rival in others if self.indistinguishable(rival, chosen)),
         ]
         for hypothesis in hypotheses:
             # Measured from the chosen set: in the best one a member may not be significant.
             shortlisted = hypothesis in competing or self.may_come_as_near(hypothesis, chosen)
-            self.fitted(
-                hypothesis.candidates, hypothesis.fit.values, steps=None if shortlisted else 0
-            )
+            steps = None if shortlisted else 0
+            self.fitted(hypothesis.candidates, hypothesis.fit.values, steps=steps)
         for hypothesis in competing:
             self.finished(self._by_label[label_of(hypothesis.candidates)])
         for size in {len(hypothesis.members) for hypothesis in hypotheses}:
@@ -372,21 +364,24 @@ def is_significant(
         share = rules.explained_part_share if to_noise else rules.explained_share
         return excess > 0.0 and removed >= share * excess
     per_degree = simpler.fit.chi_square / degrees_of_freedom
-    if per_degree > rules.contradicting_chi_square and down_to_noise(
-        hypothesis.fit, degrees_of_freedom, rules
-    ):
+    contradicted = per_degree > rules.contradicting_chi_square
+    if contradicted and down_to_noise(hypothesis.fit, degrees_of_freedom, rules):
         return True
     before, between, final = (data.excess(fitted) for fitted in (base, simpler.fit, hypothesis.fit))
     parts = ill_explained(before, between, rules)
     if not parts:
         return False
-    same_port = any(a.shares_port_with(b) for a in member for b in simpler.candidates)
+    same_port = any(
+        candidate.shares_port_with(present)
+        for candidate in member
+        for present in simpler.candidates
+    )
     least = rules.second_form_share if same_port else data.remainder
     for part in (slice(None), parts[0]):
-        whole, residual, after = (
-            np.sum(excess.of_parts[part]) for excess in (before, between, final)
+        whole, residual, remaining = (
+            np.sum(by_part.of_parts[part]) for by_part in (before, between, final)
         )
-        if residual - after >= max(rules.second_share * residual, least * whole):
+        if residual - remaining >= max(rules.second_share * residual, least * whole):
             return True
     return False
 

@@ -231,11 +231,11 @@ def indistinguishable(
     ):
         increase = hypothesis.fit.chi_square - chosen.fit.chi_square
         pairs = differing(hypothesis.candidates, chosen.candidates)
-        if any(own.only_as_form for own, _ in pairs):
+        if any(member.only_as_form for member, _ in pairs):
             return False
-        same = all(own.shares_port_with(replaced) for own, replaced in pairs)
+        same = all(member.shares_port_with(counterpart) for member, counterpart in pairs)
         accuracy = rules.form_share if overlap and same else rules.form_accuracy
-        exact = all(own.exact and replaced.exact for own, replaced in pairs)
+        exact = all(member.exact and counterpart.exact for member, counterpart in pairs)
         close = not exact and increase < accuracy**2 * (chosen.removed + residual)
     if (
         close
@@ -290,15 +290,13 @@ def contains(hypothesis: Hypothesis, special: Hypothesis) -> bool:
 
 
 def differing(
-    members: Sequence[Candidate], replaced: Sequence[Candidate]
+    members: Sequence[Candidate], counterparts: Sequence[Candidate]
 ) -> list[tuple[Candidate, Candidate]]:
     """Return pairs of the candidates by which two sets of one size differ, ordered by port."""
-    shared = Counter(_places(members)) & Counter(_places(replaced))
-    unshared = (_beyond(candidates, shared) for candidates in (members, replaced))
-    own, others = (
-        sorted(candidates, key=lambda candidate: candidate.port) for candidates in unshared
-    )
-    return list(zip(own, others, strict=True))
+    shared = Counter(_places(members)) & Counter(_places(counterparts))
+    unshared = (_beyond(candidates, shared) for candidates in (members, counterparts))
+    by_port = (sorted(candidates, key=lambda candidate: candidate.port) for candidates in unshared)
+    return list(zip(*by_port, strict=True))
 
 
 def _places(candidates: Sequence[Candidate]) -> list[tuple[str, str]]:
