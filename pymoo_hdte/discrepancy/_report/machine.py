@@ -114,7 +114,7 @@ def error_sentence(finding: MachineFinding, errors: HeldOutErrors | None) -> str
         return f"Nothing was added; the model is off by {before} on held-out records."
     words = f"On held-out records the model was off by {before}; with the correction by {after}."
     if gap.shrinkage is not None:
-        words += f" {percent(gap.shrinkage)} of what noise does not explain is gone."
+        words += f" {percent(min(gap.shrinkage, 1.0))} of what noise does not explain is gone."
     if errors.growths:
         words += f" Worse than before: {', '.join(errors.growths)}."
     return words
