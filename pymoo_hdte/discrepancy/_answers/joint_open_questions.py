@@ -32,7 +32,7 @@ def near_by(finding: JointFinding) -> list[Hypothesis]:
     found = [
         one
         for one in sorted(every, key=lambda one: one.bic)
-        if all(candidate.frees is None for candidate in one.candidates)
+        if all(candidate.releases is None for candidate in one.candidates)
         and share_removed(torsion.sensors, torsion.data, verdict.base, one.fit) >= least
     ]
     return found[:_MOST_TOLD]
