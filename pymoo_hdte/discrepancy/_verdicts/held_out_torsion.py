@@ -39,8 +39,8 @@ def torsion_gaps(finding: MechanismFinding) -> tuple[MeasuredGap, ...]:
     """
     (gear,) = (port for port in finding.mechanism.ports if port.followed)
     # As the gaps are: with the fitted stiffness, of which the stated one may be a multiple.
-    left = float(finding.remainder[0]) / stiffness_of(finding.accepted, gear)
-    found = []
+    unexplained = float(finding.remainder[0]) / stiffness_of(finding.accepted, gear)
+    errors = []
     for record in finding.records:
         if record.role != "held_out":
             continue
@@ -51,12 +51,12 @@ def torsion_gaps(finding: MechanismFinding) -> tuple[MeasuredGap, ...]:
         rows = balance.moving.whole
         measured = balance.ports[gear.name].position[rows]
         before, after = (
-            _about(predicted_torsion(data, one)[rows], measured)
-            for one in (finding.verdict.base, finding.accepted)
+            _about(predicted_torsion(data, fitted)[rows], measured)
+            for fitted in (finding.verdict.base, finding.accepted)
         )
         noise = torsion_noise(gear, record)
-        expected = float(np.hypot(left, noise))
-        found.append(
+        expected = float(np.hypot(unexplained, noise))
+        errors.append(
             MeasuredGap(
                 record.name,
                 gear.name,
@@ -76,7 +76,7 @@ def torsion_gaps(finding: MechanismFinding) -> tuple[MeasuredGap, ...]:
                 finding.data.rules,
             )
         )
-    return tuple(found)
+    return tuple(errors)
 
 
 def _independent(finding: MechanismFinding, time: Values) -> float:
@@ -108,11 +108,17 @@ def predicted_torsion(data: MeasuredData, fitted: Fit) -> Values:
     """
     (balance,) = data.spectra
     (gear,) = (port for port in data.mechanism.ports if port.followed)
-    base = dict(zip((one.name for one in data.base), fitted.values[: len(data.base)], strict=True))
+    base = dict(
+        zip(
+            (parameter.name for parameter in data.base),
+            fitted.values[: len(data.base)],
+            strict=True,
+        )
+    )
     stiffness = stiffness_of(fitted, gear)
     zero = float(base[f"zero of {gear.name}"])
     effects = (*data.known, *laws_of(fitted.effects))
-    laws = [one.law for one in effects if one.port == gear.name]
+    laws = [effect.law for effect in effects if effect.port == gear.name]
     motion = balance.ports[gear.name]
 
     def force(torsion: Values) -> Values:
@@ -121,8 +127,8 @@ def predicted_torsion(data: MeasuredData, fitted: Fit) -> Values:
         return np.asarray(stiffness * torsion + zero + sum(of_laws))
 
     whitened = data.residuals(fitted.values[: len(data.base)], laws_of(fitted.effects))
-    left = balance.in_time(data.coefficients(whitened)[0][0])
-    wanted, torsion = force(motion.position) + left, motion.position
+    unexplained = balance.in_time(data.coefficients(whitened)[0][0])
+    wanted, torsion = force(motion.position) + unexplained, motion.position
     # The steepest slope anywhere, so that no step goes too far.
     steepest = max(stiffness, _steepest(force, motion.position))
     for _ in range(_STEPS):
@@ -135,7 +141,9 @@ def predicted_torsion(data: MeasuredData, fitted: Fit) -> Values:
 
 def stiffness_of(fitted: Fit, gear: Port) -> float:
     """Return the stiffness of a gear in a fit, N.m/rad; the believed one where it is not fitted."""
-    values = dict(zip((one.name for one in fitted.parameters), fitted.values, strict=True))
+    values = dict(
+        zip((parameter.name for parameter in fitted.parameters), fitted.values, strict=True)
+    )
     return float(values.get(f"stiffness of {gear.name}", gear.stiffness.value))
 
 
@@ -183,7 +191,7 @@ def without_unproved_lines(verdict: Verdict, fitted: Fit, gaps: Sequence[Measure
     gaps : sequence of MeasuredGap
         Of that fit, on these records.
     """
-    shrinks = not gaps or sum(one.after**2 - one.before**2 for one in gaps) < 0.0
+    shrinks = not gaps or sum(error.after**2 - error.before**2 for error in gaps) < 0.0
     denied = {
         candidate.label
         for candidate, bounded in bounded_unknowns(fitted)
@@ -192,7 +200,7 @@ def without_unproved_lines(verdict: Verdict, fitted: Fit, gaps: Sequence[Measure
     if not denied or verdict.chosen is None:
         return verdict
     sets = verdict.chosen, *verdict.alternatives
-    others = [one for one in sets if not denied & label_of(one.candidates)]
+    others = [hypothesis for hypothesis in sets if not denied & label_of(hypothesis.candidates)]
     return replace(
         verdict,
         certain=False,

@@ -141,7 +141,9 @@ def held_out_errors(finding: MachineFinding) -> HeldOutErrors | None:
     among = len(data.parts) + len(finding.held_out_names)
 
     def gap(rows: Any, count: int) -> Gap:
-        size, corrected = (float(np.sqrt(np.mean(left[rows] ** 2))) for left in (before, after))
+        size, corrected = (
+            float(np.sqrt(np.mean(residuals[rows] ** 2))) for residuals in (before, after)
+        )
         moved = (after - before)[rows]
         chance = 2.0 * float(np.linalg.norm(moved)) * misfit**0.5 / moved.size
         return Gap(size, corrected, 1.0, DEVIATIONS, verdict.rules, chance, count)

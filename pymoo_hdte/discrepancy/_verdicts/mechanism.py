@@ -118,7 +118,7 @@ def _beyond(
     """Return the ripple beyond the band, with the gains that are fitted, as its other forces."""
     mechanism = sensors.mechanism
     fitted = fitted_values(mechanism, verdict.accepted)
-    gains = [f"gain of {one.name}" for one in mechanism.inputs]
+    gains = [f"gain of {actuator.name}" for actuator in mechanism.inputs]
     scaled = {name: fitted[name] for name in gains if name in fitted}
     as_fitted = mechanism.with_values(scaled, exactly=False)
     effects = (*sensors.known, *verdict.accepted.effects)

@@ -129,8 +129,8 @@ class Proof:
         metrics = None
         if self.metrics is not None:
             metrics = {
-                name: asdict(one)
-                for name, one in zip(("before", "after"), self.metrics, strict=True)
+                name: asdict(metric)
+                for name, metric in zip(("before", "after"), self.metrics, strict=True)
             }
         return self.channels["transmission_error"].as_dict() | {
             "overall": self.overall.as_dict(),
@@ -297,9 +297,9 @@ def _overlay(data: Data, predicted: Values, record: int, name: str) -> Overlay:
     channel = CHANNELS.index(name)
     raw = data.features.records[record]
     settled = raw.input_angle[unsettled_rows(raw) :]
-    first = np.ceil(settled.min() / (2.0 * np.pi))
+    start_turn = np.ceil(settled.min() / (2.0 * np.pi))
     turns = np.linspace(0.0, _OVERLAY_TURNS, _OVERLAY_POINTS)
-    waves = np.exp(2j * np.pi * np.outer(data.features.orders, first + turns))
+    waves = np.exp(2j * np.pi * np.outer(data.features.orders, start_turn + turns))
     measured = data.features.values[record]
     samples = _samples(data, raw, channel)
     # The mean of the output torque is a condition, the same in all three.
@@ -310,7 +310,7 @@ def _overlay(data: Data, predicted: Values, record: int, name: str) -> Overlay:
         moving = (_phasors(data, features, channel) @ waves).real
         return np.asarray((mean - own_mean + moving) / size)
 
-    sample_turns = raw.input_angle / (2.0 * np.pi) - first
+    sample_turns = raw.input_angle / (2.0 * np.pi) - start_turn
     shown = (sample_turns >= 0.0) & (sample_turns <= _OVERLAY_TURNS)
     return Overlay(
         name,

@@ -148,37 +148,37 @@ def prove_measured(finding: MechanismFinding, whole: bool = False) -> tuple[Meas
         simulated = simulate_held_out(
             finding.mechanism, finding.records, finding.data, fits, known, whole=True
         )
-    by_name = {one.record: one for one in simulated}
-    found: list[MeasuredGap] = []
+    by_name = {record.record: record for record in simulated}
+    errors: list[MeasuredGap] = []
     for record in finding.records:
         if record.role == "held_out":
-            found += _simulated(finding, by_name[record.name])
-            found += _balanced(finding, record)
-    return tuple(found)
+            errors += _simulated(finding, by_name[record.name])
+            errors += _balanced(finding, record)
+    return tuple(errors)
 
 
-def _simulated(finding: MechanismFinding, one: SimulatedRecord) -> list[MeasuredGap]:
-    after = one.before if finding.accepted is finding.verdict.base else one.after
-    values = one.extent.windows * one.independent
+def _simulated(finding: MechanismFinding, record: SimulatedRecord) -> list[MeasuredGap]:
+    after = record.before if finding.accepted is finding.verdict.base else record.after
+    values = record.extent.windows * record.independent
     return [
         MeasuredGap(
-            one.record,
+            record.record,
             name,
             "simulation",
-            _size(measured - one.before[name]),
+            _size(measured - record.before[name]),
             _size(measured - after[name]),
-            one.noise[name],
+            record.noise[name],
             unit_of(finding.mechanism, name, "position"),
-            one.time,
+            record.time,
             measured,
-            one.before[name],
+            record.before[name],
             after[name],
-            expected := (one.expected[name] + one.noise[name] ** 2) ** 0.5,
-            chance_of(expected, _size(after[name] - one.before[name]), values),
+            expected := (record.expected[name] + record.noise[name] ** 2) ** 0.5,
+            chance_of(expected, _size(after[name] - record.before[name]), values),
             finding.data.rules,
-            one.extent,
+            record.extent,
         )
-        for name, measured in one.measured.items()
+        for name, measured in record.measured.items()
     ]
 
 
@@ -187,10 +187,13 @@ def _balanced(finding: MechanismFinding, record: Record) -> list[MeasuredGap]:
     n_base = len(data.base)
     (balance,) = data.spectra
     whitened = [
-        data.residuals(one.values[:n_base], laws_of(one.effects))
-        for one in (finding.verdict.base, finding.accepted)
+        data.residuals(fitted.values[:n_base], laws_of(fitted.effects))
+        for fitted in (finding.verdict.base, finding.accepted)
     ]
-    residual = [(root_mean_square(data, one), data.coefficients(one)[0]) for one in whitened]
+    residual = [
+        (root_mean_square(data, residuals), data.coefficients(residuals)[0])
+        for residuals in whitened
+    ]
     floor = root_mean_square(data, np.ones(len(data.frequency)))
     change = root_mean_square(data, whitened[1] - whitened[0])
     counts = [len(rows) for rows in data.rows_of_parts()]
@@ -232,20 +235,21 @@ def chance_of(expected: float, change: float, values: float) -> float:
 def rests_told(finding: MechanismFinding) -> list[str]:
     """Return a sentence for each training record of which rows at rest are left out."""
     return [
-        f"Rows of {one.record.name} at rest: {one.left_out}. They are left out, as dry friction, "
-        "which is known to act, may have any force up to its breakaway there. What acts only there "
+        f"Rows of {balance.record.name} at rest: {balance.left_out}. They are left out, as dry "
+        "friction, which is known to act, may have any force up to its breakaway there. What acts only there "
         "or right beside it, such as friction that falls at the slowest speeds, is not judged."
-        for one in finding.data.spectra
-        if one.left_out
+        for balance in finding.data.spectra
+        if balance.left_out
     ]
 
 
 def grown(gaps: Sequence[MeasuredGap]) -> dict[str, float]:
     """Return the gaps that the correction made worse: after over before."""
-    worse = [one for one in gaps if one.worse(among=len(gaps))]
+    worse = [error for error in gaps if error.worse(among=len(gaps))]
     return {
-        f"{one.quantity} by {one.kind} in {one.record}": one.after / max(one.before, 1e-300)
-        for one in worse
+        f"{error.quantity} by {error.kind} in {error.record}": error.after
+        / max(error.before, 1e-300)
+        for error in worse
     }
 
 
