@@ -236,8 +236,9 @@ def rests_told(finding: MechanismFinding) -> list[str]:
     """Return a sentence for each training record of which rows at rest are left out."""
     return [
         f"Rows of {balance.record.name} at rest: {balance.left_out}. They are left out, as dry "
-        "friction, which is known to act, may have any force up to its breakaway there. What acts only there "
-        "or right beside it, such as friction that falls at the slowest speeds, is not judged."
+        "friction, which is known to act, may have any force up to its breakaway there. What acts "
+        "only there or right beside it, such as friction that falls at the slowest speeds, is not "
+        "judged."
         for balance in finding.data.spectra
         if balance.left_out
     ]
