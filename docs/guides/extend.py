@@ -240,7 +240,7 @@ for name, deflection in (("wide", 4e-3), ("less", 3e-3), ("narrow", 1.5e-3), ("h
 analysis = analyse(Oscillator(stiffness, frequency, 0.85, 0.2, noise, tests))
 print(f"{analysis.verdict.status}: {analysis.revised_model().effects[0]}, {friction} N is hidden")
 print(analysis.locate().sentence)
-print(f"error of prediction, in deviations of the noise: {analysis.prove().overall.after:.2f}")
+print(f"error of prediction, in deviations of the noise: {analysis.validate().overall.after:.2f}")
 
 # %%
 # A part of an algorithm

@@ -82,7 +82,7 @@ def _analysed(options: argparse.Namespace, believed: ModelFiles, say: Say) -> di
     say("locating the misfit")
     analysis.locate()
     say("proving it on the records that were held out")
-    analysis.prove()
+    analysis.validate()
     say("choosing the next test and writing the report")
     document = analysis.report(options.out)
     for hint in document.get("sensor_hints", ()):

@@ -1,4 +1,4 @@
-"""Every value at both of its bounds goes through fit, proof, report and revised model."""
+"""Every value at both of its bounds goes through fit, validation, report and revised model."""
 
 from dataclasses import replace
 
@@ -17,8 +17,8 @@ from pymoo_hdte.discrepancy._report.mechanism import write_mechanism_report
 from pymoo_hdte.discrepancy._selection.fitting import fit
 from pymoo_hdte.discrepancy._verdicts.held_out import simulate_held_out
 from pymoo_hdte.discrepancy._verdicts.mechanism_finding import MechanismFinding
-from pymoo_hdte.discrepancy._verdicts.validation_drive import prove
-from pymoo_hdte.discrepancy._verdicts.validation_mechanism import prove_measured
+from pymoo_hdte.discrepancy._verdicts.validation_drive import validate_drive
+from pymoo_hdte.discrepancy._verdicts.validation_mechanism import validate_mechanism
 from pymoo_hdte.mechanism import BelievedValue, Input, Mechanism, Port
 from pymoo_hdte.mechanism.believed import LARGEST_FACTOR, SMALLEST_SHARE
 
@@ -53,7 +53,7 @@ def test_a_mechanism_is_proved_reported_and_believed_again(quantity, bound, limi
     finding = MechanismFinding(mechanism, records, CUTOFF, data, verdict, simulated=simulated)
     out = tmp_path / "report"
     document = write_mechanism_report(
-        "rig", finding, prove_measured(finding), next_test(finding), out
+        "rig", finding, validate_mechanism(finding), next_test(finding), out
     )
     told = document["base"][quantity]
     assert told["at_bound"]
@@ -85,8 +85,8 @@ def test_a_drive_is_proved_and_revised(bound):
         values[row] = getattr(parameter, bound)
         chosen = replace(finding.verdict.chosen, fit=replace(fitted, values=values))
         there = replace(finding, verdict=replace(finding.verdict, chosen=chosen))
-        proof = prove(there)
-        assert np.isfinite([gap.after for gap in proof.channels.values()]).all()
+        validation = validate_drive(there)
+        assert np.isfinite([error.after for error in validation.channels.values()]).all()
         model = drive_model(finding.campaign, chosen.fit, "revised", "at a bound")
         assert np.all(np.isfinite(model.dte_arcsec(model.nominal[None])))
 

@@ -144,7 +144,7 @@ def effects_table(outcomes: Sequence[Outcome]) -> Table:
                   for status in _OTHERS]  # fmt: skip
         biases = [median([one.numbers.get(f"bias_{state}") for one in chosen]).value
                   for state in ("before", "after", "error")]  # fmt: skip
-        gaps = [one.gap("leading") for one in chosen]
+        errors = [one.error("leading") for one in chosen]
         rows.append((
             _plain(name), len(chosen), right.value, right.low, right.high,
             sum(one.wrong_confident for one in chosen), *counts,
@@ -152,7 +152,7 @@ def effects_table(outcomes: Sequence[Outcome]) -> Table:
             median([one.bias_ratio for one in chosen]).value,
             median([one.shrinkage("transmission_error") for one in chosen]).value,
             median([one.shrinkage("leading") for one in chosen]).value,
-            median([g.after / g.noise_floor for g in gaps if g is not None]).value,
+            median([g.after / g.noise_floor for g in errors if g is not None]).value,
         ))  # fmt: skip
     columns = (
         Column("hidden"),

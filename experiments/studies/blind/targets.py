@@ -122,8 +122,8 @@ def demands(outcomes: Sequence[Outcome]) -> Iterator[Judged]:
     yield from _covered(share([flag for one in outcomes for flag in one.covered]))
     f1 = median([one.f1 for one in single])
     yield Judged("F1 of the flagged cells, median", listed, LEAST_F1, f1)
-    for gap in ("transmission_error", "leading"):
-        yield from _proof(gap, single)
+    for error in ("transmission_error", "leading"):
+        yield from _validation(error, single)
 
 
 def pooled_demands(counts: Counts) -> Iterator[Judged]:
@@ -166,10 +166,10 @@ _GAP_WORDS = {
 }
 
 
-def _proof(gap: str, single: Sequence[Outcome]) -> Iterator[Judged]:
-    where, multiple = f"one listed effect, {_GAP_WORDS[gap]}", FLOOR_MULTIPLE
-    shrunk = median([one.shrinkage(gap) for one in single])
+def _validation(error: str, single: Sequence[Outcome]) -> Iterator[Judged]:
+    where, multiple = f"one listed effect, {_GAP_WORDS[error]}", FLOOR_MULTIPLE
+    shrunk = median([one.shrinkage(error) for one in single])
     yield Judged("shrinkage of the held-out gap, median", where, LEAST_SHRINKAGE, shrunk)
-    closed = [one.closed(gap, multiple) for one in single if one.open_before(gap, multiple)]
+    closed = [one.closed(error, multiple) for one in single if one.open_before(error, multiple)]
     what = f"held-out gap within {multiple:g} x the noise floor"
     yield Judged(what, where, LEAST_CLOSED, share(closed))

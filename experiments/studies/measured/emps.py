@@ -38,14 +38,14 @@ SOURCE = "Janot, Gautier, Brunot (2019), nonlinearbenchmark.org; its offset is -
 
 
 def run(context: Context) -> Result:
-    """Start from the model without friction; compare verdict, values and proof with known ones."""
+    """Start from the model without friction; compare all results with known ones."""
     return measured_result(RIG, _judged)
 
 
 def _judged(one: Study, found: tuple[Twin, ...]) -> Table:
     known = {name: value for name, (value, _) in PUBLISHED.items()}
     table = values_table(one, known, "literature", SOURCE)
-    simulated = next(gap for gap in one.gaps if gap.kind == "simulation")
+    simulated = next(error for error in one.errors if error.kind == "simulation")
     ours = fitted_values(one)
     near = all(
         name in ours

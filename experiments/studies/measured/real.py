@@ -47,7 +47,7 @@ from experiments.studies.measured.real_numbers import (
 from experiments.studies.measured.rigs import MEASURED, Study
 from pymoo_hdte._io.text_table import csv_text
 from pymoo_hdte.discrepancy._report.tables import STATUSES
-from pymoo_hdte.discrepancy._verdicts.validation_mechanism import prove_measured
+from pymoo_hdte.discrepancy._verdicts.validation_mechanism import validate_mechanism
 
 NAME = "real"
 VERDICTS = (
@@ -142,12 +142,14 @@ def examined(rig: KnownRig, tools: bool = True, whole: bool = True) -> Examined 
         rows.append(_tool_row(rig, answer))
         seconds.append([rig.name, answer.tool, f"{answer.seconds:.3g}"])
     if whole and rig.name == ARROW:
-        gap = next(
-            gap for gap in prove_measured(one.finding, whole=True) if gap.determination is not None
+        error = next(
+            error
+            for error in validate_mechanism(one.finding, whole=True)
+            if error.determination is not None
         )
-        assert gap.determination is not None
-        words = f"the same, {gap.record} without a break"
-        rows.append([TOOL, "", words, "", f"{gap.determination[1]:.5f}"])
+        assert error.determination is not None
+        words = f"the same, {error.record} without a break"
+        rows.append([TOOL, "", words, "", f"{error.determination[1]:.5f}"])
     return Examined(verdict_row(rig, one), [[rig.name, *row] for row in rows], seconds)
 
 
@@ -156,7 +158,7 @@ def verdict_row(rig: KnownRig, one: Study) -> list[str]:
     judgement, words = _said(rig, one)
     off, order = farthest(rig, one), nearest_order(rig, one)
     rms = [pooled(one, kind, side) for kind in ("balance", "simulation") for side in (0, 1)]
-    extents = [gap.extent.length for gap in one.gaps if gap.extent is not None]
+    extents = [error.extent.length for error in one.errors if error.extent is not None]
     numbers = [off, order, rig.order, *rms, min(extents, default=None)]
     shown = ["" if number is None else f"{number:.4g}" for number in numbers]
     by_simulation = [f"{value:.5f}" for value in explained(one)]

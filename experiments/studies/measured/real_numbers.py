@@ -32,8 +32,8 @@ def named(one: Study) -> list[dict[str, Any]]:
 
 def torsion_errors(one: Study) -> list[str]:
     """Return the errors of the held-out torsion before and after, arcseconds, where measured."""
-    gaps = one.joint.gaps if one.joint else ()
-    sizes = ([getattr(gap, side) for gap in gaps] for side in ("before", "after"))
+    errors = one.joint.errors if one.joint else ()
+    sizes = ([getattr(error, side) for error in errors] for side in ("before", "after"))
     return [f"{np.sqrt(np.mean(np.square(each))) / ARCSEC:.4g}" if each else "" for each in sizes]
 
 
@@ -44,24 +44,24 @@ def share_in_words(value: float | None) -> str:
 
 def determinations(one: Study) -> list[str]:
     """Return R2 of force and simulated position by the accepted model, held out."""
-    finding, gaps = one.finding, [gap for gap in one.gaps if gap.kind == "balance"]
+    finding, errors = one.finding, [error for error in one.errors if error.kind == "balance"]
     (name,) = finding.mechanism.coordinates
-    gaps = [gap for gap in gaps if gap.quantity == name]
-    if not gaps:
+    errors = [error for error in errors if error.quantity == name]
+    if not errors:
         return ["", ""]
     power = terms_of(finding, "held_out", ()).power
-    left = float(np.mean([gap.after**2 for gap in gaps]))
+    left = float(np.mean([error.after**2 for error in errors]))
     return [f"{1.0 - left / power:.5f}", f"{explained(one)[1]:.5f}"]
 
 
 def explained(one: Study) -> tuple[float, float]:
     """Return R2 of all simulated positions, before and after."""
-    gaps = [gap for gap in one.gaps if gap.extent is not None]
-    if not gaps:
+    errors = [error for error in one.errors if error.extent is not None]
+    if not errors:
         return np.nan, np.nan
-    power = np.concatenate([gap.measured - gap.measured.mean() for gap in gaps])
+    power = np.concatenate([error.measured - error.measured.mean() for error in errors])
     left = (
-        np.concatenate([gap.measured - getattr(gap, side) for gap in gaps])
+        np.concatenate([error.measured - getattr(error, side) for error in errors])
         for side in ("predicted_before", "predicted_after")
     )
     before, after = (1.0 - float(np.mean(one**2) / np.mean(power**2)) for one in left)
@@ -72,9 +72,9 @@ def pooled(one: Study, kind: str, side: int) -> float | None:
     """Return the root mean square over the held-out records, of the first coordinate."""
     name = one.finding.mechanism.coordinates[0]
     sizes = [
-        (gap.before, gap.after)[side]
-        for gap in one.gaps
-        if (gap.kind, gap.quantity) == (kind, name)
+        (error.before, error.after)[side]
+        for error in one.errors
+        if (error.kind, error.quantity) == (kind, name)
     ]
     return float(np.sqrt(np.mean(np.square(sizes)))) if sizes else None
 

@@ -1,4 +1,4 @@
-"""The report on one rig that others measured: verdict, judged values, proof and twins."""
+"""The report on one rig that others measured: verdict, judged values, validation and twins."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from experiments.runner.result import Result, Table
 from experiments.studies.measured.rigs import (
     Study,
     absent,
+    errors_table,
     evidence_table,
-    gaps_table,
     pictures,
     study,
     verdict_paragraphs,
@@ -62,6 +62,6 @@ def measured_result(rig: MeasuredRig, judge: Judge) -> Result:
         title=rig.title,
         command=command,
         paragraphs=(rig.believed, *verdict_paragraphs(one)),
-        tables=(judge(one, found), gaps_table(one), twins_table(found), evidence_table(one)),
+        tables=(judge(one, found), errors_table(one), twins_table(found), evidence_table(one)),
         pictures=pictures(one),
     )

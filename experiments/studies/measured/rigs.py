@@ -16,15 +16,18 @@ from pymoo_hdte._reports.html import percent
 from pymoo_hdte.discrepancy._answers.next_test_mechanism import next_test
 from pymoo_hdte.discrepancy._evidence.force_balances.joint_halves import joint_of, rigid_half
 from pymoo_hdte.discrepancy._records.rig_files import MeasuredMechanism, read_rig
-from pymoo_hdte.discrepancy._report.mechanism import extent_sentence, proof_sentence
-from pymoo_hdte.discrepancy._report.mechanism_document import limits, offered, remainder
+from pymoo_hdte.discrepancy._report.mechanism import extent_sentence, validation_sentence
+from pymoo_hdte.discrepancy._report.mechanism_document import limits, offered, unexplained
 from pymoo_hdte.discrepancy._report.mechanism_figures import misfit_over_motion, overlay
 from pymoo_hdte.discrepancy._report.mechanism_values import effects, quantities
 from pymoo_hdte.discrepancy._report.tables import STATUSES
 from pymoo_hdte.discrepancy._verdicts.joint import JointFinding, examine_joint
 from pymoo_hdte.discrepancy._verdicts.mechanism import examine_mechanism
 from pymoo_hdte.discrepancy._verdicts.mechanism_finding import MechanismFinding
-from pymoo_hdte.discrepancy._verdicts.validation_mechanism import MeasuredGap, prove_measured
+from pymoo_hdte.discrepancy._verdicts.validation_mechanism import (
+    MechanismPredictionError,
+    validate_mechanism,
+)
 from pymoo_hdte.effects.sentence_blanks import in_words
 
 MEASURED = Path(__file__).resolve().parents[4] / "shared" / "measured"
@@ -35,15 +38,15 @@ _BANDS = 12
 
 @dataclass(frozen=True, eq=False)
 class Study:
-    """A rig, what the workflow finds in its records, and the proof.
+    """A rig, what the workflow finds in its records, and the validation.
 
-    Of a joint with two encoders the rig, the finding and the proof are those of its torques;
+    Of a joint with two encoders the rig, the finding and the validation are those of its torques;
     ``joint`` has the torsion as well.
     """
 
     rig: MeasuredMechanism
     finding: MechanismFinding
-    gaps: tuple[MeasuredGap, ...]
+    errors: tuple[MechanismPredictionError, ...]
     joint: JointFinding | None = None
 
     @property
@@ -66,9 +69,9 @@ def study(name: str, folder: str) -> Study | None:
     joint = joint_of(rig.mechanism)
     if joint is None:
         finding = examine_mechanism(rig.mechanism, *believed)
-        return Study(rig, finding, prove_measured(finding))
+        return Study(rig, finding, validate_mechanism(finding))
     both = examine_joint(joint, *believed)
-    return Study(torques_of(rig), both.torque, prove_measured(both.torque), both)
+    return Study(torques_of(rig), both.torque, validate_mechanism(both.torque), both)
 
 
 def torques_of(rig: MeasuredMechanism) -> MeasuredMechanism:
@@ -104,9 +107,9 @@ def verdict_paragraphs(one: Study) -> tuple[str, ...]:
     )
     return (
         f"Verdict: {STATUSES[one.finding.verdict.status]}. {named}",
-        f"{remainder(one.finding)['sentence']} {second}".strip(),
+        f"{unexplained(one.finding)['sentence']} {second}".strip(),
         *limits(one.finding),
-        proof_sentence(one.finding, one.gaps),
+        validation_sentence(one.finding, one.errors),
         f"Next test: {next_test(one.finding).description}",
     )
 
@@ -157,8 +160,8 @@ def values_table(one: Study, known: Mapping[str, float], heading: str, source: s
     )
 
 
-def gaps_table(one: Study) -> Table:
-    """Return the gaps on held-out records."""
+def errors_table(one: Study) -> Table:
+    """Return the errors on held-out records."""
     return Table(
         "held_out",
         "Root mean square errors on held-out records",
@@ -174,13 +177,20 @@ def gaps_table(one: Study) -> Table:
         ),
         tuple(
             (
-                *(gap.record, gap.quantity, gap.kind, gap.before, gap.after, gap.noise_floor),
-                *(gap.determination or (None, None)),
+                *(
+                    error.record,
+                    error.quantity,
+                    error.kind,
+                    error.before,
+                    error.after,
+                    error.noise_floor,
+                ),
+                *(error.determination or (None, None)),
             )
-            for gap in one.gaps
+            for error in one.errors
         ),
         note="Before: the fitted model without the effects. A simulation has the measured inputs. "
-        f"{extent_sentence(one.gaps)}",
+        f"{extent_sentence(one.errors)}",
     )
 
 
@@ -203,7 +213,9 @@ def evidence_table(one: Study) -> Table:
 
 def pictures(one: Study) -> tuple[Picture, ...]:
     """Return what is left over the motion, and the held-out record that was missed most."""
-    drawn = [gap for gap in one.gaps if gap.kind == "simulation" and np.isfinite(gap.after)]
+    drawn = [
+        error for error in one.errors if error.kind == "simulation" and np.isfinite(error.after)
+    ]
     found = [
         Picture(
             "misfit",
@@ -213,7 +225,7 @@ def pictures(one: Study) -> tuple[Picture, ...]:
         )
     ]
     if drawn:
-        worst = max(drawn, key=lambda gap: gap.before)
+        worst = max(drawn, key=lambda error: error.before)
         caption = f"Held-out record {worst.record}, simulated."
         found.append(Picture("overlay", caption, overlay(one.finding, worst)))
     return tuple(found)

@@ -91,18 +91,18 @@ def _counted(statuses: Sequence[str]) -> str:
 
 def verdict_row(name: str, analysis: DriveAnalysis) -> list[str]:
     """Return what is said of a rig, in the order of `COLUMNS`."""
-    verdict, proof = analysis.verdict, analysis.prove()
+    verdict, validation = analysis.verdict, analysis.validate()
     accepted = verdict.accepted
     effects = "" if accepted is verdict.base else _labels(accepted.candidates)
     rivals = " or ".join(_labels(one.candidates) for one in verdict.equivalent)
     fits = [one.chi_square / verdict.degrees_of_freedom for one in (verdict.base, accepted)]
     words = [name, verdict.status, effects, rivals, "; ".join(map(in_a_sentence, verdict.reasons))]
-    gaps = [float("nan")] * 5
-    if proof is not None:
-        error = proof.channels["transmission_error"]
-        gaps = [proof.overall.before, proof.overall.after]
-        gaps += [error.before, error.after, error.noise_floor]
-    return [*words, *(f"{one:.5g}" for one in (*fits, *gaps))]
+    errors = [float("nan")] * 5
+    if validation is not None:
+        error = validation.channels["transmission_error"]
+        errors = [validation.overall.before, validation.overall.after]
+        errors += [error.before, error.after, error.noise_floor]
+    return [*words, *(f"{one:.5g}" for one in (*fits, *errors))]
 
 
 def _labels(candidates: Sequence[Candidate]) -> str:

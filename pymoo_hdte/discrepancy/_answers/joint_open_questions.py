@@ -43,7 +43,7 @@ def open_by_motion(finding: JointFinding) -> list[str]:
     torsion, gear = finding.torsion, finding.joint.gear.name
     shaft = torsion.mechanism.ports[0].name
     found = [
-        *wiring_doubts(finding),
+        *wiring_caveats(finding),
         "The zeros of the two encoders are not known: a constant torque ahead of the gear, or a "
         "constant error of it, is part of them. Held-out records are compared about their means.",
     ]
@@ -152,7 +152,7 @@ def torsion_test(finding: JointFinding) -> str:
 Values = NDArray[np.float64]
 
 
-def wiring_doubts(finding: JointFinding) -> list[str]:
+def wiring_caveats(finding: JointFinding) -> list[str]:
     """Return what may be wrong with the encoders of a joint, in sentences.
 
     Nothing where the spring alone, or a friction named ahead of the gear, is the better answer.

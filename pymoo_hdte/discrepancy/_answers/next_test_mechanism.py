@@ -199,7 +199,7 @@ def _separation(
 ) -> float:
     """Return the difference of two hypotheses in a repeated record that the base cannot absorb."""
     balance = finding.data.spectra[place]
-    power, rest = 0.0, finding.remainder
+    power, rest = 0.0, finding.unexplained
     for row, name in enumerate(finding.data.names):
         difference = np.zeros(len(balance.time))
         imitated = [np.ones(len(balance.time))]

@@ -92,7 +92,7 @@ class ModelEvidence(ABC):
         """
 
     @property
-    def remainder(self) -> float:
+    def model_error_share(self) -> float:
         """Share of the base's excess up to which a residual counts as the model's own error."""
         return self.rules.model_accuracy**2
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pymoo_hdte._reports.html import number, percent
 from pymoo_hdte.discrepancy._evidence.order_lines.evidence import PARTS
 from pymoo_hdte.discrepancy._evidence.order_lines.parameters import labels_by_order, words_of
-from pymoo_hdte.discrepancy._report.words import doubts
+from pymoo_hdte.discrepancy._report.words import caveats
 from pymoo_hdte.discrepancy._selection.hypothesis import (
     Hypothesis,
     adequate,
@@ -47,7 +47,7 @@ def how_sure(finding: DriveFinding) -> str:
             f"{certain} The nearest known effect, "
             f"{labels_by_order(verdict.chosen.label, orders)}, explains {share} of the misfit, "
             f"{_too_little(finding, verdict.chosen)}."
-            + "".join(f" Against it: {one}." for one in doubts(verdict, orders))
+            + "".join(f" Against it: {one}." for one in caveats(verdict, orders))
         )
     return " ".join(_evidence(finding, verdict.chosen, share))
 

@@ -15,7 +15,7 @@ from pymoo_hdte.discrepancy._answers.where.map import Location
 from pymoo_hdte.discrepancy._answers.where.relevance import relevance
 from pymoo_hdte.discrepancy._evidence.order_lines.evidence import PARTS
 from pymoo_hdte.discrepancy._evidence.order_lines.parameters import base_unit, labels_by_order
-from pymoo_hdte.discrepancy._report.words import doubts
+from pymoo_hdte.discrepancy._report.words import caveats
 from pymoo_hdte.discrepancy._selection.candidate import Candidate, labels_apart
 from pymoo_hdte.discrepancy._selection.fitting import Fit
 from pymoo_hdte.discrepancy._selection.hypothesis import (
@@ -66,7 +66,7 @@ def verdict_document(
         "status": verdict.status,
         "sentence": sentence(verdict, orders),
         "probability": verdict.probability,
-        "doubts": doubts(verdict, orders),
+        "doubts": caveats(verdict, orders),
         "reasons": [reason.as_dict() for reason in verdict.reasons],
         "effects": effects_of(verdict),
         "relevance": None if matters is None else matters.as_dict(),
@@ -128,7 +128,7 @@ def sentence(verdict: Verdict, error_orders: Sequence[float] = ()) -> str:
     if verdict.status == "class" and verdict.equivalent:
         what = f"{what} {_or_else([chosen, *verdict.equivalent], error_orders)}"
     if verdict.reasons:
-        against = "; ".join(doubts(verdict, error_orders))
+        against = "; ".join(caveats(verdict, error_orders))
         return f"{what} That is not all, or not quite right: {against}."
     return what
 

@@ -23,7 +23,7 @@ from pymoo_hdte.discrepancy._report.document import (
 )
 from pymoo_hdte.discrepancy._report.folder import FOLDER
 from pymoo_hdte.discrepancy._report.tables import STATUSES, effect_rows, hypothesis_rows
-from pymoo_hdte.discrepancy._report.words import doubts
+from pymoo_hdte.discrepancy._report.words import caveats
 from pymoo_hdte.discrepancy._verdicts.machine import HeldOutErrors, MachineFinding
 from pymoo_hdte.mechanism.effects import table_of
 
@@ -62,7 +62,7 @@ def write_machine_report(
         "status": verdict.status,
         "sentence": _sentence(finding),
         "probability": verdict.probability,
-        "doubts": doubts(verdict),
+        "doubts": caveats(verdict),
         "reasons": [reason.as_dict() for reason in verdict.reasons],
         "effects": effects_of(verdict, unit_of),
         "alternatives": alternatives_of(verdict),
@@ -108,13 +108,13 @@ def error_sentence(finding: MachineFinding, errors: HeldOutErrors | None) -> str
     """Return in words how the error of prediction on held-out records changed."""
     if errors is None:
         return "No record was held out, so nothing can be said about conditions not fitted."
-    gap = errors.overall
-    before, after = f"{number(gap.before)} times the noise", number(gap.after)
+    error = errors.overall
+    before, after = f"{number(error.before)} times the noise", number(error.after)
     if not finding.verdict.accepted.candidates:
         return f"Nothing was added; the model is off by {before} on held-out records."
     words = f"On held-out records the model was off by {before}; with the correction by {after}."
-    if gap.shrinkage is not None:
-        words += f" {percent(min(gap.shrinkage, 1.0))} of what noise does not explain is gone."
+    if error.shrinkage is not None:
+        words += f" {percent(min(error.shrinkage, 1.0))} of what noise does not explain is gone."
     if errors.growths:
         words += f" Worse than before: {', '.join(errors.growths)}."
     return words

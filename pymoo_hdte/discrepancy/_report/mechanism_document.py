@@ -20,8 +20,8 @@ from pymoo_hdte.discrepancy._selection.hypothesis import Hypothesis, label_of
 from pymoo_hdte.discrepancy._selection.reason import NOT_VALIDATED, Reason
 from pymoo_hdte.discrepancy._verdicts.mechanism_finding import MechanismFinding
 from pymoo_hdte.discrepancy._verdicts.validation_mechanism import (
-    MeasuredGap,
-    rests_told,
+    MechanismPredictionError,
+    sentences_on_rest,
 )
 from pymoo_hdte.effects.sentence_blanks import in_words
 from pymoo_hdte.mechanism.effects import table_of
@@ -30,7 +30,10 @@ from pymoo_hdte.mechanism.resampling import share_beyond
 
 
 def mechanism_verdict_document(
-    title: str, finding: MechanismFinding, gaps: Sequence[MeasuredGap], test: NextTest
+    title: str,
+    finding: MechanismFinding,
+    errors: Sequence[MechanismPredictionError],
+    test: NextTest,
 ) -> dict[str, Any]:
     """Return the verdict as plain types.
 
@@ -38,7 +41,7 @@ def mechanism_verdict_document(
     ----------
     title : str
     finding : MechanismFinding
-    gaps : sequence of MeasuredGap
+    errors : sequence of MechanismPredictionError
         Of held-out records; empty where there are none.
     test : NextTest
     """
@@ -58,10 +61,10 @@ def mechanism_verdict_document(
         **with_believed_effects([table_of(effect) for effect in finding.believed]),
         "band": band(finding),
         "location": locate_in_mechanism(finding).summary(),
-        "remainder": remainder(finding),
+        "remainder": unexplained(finding),
         "limits": limits(finding),
         "record_remarks": record_remarks(finding),
-        "held_out": [gap.as_dict() for gap in gaps]
+        "held_out": [error.as_dict() for error in errors]
         or {"reason": "no record was held out, so that nothing can be proved"},
         "next_experiment": test.as_dict(),
         "versions": {
@@ -101,9 +104,9 @@ def offered(finding: MechanismFinding) -> list[dict[str, Any]]:
     return found
 
 
-def remainder(finding: MechanismFinding) -> dict[str, Any]:
+def unexplained(finding: MechanismFinding) -> dict[str, Any]:
     """Return the residual of the accepted model, and its share of the misfit in words."""
-    after, noise = finding.remainder, finding.sensor_noise
+    after, noise = finding.unexplained, finding.sensor_noise
     size = ", ".join(
         f"{one:.3g} {unit_of(finding.mechanism, name)} in the {finding.data.what(name)} "
         f"({one / max(floor, 1e-300):.2g} times the sensors' noise)"
@@ -168,7 +171,7 @@ def limits(finding: MechanismFinding) -> list[str]:
         for port in finding.mechanism.ports
         if not port.read and not turns_back(finding.data, port.name)
     ]
-    found += rests_told(finding)
+    found += sentences_on_rest(finding)
     found += [
         f"What force a unit of {one.name} makes is not known: masses, springs, dampers and forces "
         f"are told in units of {one.name}. Their ratios and the kind of effect are determined, "

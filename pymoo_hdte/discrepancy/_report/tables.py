@@ -27,8 +27,8 @@ from pymoo_hdte.discrepancy._selection.fitting import Fit
 from pymoo_hdte.discrepancy._selection.hypothesis import Hypothesis
 from pymoo_hdte.discrepancy._selection.verdict import Verdict
 from pymoo_hdte.discrepancy._verdicts.drive_finding import DriveFinding
-from pymoo_hdte.discrepancy._verdicts.gap import Gap
-from pymoo_hdte.discrepancy._verdicts.validation_drive import Proof
+from pymoo_hdte.discrepancy._verdicts.prediction_error import PredictionError
+from pymoo_hdte.discrepancy._verdicts.validation_drive import Validation
 from pymoo_hdte.effects.sentence_blanks import listed
 from pymoo_hdte.effects.unknowns import HARMONIC_NAMES, Parameter
 from pymoo_hdte.units import ARCSEC, REVOLUTION_PER_MINUTE
@@ -156,11 +156,11 @@ def parameter_rows(finding: DriveFinding) -> list[ParameterRow]:
     ]
 
 
-def metric_rows(proof: Proof | None) -> list[tuple[str, float, float]]:
+def metric_rows(validation: Validation | None) -> list[tuple[str, float, float]]:
     """Return the paper's metrics of the peak-to-peak: name, before, after."""
-    if proof is None or proof.metrics is None:
+    if validation is None or validation.metrics is None:
         return []
-    before, after = proof.metrics
+    before, after = validation.metrics
     rows = [(word, getattr(before, name), getattr(after, name)) for name, word in METRICS.items()]
     ends = zip(
         ("lower", "upper"), before.mean_error_interval, after.mean_error_interval, strict=True
@@ -169,10 +169,14 @@ def metric_rows(proof: Proof | None) -> list[tuple[str, float, float]]:
 
 
 def record_rows(
-    campaign: Campaign, proof: Proof | None
-) -> list[tuple[str, str, float, float, int, Gap | None]]:
-    """Return name, role, speed (r/min), load (N.m), rows and, where held out, gap of records."""
-    gaps = {} if proof is None else dict(zip(proof.records, proof.by_record, strict=True))
+    campaign: Campaign, validation: Validation | None
+) -> list[tuple[str, str, float, float, int, PredictionError | None]]:
+    """Return name, role, speed (r/min), load (N.m), rows and, where held out, error of records."""
+    errors = (
+        {}
+        if validation is None
+        else dict(zip(validation.records, validation.by_record, strict=True))
+    )
     return [
         (
             record.name,
@@ -180,7 +184,7 @@ def record_rows(
             record.input_speed / REVOLUTION_PER_MINUTE,
             record.load_torque,
             len(record.time),
-            gaps.get(record.name),
+            errors.get(record.name),
         )
         for record in campaign.running
     ]

@@ -24,7 +24,7 @@ from pymoo_hdte.discrepancy._selection.candidate import Candidate
 from pymoo_hdte.discrepancy._selection.reason import NOT_VALIDATED, Reason
 from pymoo_hdte.discrepancy._verdicts.joint import JointFinding
 from pymoo_hdte.discrepancy._verdicts.joint_torsion import KINEMATIC, errors_of
-from pymoo_hdte.discrepancy._verdicts.validation_mechanism import rests_told
+from pymoo_hdte.discrepancy._verdicts.validation_mechanism import sentences_on_rest
 from pymoo_hdte.effects.sentence_blanks import in_words
 from pymoo_hdte.mechanism import LawAt
 from pymoo_hdte.units import ARCSEC
@@ -52,28 +52,28 @@ def torsion_document(finding: JointFinding) -> dict[str, Any]:
         "alternatives": [evidence(torsion, one) for one in alternatives],
         "not_ruled_out": [in_words(one.label) for one in near_by(finding)],
         "base": quantities(torsion),
-        "remainder": _remainder(finding),
+        "remainder": _unexplained(finding),
         "limits": torsion_limits(finding),
         "held_out": [
             {
-                "record": gap.record,
-                "before_arcsec": gap.before / ARCSEC,
-                "after_arcsec": gap.after / ARCSEC,
-                "noise_floor_arcsec": gap.noise_floor / ARCSEC,
-                "before_Nm": gap.before * finding.stiffness,
-                "after_Nm": gap.after * finding.stiffness,
-                "shrinkage": gap.shrinkage,
+                "record": error.record,
+                "before_arcsec": error.before / ARCSEC,
+                "after_arcsec": error.after / ARCSEC,
+                "noise_floor_arcsec": error.noise_floor / ARCSEC,
+                "before_Nm": error.before * finding.stiffness,
+                "after_Nm": error.after * finding.stiffness,
+                "shrinkage": error.shrinkage,
             }
-            for gap in finding.gaps
+            for error in finding.errors
         ],
-        "proof": _proof(finding),
+        "proof": _validation(finding),
         "next_experiment": torsion_test(finding),
     }
 
 
 def torsion_limits(finding: JointFinding) -> list[str]:
     """Return what the records cannot tell of the torsion, in sentences."""
-    of_names, of_rest = _unnamed(finding), rests_told(finding.torsion)
+    of_names, of_rest = _unnamed(finding), sentences_on_rest(finding.torsion)
     return [*open_by_motion(finding), *of_names, *of_rest, *open_by_twins(finding)]
 
 
@@ -196,9 +196,9 @@ def _size(finding: JointFinding, laws: tuple[LawAt, ...]) -> dict[str, float]:
     return {"rms_Nm": size, "rms_arcsec": size / finding.stiffness / ARCSEC}
 
 
-def _remainder(finding: JointFinding) -> dict[str, Any]:
+def _unexplained(finding: JointFinding) -> dict[str, Any]:
     torsion = finding.torsion
-    (left,), (noise,) = torsion.remainder.tolist(), torsion.sensor_noise.tolist()
+    (left,), (noise,) = torsion.unexplained.tolist(), torsion.sensor_noise.tolist()
     arcseconds = left / finding.stiffness / ARCSEC
     named = bool(torsion.accepted.candidates)
     removed = torsion.share_removed if named else 0.0
@@ -215,14 +215,16 @@ def _remainder(finding: JointFinding) -> dict[str, Any]:
     }
 
 
-def _proof(finding: JointFinding) -> str:
-    if not finding.gaps:
+def _validation(finding: JointFinding) -> str:
+    if not finding.errors:
         return "No record was held out, so that nothing can be proved."
     before, after, floor = (
-        float(np.sqrt(np.mean([getattr(gap, one) ** 2 for gap in finding.gaps]))) / ARCSEC
+        float(np.sqrt(np.mean([getattr(error, one) ** 2 for error in finding.errors]))) / ARCSEC
         for one in ("before", "after", "noise_floor")
     )
-    measured = float(np.sqrt(np.mean([np.var(gap.measured) for gap in finding.gaps]))) / ARCSEC
+    measured = (
+        float(np.sqrt(np.mean([np.var(error.measured) for error in finding.errors]))) / ARCSEC
+    )
     told = f"of {measured:.3g} arcseconds that were measured; the encoders' noise is {floor:.2g}"
     if not finding.torsion.accepted.candidates:
         return f"Nothing was added; the held-out torsion is off by {before:.3g} {told}."

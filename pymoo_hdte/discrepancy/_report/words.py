@@ -69,7 +69,7 @@ def in_a_sentence(reason: Reason, label: Label = str) -> str:
     return _SENTENCES[reason.code](reason, label)
 
 
-def doubts(verdict: Verdict, error_orders: Sequence[float] = ()) -> list[str]:
+def caveats(verdict: Verdict, error_orders: Sequence[float] = ()) -> list[str]:
     """Return the reasons of a verdict in words.
 
     Parameters

@@ -192,7 +192,7 @@ class Evidence(Protocol):
         ...
 
     @property
-    def remainder(self) -> float:
+    def model_error_share(self) -> float:
         """Share of the base's excess up to which a residual is attributed to no effect."""
         ...
 

@@ -68,7 +68,7 @@ class Verdict:
         Thresholds of the verdict.
     reasons : tuple of Reason
         What forbids to name the chosen effects plainly; with ``"partial"`` and ``"class"`` they are
-        certain as far as they go. In words they are ``doubts`` of an analysis.
+        certain as far as they go. In words they are ``caveats`` of an analysis.
     shown_in_held_out : bool
         Whether the records kept out of the fit, if there are any, show what is chosen.
     probability : float or None
@@ -148,9 +148,9 @@ class Verdict:
         chosen = self.chosen
         return chosen is not None and chosen.explained >= self.rules.explained_part_share
 
-    def proven(
+    def after_held_out_test(
         self,
-        vote: HeldOutTest | None = None,
+        held_out_test: HeldOutTest | None = None,
         worse: Mapping[str, float] | None = None,
         condemned: bool = False,
     ) -> Verdict:
@@ -158,7 +158,7 @@ class Verdict:
 
         Parameters
         ----------
-        vote : HeldOutTest, optional
+        held_out_test : HeldOutTest, optional
             Theirs on the named effects, where it has not been heard yet.
         worse : mapping of str to float, optional
             Prediction errors that grow with the named effects, after over before: see `grows`.
@@ -171,22 +171,24 @@ class Verdict:
             ``unlisted`` where they contradict it, and no better than ``partial`` where any error
             of theirs grows.
         """
-        if condemned or (vote and vote.denies(self.rules, self.accepted.misfit)):
+        if condemned or (held_out_test and held_out_test.denies(self.rules, self.accepted.misfit)):
             reasons = (*self.reasons, Reason(NOT_VALIDATED))
             return replace(self, equivalent=(), reasons=reasons, probability=None)
-        shown = self.shown_in_held_out and (vote is None or vote.counts(self.rules))
+        shown = self.shown_in_held_out and (
+            held_out_test is None or held_out_test.counts(self.rules)
+        )
         verdict = replace(self, shown_in_held_out=shown)
         if not worse:
             return verdict
-        return verdict.doubted([Reason.of(HELD_OUT_ERROR_GROWS, numbers=worse)])
+        return verdict.with_caveats([Reason.of(HELD_OUT_ERROR_GROWS, numbers=worse)])
 
-    def doubted(self, reasons: Sequence[Reason]) -> Verdict:
+    def with_caveats(self, reasons: Sequence[Reason]) -> Verdict:
         """Return it with further reasons, with which no status is unqualified."""
         sure, shares = self.probability, probability.experience_of(self.rules)
-        doubted = replace(self, reasons=(*self.reasons, *reasons))
-        if sure and doubted.status != self.status:
-            sure *= shares[doubted.status] / shares[self.status]
-        return replace(doubted, probability=sure)
+        qualified = replace(self, reasons=(*self.reasons, *reasons))
+        if sure and qualified.status != self.status:
+            sure *= shares[qualified.status] / shares[self.status]
+        return replace(qualified, probability=sure)
 
 
 def judge(
@@ -280,9 +282,9 @@ def _verdict(search: Search, answer: Answer) -> Verdict:
     data, rules, degrees_of_freedom = search.data, search.data.rules, search.degrees_of_freedom
     chosen, rivals, certain, foreign, in_part = answer
     equivalent = list(rivals)
-    vote = data.held_out_test(search.base, chosen.fit)
-    shown = vote is None or vote.counts(rules)
-    reasons = reasons_of(search, chosen, vote) + other_forms(search, chosen)
+    held_out_test = data.held_out_test(search.base, chosen.fit)
+    shown = held_out_test is None or held_out_test.counts(rules)
+    reasons = reasons_of(search, chosen, held_out_test) + other_forms(search, chosen)
     if in_part:
         reason = above_noise(chosen.fit.chi_square / degrees_of_freedom)
         reasons += [reason] if reason not in reasons else []

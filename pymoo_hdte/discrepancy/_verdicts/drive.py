@@ -31,7 +31,7 @@ from pymoo_hdte.discrepancy._selection.rules import RULES, Rules
 from pymoo_hdte.discrepancy._selection.verdict import EXPLAINED, Verdict, judge
 from pymoo_hdte.discrepancy._verdicts import rattling
 from pymoo_hdte.discrepancy._verdicts.drive_finding import DriveFinding
-from pymoo_hdte.discrepancy._verdicts.validation_drive import prove
+from pymoo_hdte.discrepancy._verdicts.validation_drive import validate_drive
 from pymoo_hdte.drive import SpeedLoop, harmonic_balance
 from pymoo_hdte.drive._solve.free_angle import torus_of
 from pymoo_hdte.effects.effect import effect_named
@@ -109,10 +109,12 @@ def examine_drive(campaign: Campaign, rules: Rules = RULES) -> DriveFinding:
     data, listed, verdict = judged
     data, verdict = _judged_again(verdict, data, listed)
     finding = DriveFinding(campaign, data, verdict, (*unexpected, *harmonics), rows)
-    if verdict.accepted is verdict.base or (proof := prove(finding)) is None:
+    if verdict.accepted is verdict.base or (validation := validate_drive(finding)) is None:
         return finding
-    worse = {name.replace("_", " "): growth for name, growth in proof.growths.items()}
-    return replace(finding, verdict=verdict.proven(worse=worse, condemned=proof.condemns))
+    worse = {name.replace("_", " "): growth for name, growth in validation.growths.items()}
+    return replace(
+        finding, verdict=verdict.after_held_out_test(worse=worse, condemned=validation.condemns)
+    )
 
 
 def _harmonics(data: Data, base: Fit) -> list[float]:

@@ -1,4 +1,4 @@
-"""Held-out records, simulated in windows by the model before and after a verdict, and their vote.
+"""Held-out records, simulated in windows by the model before and after a verdict, as a test of it.
 
 With the measured inputs, or with the references where a loop is closed. Each window starts from the
 measured positions and the speeds of their smoothed course.
@@ -214,7 +214,9 @@ def _state(motion: SmoothedMotion, row: int) -> tuple[float, float]:
     return float(motion.position[row]), float(motion.speed[row])
 
 
-def voted(verdict: Verdict, simulated: Sequence[SimulatedRecord]) -> Verdict:
+def mechanism_after_held_out_test(
+    verdict: Verdict, simulated: Sequence[SimulatedRecord]
+) -> Verdict:
     """Return the verdict, ``unlisted`` where held-out records contradict what it names.
 
     Simulated, their positions do not come nearer to the measured ones as they should, though the
@@ -222,11 +224,11 @@ def voted(verdict: Verdict, simulated: Sequence[SimulatedRecord]) -> Verdict:
     """
     if verdict.accepted is verdict.base or not simulated:
         return verdict
-    return verdict.proven(_vote(simulated))
+    return verdict.after_held_out_test(_held_out_test(simulated))
 
 
-def _vote(simulated: Sequence[SimulatedRecord]) -> HeldOutTest:
-    """Return the vote of simulated positions, in units of what was to be expected.
+def _held_out_test(simulated: Sequence[SimulatedRecord]) -> HeldOutTest:
+    """Return the held-out test of simulated positions, in units of what was to be expected.
 
     A window of a free coordinate gives one independent value, since its error builds up.
     """

@@ -1,4 +1,4 @@
-"""The torsion of held-out records as models predict it from the measured torque, and their vote."""
+"""The torsion of held-out records as models predict it from the measured torque."""
 
 from __future__ import annotations
 
@@ -15,7 +15,11 @@ from pymoo_hdte.discrepancy._selection.hypothesis import bounded_unknowns, label
 from pymoo_hdte.discrepancy._selection.verdict import Verdict
 from pymoo_hdte.discrepancy._verdicts.held_out import laws_of
 from pymoo_hdte.discrepancy._verdicts.mechanism_finding import MechanismFinding
-from pymoo_hdte.discrepancy._verdicts.validation_mechanism import MeasuredGap, chance_of, grown
+from pymoo_hdte.discrepancy._verdicts.validation_mechanism import (
+    MechanismPredictionError,
+    chance_of,
+    grown,
+)
 from pymoo_hdte.mechanism import Port
 from pymoo_hdte.mechanism.port_motion import law_force, torsion_noise
 
@@ -27,8 +31,8 @@ _SETTLED = 1e-9
 """rad, 2e-4 arcseconds."""
 
 
-def torsion_gaps(finding: MechanismFinding) -> tuple[MeasuredGap, ...]:
-    """Return the gaps between the measured and the predicted torsion of held-out records, rad.
+def torsion_errors(finding: MechanismFinding) -> tuple[MechanismPredictionError, ...]:
+    """Return the errors of the predicted torsion on held-out records, rad.
 
     About their means: how the springs of a hysteresis are stretched at the first row is not known.
 
@@ -38,8 +42,8 @@ def torsion_gaps(finding: MechanismFinding) -> tuple[MeasuredGap, ...]:
         From `examine_torsion`.
     """
     (gear,) = (port for port in finding.mechanism.ports if port.followed)
-    # As the gaps are: with the fitted stiffness, of which the stated one may be a multiple.
-    unexplained = float(finding.remainder[0]) / stiffness_of(finding.accepted, gear)
+    # As the errors are: with the fitted stiffness, of which the stated one may be a multiple.
+    unexplained = float(finding.unexplained[0]) / stiffness_of(finding.accepted, gear)
     errors = []
     for record in finding.records:
         if record.role != "held_out":
@@ -57,7 +61,7 @@ def torsion_gaps(finding: MechanismFinding) -> tuple[MeasuredGap, ...]:
         noise = torsion_noise(gear, record)
         expected = float(np.hypot(unexplained, noise))
         errors.append(
-            MeasuredGap(
+            MechanismPredictionError(
                 record.name,
                 gear.name,
                 KIND,
@@ -156,28 +160,32 @@ def _steepest(force: Callable[[Values], Values], torsion: Values) -> float:
     return float(np.max((force(torsion + apart) - force(torsion))[1:] / apart[1:]))
 
 
-def voted(finding: MechanismFinding, gaps: Sequence[MeasuredGap]) -> Verdict:
+def torsion_after_held_out_test(
+    finding: MechanismFinding, errors: Sequence[MechanismPredictionError]
+) -> Verdict:
     """Return the verdict on a torsion, ``unlisted`` where held-out records contradict it.
 
     Parameters
     ----------
     finding : MechanismFinding
-    gaps : sequence of MeasuredGap
+    errors : sequence of MechanismPredictionError
         From `torsion_gaps`.
     """
     verdict = finding.verdict
-    if verdict.accepted is verdict.base or not gaps:
+    if verdict.accepted is verdict.base or not errors:
         return verdict
     sums = np.zeros(3)
-    for gap in gaps:
-        change = float(np.mean((gap.predicted_after - gap.predicted_before) ** 2))
-        powers = np.array([gap.before**2, gap.after**2, change])
-        sums += _independent(finding, gap.time) * powers / gap.expected**2
-    return verdict.proven(HeldOutTest(*sums.tolist()), grown(gaps))
+    for error in errors:
+        change = float(np.mean((error.predicted_after - error.predicted_before) ** 2))
+        powers = np.array([error.before**2, error.after**2, change])
+        sums += _independent(finding, error.time) * powers / error.expected**2
+    return verdict.after_held_out_test(HeldOutTest(*sums.tolist()), grown(errors))
 
 
-def without_unproved_lines(verdict: Verdict, fitted: Fit, gaps: Sequence[MeasuredGap]) -> Verdict:
-    """Return a verdict on a torsion in which no set has an order that its fit or its proof denies.
+def without_unvalidated_lines(
+    verdict: Verdict, fitted: Fit, errors: Sequence[MechanismPredictionError]
+) -> Verdict:
+    """Return a verdict on a torsion in which no set has an order that its fit or validation denies.
 
     A line whose amplitude ended at a bound, or one that leaves the held-out torsion as it was,
     stands for something else: its order would send a reader to a part that does not err.
@@ -185,13 +193,13 @@ def without_unproved_lines(verdict: Verdict, fitted: Fit, gaps: Sequence[Measure
     Parameters
     ----------
     verdict : Verdict
-        After the vote of its held-out records.
+        After the test on its held-out records.
     fitted : Fit
         What was accepted before it.
-    gaps : sequence of MeasuredGap
+    errors : sequence of MechanismPredictionError
         Of that fit, on these records.
     """
-    shrinks = not gaps or sum(error.after**2 - error.before**2 for error in gaps) < 0.0
+    shrinks = not errors or sum(error.after**2 - error.before**2 for error in errors) < 0.0
     denied = {
         candidate.label
         for candidate, bounded in bounded_unknowns(fitted)

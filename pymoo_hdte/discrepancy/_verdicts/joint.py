@@ -18,14 +18,14 @@ from pymoo_hdte.discrepancy._selection.rules import RULES, Rules
 from pymoo_hdte.discrepancy._verdicts.held_out import Progress, laws_of
 from pymoo_hdte.discrepancy._verdicts.held_out_torsion import (
     stiffness_of,
-    torsion_gaps,
-    voted,
-    without_unproved_lines,
+    torsion_after_held_out_test,
+    torsion_errors,
+    without_unvalidated_lines,
 )
 from pymoo_hdte.discrepancy._verdicts.joint_torsion import examine_torsion, lines_of
 from pymoo_hdte.discrepancy._verdicts.mechanism import examine_mechanism
 from pymoo_hdte.discrepancy._verdicts.mechanism_finding import MechanismFinding
-from pymoo_hdte.discrepancy._verdicts.validation_mechanism import MeasuredGap
+from pymoo_hdte.discrepancy._verdicts.validation_mechanism import MechanismPredictionError
 from pymoo_hdte.drive._effects.static_error import KinematicTorsion
 from pymoo_hdte.mechanism import ErrorLine, LawAt, Mechanism, Port, Record
 
@@ -43,14 +43,14 @@ class JointFinding:
         On the balance of torques of the joint as a rigid body, with its held-out simulation.
     torsion : MechanismFinding
         On the torsion of the gear: in N.m of its output, its ripples in rad.
-    gaps : tuple of MeasuredGap
+    errors : tuple of MechanismPredictionError
         Of the torsion of held-out records, rad.
     """
 
     joint: Joint
     torque: MechanismFinding
     torsion: MechanismFinding
-    gaps: tuple[MeasuredGap, ...]
+    errors: tuple[MechanismPredictionError, ...]
 
     @property
     def status(self) -> str:
@@ -103,18 +103,18 @@ def examine_joint(
     rigid = rigid_half(joint, records, known)
     torque = examine_mechanism(rigid.mechanism, rigid.records, cutoff, rigid.known, rules, progress)
     torsion = examine_torsion(torsion_half(joint, records, known), joint, torque.cutoff, rules)
-    gaps = torsion_gaps(torsion)
-    verdict = voted(torsion, gaps)
+    errors = torsion_errors(torsion)
+    verdict = torsion_after_held_out_test(torsion, errors)
     slows = any(
         candidate.effect and candidate.effect.slows for candidate in verdict.accepted.candidates
     )
     if verdict.status == "named" and slows:
         verdict = replace(verdict, rivals_beyond=("encoder_delay",))
-    verdict = without_unproved_lines(verdict, torsion.accepted, gaps)
+    verdict = without_unvalidated_lines(verdict, torsion.accepted, errors)
     validated = replace(torsion, verdict=verdict)
     if validated.accepted is not torsion.accepted:
-        gaps = torsion_gaps(validated)
-    return JointFinding(joint, torque, validated, gaps)
+        errors = torsion_errors(validated)
+    return JointFinding(joint, torque, validated, errors)
 
 
 def revised_joint(title: str, finding: JointFinding) -> MechanismModel:

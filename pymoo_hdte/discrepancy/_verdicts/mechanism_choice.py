@@ -80,7 +80,7 @@ def judged(
     scale = stated.reach / rules.certain_deviations
     unsure = uncertain(chosen.fit, rules, stated.covariance * np.outer(scale, scale))
     of_zeros = [reason for reason in holds_zero(unsure) if reason not in verdict.reasons]
-    return verdict.doubted([_too_little(removed)] * little + of_zeros)
+    return verdict.with_caveats([_too_little(removed)] * little + of_zeros)
 
 
 def _compared(
@@ -191,7 +191,7 @@ def _within_bounds(sensors: MeasuredData, data: MeasuredData, verdict: Verdict) 
 
     A further effect that takes it off the bound and leaves nothing is earned by that. Else, at the
     bound of a law lies a simpler one, or one that these records do not show. What is certain is the
-    simpler one, as long as it explains most of the misfit; what it leaves is a doubt.
+    simpler one, as long as it explains most of the misfit; what it leaves is a caveat.
     """
     chosen = verdict.chosen
     if chosen is None or verdict.status not in _NAMING or not _bounded(chosen.fit):

@@ -89,7 +89,7 @@ class MechanismFinding:
         return root_mean_square(self.data, self.verdict.base.residuals)
 
     @property
-    def remainder(self) -> NDArray[np.float64]:
+    def unexplained(self) -> NDArray[np.float64]:
         """Root mean square of the residual of the accepted model in each balance.
 
         Shape (n_balances,), N or N.m.

@@ -1,4 +1,4 @@
-"""Validation on records that were not fitted: gaps of motion and forces before and after.
+"""Validation on records that were not fitted: errors of motion and forces before and after.
 
 Simulations in windows, see `held_out`, show the quality of the model's predictions; the force
 balances show its error at each moment.
@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from pymoo_hdte.discrepancy._evidence.force_balances.evidence import measured_data
 from pymoo_hdte.discrepancy._evidence.force_balances.unexplained import root_mean_square
 from pymoo_hdte.discrepancy._selection.rules import RULES, Rules
-from pymoo_hdte.discrepancy._verdicts.gap import grows
 from pymoo_hdte.discrepancy._verdicts.held_out import (
     Extent,
     SimulatedRecord,
@@ -24,6 +23,7 @@ from pymoo_hdte.discrepancy._verdicts.held_out import (
     simulate_held_out,
 )
 from pymoo_hdte.discrepancy._verdicts.mechanism_finding import MechanismFinding
+from pymoo_hdte.discrepancy._verdicts.prediction_error import grows
 from pymoo_hdte.mechanism import Record
 from pymoo_hdte.mechanism.quantity_units import unit_of
 
@@ -31,7 +31,7 @@ Values = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class MeasuredGap:
+class MechanismPredictionError:
     """Root mean squares of measured minus predicted.
 
     Of a simulation at the samples of its windows but those at which they start.
@@ -57,7 +57,7 @@ class MeasuredGap:
         What the revised model leaves to be expected of it, by what it leaves of the training
         records, in ``unit``.
     chance : float
-        Standard deviation of the difference of the squares of the gaps, if only that is left.
+        Standard deviation of the difference of the squares of the errors, if only that is left.
     rules : Rules
         Thresholds by which it shrinks or grows.
     extent : Extent or None
@@ -82,7 +82,7 @@ class MeasuredGap:
 
     @property
     def shrinkage(self) -> float | None:
-        """1 - (after - floor) / (before - floor), or None where there was no gap to shrink."""
+        """1 - (after - floor) / (before - floor), or None where there was no error to shrink."""
         excess = self.before - self.noise_floor
         if not excess > self.rules.least_gap_share * self.noise_floor:
             return None
@@ -130,8 +130,10 @@ class MeasuredGap:
         }
 
 
-def prove_measured(finding: MechanismFinding, whole: bool = False) -> tuple[MeasuredGap, ...]:
-    """Return the gaps on the held-out records; none where none was held out.
+def validate_mechanism(
+    finding: MechanismFinding, whole: bool = False
+) -> tuple[MechanismPredictionError, ...]:
+    """Return the errors on the held-out records; none where none was held out.
 
     Where nothing is named, before and after are equal.
 
@@ -149,7 +151,7 @@ def prove_measured(finding: MechanismFinding, whole: bool = False) -> tuple[Meas
             finding.mechanism, finding.records, finding.data, fits, known, whole=True
         )
     by_name = {record.record: record for record in simulated}
-    errors: list[MeasuredGap] = []
+    errors: list[MechanismPredictionError] = []
     for record in finding.records:
         if record.role == "held_out":
             errors += _simulated(finding, by_name[record.name])
@@ -157,11 +159,13 @@ def prove_measured(finding: MechanismFinding, whole: bool = False) -> tuple[Meas
     return tuple(errors)
 
 
-def _simulated(finding: MechanismFinding, record: SimulatedRecord) -> list[MeasuredGap]:
+def _simulated(
+    finding: MechanismFinding, record: SimulatedRecord
+) -> list[MechanismPredictionError]:
     after = record.before if finding.accepted is finding.verdict.base else record.after
     values = record.extent.windows * record.independent
     return [
-        MeasuredGap(
+        MechanismPredictionError(
             record.record,
             name,
             "simulation",
@@ -182,7 +186,7 @@ def _simulated(finding: MechanismFinding, record: SimulatedRecord) -> list[Measu
     ]
 
 
-def _balanced(finding: MechanismFinding, record: Record) -> list[MeasuredGap]:
+def _balanced(finding: MechanismFinding, record: Record) -> list[MechanismPredictionError]:
     data = measured_data(finding.mechanism, [record], finding.cutoff, finding.data.known)
     n_base = len(data.base)
     (balance,) = data.spectra
@@ -197,9 +201,9 @@ def _balanced(finding: MechanismFinding, record: Record) -> list[MeasuredGap]:
     floor = root_mean_square(data, np.ones(len(data.frequency)))
     change = root_mean_square(data, whitened[1] - whitened[0])
     counts = [len(rows) for rows in data.rows_of_parts()]
-    expected = np.maximum(finding.remainder, floor)
+    expected = np.maximum(finding.unexplained, floor)
     return [
-        MeasuredGap(
+        MechanismPredictionError(
             record.name,
             name,
             "balance",
@@ -232,7 +236,7 @@ def chance_of(expected: float, change: float, values: float) -> float:
     return 2.0 * expected * change / max(values, 1.0) ** 0.5
 
 
-def rests_told(finding: MechanismFinding) -> list[str]:
+def sentences_on_rest(finding: MechanismFinding) -> list[str]:
     """Return a sentence for each training record of which rows at rest are left out."""
     return [
         f"Rows of {balance.record.name} at rest: {balance.left_out}. They are left out, as dry "
@@ -244,9 +248,9 @@ def rests_told(finding: MechanismFinding) -> list[str]:
     ]
 
 
-def grown(gaps: Sequence[MeasuredGap]) -> dict[str, float]:
-    """Return the gaps that the correction made worse: after over before."""
-    worse = [error for error in gaps if error.worse(among=len(gaps))]
+def grown(errors: Sequence[MechanismPredictionError]) -> dict[str, float]:
+    """Return the errors that the correction made worse: after over before."""
+    worse = [error for error in errors if error.worse(among=len(errors))]
     return {
         f"{error.quantity} by {error.kind} in {error.record}": error.after
         / max(error.before, 1e-300)

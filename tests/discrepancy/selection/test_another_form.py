@@ -398,7 +398,7 @@ def test_a_damping_out_of_tolerance_may_be_the_form_of_a_drag_at_its_port(
     base.values = np.zeros(0)
     data = SimpleNamespace(
         rules=RULES,
-        remainder=RULES.model_accuracy**2,
+        model_error_share=RULES.model_accuracy**2,
         excess=lambda fit: SimpleNamespace(of_parts=np.array([whole[fit.name]])),
     )
     rest = SimpleNamespace(fit=fitted("rest"), exact=False, candidates=(drag,))

@@ -10,7 +10,7 @@ from scipy.stats import chi2
 
 from pymoo_hdte.discrepancy._evidence.order_lines.objective import Objective
 from pymoo_hdte.discrepancy._report.document import effects_of, sentence
-from pymoo_hdte.discrepancy._report.words import doubts
+from pymoo_hdte.discrepancy._report.words import caveats
 from pymoo_hdte.discrepancy._selection import fitted_sets, hypothesis, search
 from pymoo_hdte.discrepancy._selection import fitted_sets as membership
 from pymoo_hdte.discrepancy._selection.any_form import AnyForm
@@ -512,7 +512,7 @@ def test_what_nothing_tells_apart_is_a_class_also_where_more_is_missing():
     assert verdict.status == "class"
     assert {verdict.chosen.label, *(one.label for one in verdict.equivalent)} == set(labels)
     assert verdict.leaves_more_than_noise
-    assert all(one in sentence(verdict) for one in doubts(verdict))
+    assert all(one in sentence(verdict) for one in caveats(verdict))
     assert verdict.probability == pytest.approx(RULES.partial_right, abs=0.01)
 
 

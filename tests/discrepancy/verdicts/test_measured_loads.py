@@ -202,7 +202,7 @@ def test_at_the_bound_of_a_form_no_name_is_plain():
         ),
     ],
 )
-def test_a_belief_that_ends_at_its_tolerance_is_a_doubt(believed, stuck):
+def test_a_belief_that_ends_at_its_tolerance_is_a_caveat(believed, stuck):
     finding = found(dry, mechanism=believed)
     assert finding.verdict.status == "partial"
     assert Reason(AT_TOLERANCE, stuck) in finding.verdict.reasons

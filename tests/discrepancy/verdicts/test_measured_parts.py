@@ -133,8 +133,8 @@ def test_a_rest_that_nobody_explains_does_not_hide_the_main_effect():
     )
     assert effects(finding)[0]["name"] == "coulomb_friction"
     assert len(effects(finding)) == 1
-    assert finding.remainder > 10.0 * finding.sensor_noise
-    assert finding.remainder < 0.35 * finding.base_misfit
+    assert finding.unexplained > 10.0 * finding.sensor_noise
+    assert finding.unexplained < 0.35 * finding.base_misfit
 
 
 @pytest.mark.nightly

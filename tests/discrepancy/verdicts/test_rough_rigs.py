@@ -7,10 +7,13 @@ import pytest
 from made_joint import ARCSECOND, STIFFNESS, Hidden, believed, record, records
 
 from pymoo_hdte.checks import InvalidInput
-from pymoo_hdte.discrepancy._answers.joint_open_questions import wiring_doubts
+from pymoo_hdte.discrepancy._answers.joint_open_questions import wiring_caveats
 from pymoo_hdte.discrepancy._evidence.force_balances.joint_halves import joint_of, torsion_half
 from pymoo_hdte.discrepancy._report.torsion import torsion_document
-from pymoo_hdte.discrepancy._verdicts.held_out_torsion import torsion_gaps, voted
+from pymoo_hdte.discrepancy._verdicts.held_out_torsion import (
+    torsion_after_held_out_test,
+    torsion_errors,
+)
 from pymoo_hdte.discrepancy._verdicts.joint import JointFinding, examine_joint
 from pymoo_hdte.discrepancy._verdicts.joint_torsion import examine_torsion
 from pymoo_hdte.effects.stiffness import SoftWindup
@@ -59,13 +62,13 @@ def test_a_mean_torque_far_above_its_variation_is_part_of_the_zero():
     assert finding.verdict.status == "adequate"
 
 
-def test_the_vote_of_held_out_records_does_not_depend_on_the_stated_stiffness():
+def test_the_held_out_test_does_not_depend_on_the_stated_stiffness():
     train, _ = records(Hidden(SoftWindup(0.015, 6e-4, 3.0)))
     _, other = records(Hidden())
     joint = roughly_stiff(0.1 * STIFFNESS)
     finding = examine_torsion(torsion_half(joint, [train, other], ()), joint, CUTOFF)
     assert finding.verdict.status == "named"
-    assert voted(finding, torsion_gaps(finding)).status == "unlisted"
+    assert torsion_after_held_out_test(finding, torsion_errors(finding)).status == "unlisted"
 
 
 @pytest.mark.parametrize(
@@ -84,7 +87,7 @@ def test_what_is_wrong_with_the_encoders_is_said_and_no_effect_is_certain(hidden
     half = torsion_half(joint, [replace(train, channels=channels)], ())
     finding = examine_torsion(half, joint, CUTOFF)
     assert finding.verdict.status in ("unlisted", "partial")
-    (told,) = wiring_doubts(JointFinding(joint, finding, finding, ()))
+    (told,) = wiring_caveats(JointFinding(joint, finding, finding, ()))
     assert words in told
 
 
