@@ -35,7 +35,7 @@ def campaign_limits(finding: DriveFinding) -> list[str]:
 def _zeroed(finding: DriveFinding) -> list[str]:
     """Return what records say that all begin at one reading of both angles, noise included."""
     running = finding.campaign.running
-    begins = {(float(one.input_angle[0]), float(one.output_angle[0])) for one in running}
+    begins = {(float(record.input_angle[0]), float(record.output_angle[0])) for record in running}
     if len(begins) > 1 or len(running) < 2:
         return []
     return [
@@ -64,68 +64,74 @@ def _standing_out(finding: DriveFinding) -> list[str]:
 
 
 def _unproven(finding: DriveFinding) -> list[str]:
-    found = []
+    sentences = []
     if not finding.campaign.held_out:
-        found.append("No record was held out: nothing is proven about conditions not fitted.")
+        sentences.append("No record was held out: nothing is proven about conditions not fitted.")
     if finding.verdict.status in EXPLAINED and not finding.verdict.shown_in_held_out:
-        found.append("The records kept out of the fit do not show what is named.")
+        sentences.append("The records kept out of the fit do not show what is named.")
     fitted = {record.name for record in finding.data.features.records}
     if finding.campaign.held_out and (held_out := finding.held_out) is None:
-        found.append("All held-out records rattle: nothing is proven about conditions not fitted.")
+        sentences.append(
+            "All held-out records rattle: nothing is proven about conditions not fitted."
+        )
     elif finding.campaign.held_out and held_out is not None:
         fitted |= {record.name for record in held_out.features.records}
     left_out = [record.name for record in finding.campaign.running if record.name not in fitted]
     if left_out:
-        found.append(
+        sentences.append(
             "Neither fitted nor predicted, because the load does not hold the tooth flanks "
             f"together: {', '.join(left_out)}."
         )
     if finding.data.evident:
-        found.append(
+        sentences.append(
             "Without load the motion does not repeat with the input, as where tooth flanks part "
             "and meet again: no explanation without a clearance is told."
         )
-    return found
+    return sentences
 
 
 def _unvaried(finding: DriveFinding) -> list[str]:
-    records, found = finding.data.features.records, []
+    records, sentences = finding.data.features.records, []
     rules = finding.data.rules
     speeds = np.array([record.input_speed for record in records])
     loads = np.array([record.load_torque for record in records])
     if np.abs(speeds).max() <= rules.one_speed_ratio * np.abs(speeds).min():
-        found.append(
+        sentences.append(
             "All fitted records run at one speed: dry friction, friction that changes with speed "
             "and damping cannot be told apart."
         )
     if np.ptp(loads) <= rules.one_load_range * np.abs(loads).max():
-        found.append(
+        sentences.append(
             "All fitted records carry one load: an error that grows with load cannot be told from "
             "one that does not."
         )
     if np.all(speeds > 0.0) or np.all(speeds < 0.0):
-        found.append(
+        sentences.append(
             "All fitted records turn one way: only the stated zero error of the input torque "
             f"sensor, {finding.campaign.rig.input_torque_zero:g} N.m, tells dry friction at the "
             "input from it."
         )
     if np.ptp([record.elapsed for record in records]) == 0.0:
-        found.append("All fitted records stand at one time of the session: no drift can be seen.")
+        sentences.append(
+            "All fitted records stand at one time of the session: no drift can be seen."
+        )
     if not finding.data.torsion:
-        found.append(
+        sentences.append(
             "No torsion sweep was fitted: a clearance cannot be told from a soft wind-up, nor "
             "hysteresis from damping, where the running records do not pass through zero torque."
         )
-    return found
+    return sentences
 
 
 def _like_a_gain(finding: DriveFinding) -> list[str]:
     """Return what tells a friction in proportion to the load from a gain of the torque sensor."""
     verdict = finding.verdict
     chosen = verdict.chosen if verdict.status in EXPLAINED else None
-    if chosen is None or not any(one.effect and one.effect.loaded for one in chosen.candidates):
+    if chosen is None or not any(
+        candidate.effect and candidate.effect.loaded for candidate in chosen.candidates
+    ):
         return []
-    power = [one.input_speed * one.load_torque for one in finding.data.features.records]
+    power = [record.input_speed * record.load_torque for record in finding.data.features.records]
     if min(power) < 0.0 < max(power):
         return []
     gain = 100.0 * finding.campaign.rig.input_torque_gain
@@ -153,15 +159,15 @@ def _unseen(finding: DriveFinding) -> list[str]:
         for order, amplitude in zip(believed.error_orders, believed.error_amplitudes, strict=True)
         if amplitude != 0.0 and np.abs(orders - order).min() > _SAME_ORDER
     ]
-    found = []
+    sentences = []
     if mixed := _named([order for order in unseen if order <= highest]):
-        found.append(f"The records do not resolve the believed static error of order {mixed}.")
+        sentences.append(f"The records do not resolve the believed static error of order {mixed}.")
     if high := _named([order for order in unseen if order > highest]):
-        found.append(
+        sentences.append(
             f"The believed static error of order {high} is not looked at: lines are compared up to "
             f"order {highest:.3g}."
         )
-    return found
+    return sentences
 
 
 def _too_high(finding: DriveFinding) -> list[str]:
@@ -170,7 +176,9 @@ def _too_high(finding: DriveFinding) -> list[str]:
     if verdict.chosen is None or not verdict.leaves_more_than_noise:
         return []
     seen = finding.data.features.orders.tolist()
-    orders = {one.order for one in verdict.chosen.candidates if one.order is not None}
+    orders = {
+        candidate.order for candidate in verdict.chosen.candidates if candidate.order is not None
+    }
     values = ", which may shift the values of the effect" if verdict.status in EXPLAINED else ""
     # Unexpected lines are searched strictly below the highest order.
     return [
