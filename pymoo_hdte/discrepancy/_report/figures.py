@@ -109,8 +109,8 @@ def overlay(validation: Validation) -> Figure:
     """Draw measured, before and after of the held-out record with the largest error of the base."""
     figure = Figure(figsize=(11.0, 5.6), layout="constrained")
     panels = figure.subplots(len(validation.overlays), 1, sharex=True, squeeze=False)[:, 0]
-    for axis, one in zip(panels, validation.overlays, strict=True):
-        _draw_overlay(axis, one)
+    for axis, overlaid in zip(panels, validation.overlays, strict=True):
+        _draw_overlay(axis, overlaid)
     panels[0].legend(fontsize=8, frameon=False, ncols=4, loc="upper right")
     panels[-1].set_xlabel("input turns")
     return figure
@@ -135,12 +135,20 @@ def optimum_fronts(shift: OptimumShift) -> Figure:
     return figure
 
 
-def _draw_overlay(axis: Axes, one: Overlay) -> None:
-    axis.plot(one.sample_turns, one.samples, ".", color="#A9B2BB", markersize=4, label="samples")
-    axis.plot(one.turns, one.measured, color="black", linewidth=2.2, label="measured order lines")
-    axis.plot(one.turns, one.before, "--", color=BEFORE, linewidth=1.6, label="before")
-    axis.plot(one.turns, one.after, "-.", color=AFTER, linewidth=1.6, label="after")
-    axis.set_ylabel(f"{WORDS[one.channel]} [{one.unit}]")
+def _draw_overlay(axis: Axes, overlaid: Overlay) -> None:
+    axis.plot(
+        overlaid.sample_turns, overlaid.samples, ".", color="#A9B2BB", markersize=4, label="samples"
+    )
+    axis.plot(
+        overlaid.turns,
+        overlaid.measured,
+        color="black",
+        linewidth=2.2,
+        label="measured order lines",
+    )
+    axis.plot(overlaid.turns, overlaid.before, "--", color=BEFORE, linewidth=1.6, label="before")
+    axis.plot(overlaid.turns, overlaid.after, "-.", color=AFTER, linewidth=1.6, label="after")
+    axis.set_ylabel(f"{WORDS[overlaid.channel]} [{overlaid.unit}]")
     _tidy(axis)
 
 

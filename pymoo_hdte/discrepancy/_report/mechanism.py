@@ -17,8 +17,8 @@ from pymoo_hdte.discrepancy._report.certainty import how_sure_of_records
 from pymoo_hdte.discrepancy._report.document import believed_in_words
 from pymoo_hdte.discrepancy._report.folder import FOLDER
 from pymoo_hdte.discrepancy._report.mechanism_document import evidence, mechanism_verdict_document
-from pymoo_hdte.discrepancy._report.mechanism_figures import errors as errors_figure
 from pymoo_hdte.discrepancy._report.mechanism_figures import (
+    errors_figure,
     misfit_over_frequency,
     misfit_over_motion,
     overlay,
@@ -118,7 +118,7 @@ def _page(
         compared=[*compared, *document["alternatives"]],
         extent_sentence=extent_sentence(errors),
         believed_effects=believed_in_words(document),
-        believed={name: one.value for name, one in finding.mechanism.quantities.items()},
+        believed={name: value.value for name, value in finding.mechanism.quantities.items()},
     )
 
 
@@ -146,8 +146,8 @@ def validation_sentence(
         for quantity in dict.fromkeys(error.quantity for error in errors if error.kind == kind):
             of_it = [error for error in errors if (error.kind, error.quantity) == (kind, quantity)]
             before, after = (
-                float(np.sqrt(np.mean([getattr(error, one) ** 2 for error in of_it])))
-                for one in ("before", "after")
+                float(np.sqrt(np.mean([getattr(error, side) ** 2 for error in of_it])))
+                for side in ("before", "after")
             )
             change, unit = _change(before, after), of_it[0].unit
             words.append(
@@ -177,7 +177,7 @@ def _change(before: float, after: float) -> str:
 def _effect_rows(effects: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
     return [
         {
-            "effect": f"{one['name'].replace('_', ' ')} ({one['port']})",
+            "effect": f"{effect['name'].replace('_', ' ')} ({effect['port']})",
             "parameter": name.replace("_", " "),
             "value": parameter["value"],
             "lower": parameter["interval95"][0],
@@ -185,6 +185,6 @@ def _effect_rows(effects: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
             "at_bound": parameter["at_bound"],
             "unit": "" if parameter["unit"] == "1" else parameter["unit"],
         }
-        for one in effects
-        for name, parameter in one["parameters"].items()
+        for effect in effects
+        for name, parameter in effect["parameters"].items()
     ]

@@ -72,11 +72,15 @@ def misfit_over_frequency(finding: MechanismFinding) -> Figure:
         order = np.argsort(frequency, kind="stable")
         deviation = np.concatenate(
             [
-                one[part][balance.kept[part]]
-                for one, balance in zip(finding.data.deviation, finding.data.spectra, strict=True)
+                deviation[part][balance.kept[part]]
+                for deviation, balance in zip(
+                    finding.data.deviation, finding.data.spectra, strict=True
+                )
             ]
         )
-        noise = np.concatenate([one.noise[part][one.kept[part]] for one in finding.data.spectra])
+        noise = np.concatenate(
+            [balance.noise[part][balance.kept[part]] for balance in finding.data.spectra]
+        )
         lines = [("before", finding.verdict.base.residuals, BEFORE, "--")]
         if finding.accepted.candidates:
             lines.append(("after", finding.accepted.residuals, AFTER, "-"))
@@ -121,11 +125,11 @@ def overlay(finding: MechanismFinding, error: MechanismPredictionError) -> Figur
     return figure
 
 
-def errors(found: Sequence[MechanismPredictionError]) -> Figure:
+def errors_figure(errors: Sequence[MechanismPredictionError]) -> Figure:
     """Draw the errors on held-out records before and after, as ratios to the error before."""
-    figure = Figure(figsize=(6.4, 0.7 + 0.42 * len(found)), layout="constrained")
+    figure = Figure(figsize=(6.4, 0.7 + 0.42 * len(errors)), layout="constrained")
     axis = figure.subplots()
-    for row, error in enumerate(found):
+    for row, error in enumerate(errors):
         unit = error.before if error.before > 0.0 and np.isfinite(error.before) else 1.0
         axis.barh(row - 0.18, error.before / unit, 0.34, color=BEFORE, hatch="//",
                   edgecolor="white", label="before" if row == 0 else None)  # fmt: skip
@@ -134,7 +138,7 @@ def errors(found: Sequence[MechanismPredictionError]) -> Figure:
         axis.plot([error.noise_floor / unit] * 2, [row - 0.4, row + 0.4], ":", color=GREY,
                   label="sensors" if row == 0 else None)  # fmt: skip
     axis.set_yticks(
-        range(len(found)), [f"{error.record}: {error.quantity}, {error.kind}" for error in found]
+        range(len(errors)), [f"{error.record}: {error.quantity}, {error.kind}" for error in errors]
     )
     axis.invert_yaxis()
     axis.set(xlabel="gap over the gap before")

@@ -165,7 +165,7 @@ def metric_rows(validation: Validation | None) -> list[tuple[str, float, float]]
     ends = zip(
         ("lower", "upper"), before.mean_error_interval, after.mean_error_interval, strict=True
     )
-    return rows + [(f"mean error, {end} end (95 %)", one, two) for end, one, two in ends]
+    return rows + [(f"mean error, {end} end (95 %)", old, new) for end, old, new in ends]
 
 
 def record_rows(
@@ -201,15 +201,15 @@ def _parameter_row(
     words = words_of(name, ()) if "." in name else name_by_order(name, orders)
     low, high = (end / size for end in entry["interval95"])
     # Phases and the constant of the encoders have no believed value.
-    free = parameter.name == "offset" or parameter.name.startswith("error_phase_")
+    without_belief = parameter.name == "offset" or parameter.name.startswith("error_phase_")
     return ParameterRow(
         words,
         unit,
-        None if free else parameter.start / size,
+        None if without_belief else parameter.start / size,
         entry["value"] / size,
         (low, high) if has_interval else None,
-        None if free else parameter.lower / size,
-        None if free else parameter.upper / size,
+        None if without_belief else parameter.lower / size,
+        None if without_belief else parameter.upper / size,
         entry["at_bound"],
     )
 
@@ -217,8 +217,12 @@ def _parameter_row(
 def _bounded(fitted: Fit, error_orders: Sequence[float]) -> list[str]:
     """Return the unknowns of a fit that ended at a bound, in words."""
     return [
-        name_by_order(one.name, error_orders) if row < fitted.n_base else one.name.replace("_", " ")
-        for row, (one, side) in enumerate(zip(fitted.parameters, fitted.bound_sides, strict=True))
+        name_by_order(parameter.name, error_orders)
+        if row < fitted.n_base
+        else parameter.name.replace("_", " ")
+        for row, (parameter, side) in enumerate(
+            zip(fitted.parameters, fitted.bound_sides, strict=True)
+        )
         if side != 0.0
     ]
 
@@ -293,15 +297,17 @@ def rows_sentence(findings: RowFindings) -> str:
         records = {fault.record for fault in shown}
         where = next(iter(records)) if len(records) == 1 else f"{len(records)} records"
         words.append(f"{listed(counted)} in {where}: {_treatment(findings)}.")
-    replaced = [one for one in findings.noise if one.replaced]
-    for zero in (one for one in replaced if one.name.endswith("_zero")):
+    replaced = [finding for finding in findings.noise if finding.replaced]
+    for zero in (finding for finding in replaced if finding.name.endswith("_zero")):
         words.append(
             f"The {_name(zero)} drifts, so that it counts as known to {zero.used:.2g} {zero.unit} "
             f"instead of {zero.stated:.2g} {zero.unit}."
         )
-    changed = [one for one in replaced if not one.name.endswith("_zero")]
+    changed = [finding for finding in replaced if not finding.name.endswith("_zero")]
     if changed:
-        ratios = listed([f"{one.used / one.stated:.2g} times ({_name(one)})" for one in changed])
+        ratios = listed(
+            [f"{finding.used / finding.stated:.2g} times ({_name(finding)})" for finding in changed]
+        )
         words.append(f"The noise is not the stated one but {ratios}; what was found is used.")
     sentence = " ".join(words)
     return sentence[:1].upper() + sentence[1:]
@@ -326,7 +332,7 @@ def _treatment(findings: RowFindings) -> str:
     if "new zero" in modelled:
         done.append("records with a new zero are shifted back")
     if "drift" in modelled:
-        largest = max(abs(one.size) for one in findings.faults if one.kind == "drift")
+        largest = max(abs(fault.size) for fault in findings.faults if fault.kind == "drift")
         done.append(f"drifts of up to {largest:.2g} N.m are taken out")
     if findings.left_out:
         done.append(f"left out as a whole: {listed(list(findings.left_out))}")
@@ -351,18 +357,25 @@ def _fault_row(fault: RowFault) -> FaultRow:
 
 def noise_rows(findings: RowFindings) -> list[NoiseRow]:
     """Return stated and found noise."""
-    return [_noise_row(one) for one in findings.noise]
+    return [_noise_row(finding) for finding in findings.noise]
 
 
-def _noise_row(one: NoiseFinding) -> NoiseRow:
-    unit, stated = _unit_of(one.unit, one.stated)
-    found = None if one.found is None else _unit_of(one.unit, one.found)[1]
-    return NoiseRow(_name(one), stated, found, _unit_of(one.unit, one.used)[1], unit, one.reason)
+def _noise_row(finding: NoiseFinding) -> NoiseRow:
+    unit, stated = _unit_of(finding.unit, finding.stated)
+    estimate = None if finding.found is None else _unit_of(finding.unit, finding.found)[1]
+    return NoiseRow(
+        _name(finding),
+        stated,
+        estimate,
+        _unit_of(finding.unit, finding.used)[1],
+        unit,
+        finding.reason,
+    )
 
 
 def _unit_of(unit: str, size: float) -> tuple[str, float]:
     return ("arcsec", size / ARCSEC) if unit == "rad" else (unit, size)
 
 
-def _name(one: NoiseFinding) -> str:
-    return one.name.removesuffix("_noise").replace("_", " ")
+def _name(finding: NoiseFinding) -> str:
+    return finding.name.removesuffix("_noise").replace("_", " ")

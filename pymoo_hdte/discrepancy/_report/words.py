@@ -79,6 +79,6 @@ def caveats(verdict: Verdict, error_orders: Sequence[float] = ()) -> list[str]:
         Of a drive, the orders of its static error, by which its lines are called.
     """
     return [
-        in_a_sentence(one, lambda label: labels_by_order(label, error_orders))
-        for one in verdict.reasons
+        in_a_sentence(reason, lambda label: labels_by_order(label, error_orders))
+        for reason in verdict.reasons
     ]
