@@ -25,7 +25,7 @@ class Record:
     Attributes
     ----------
     name : str
-        Of the test.
+        Name of the test.
     role : {"train", "held_out"}
         To be fitted, or only to judge the result.
     time : ndarray, shape (n,)
