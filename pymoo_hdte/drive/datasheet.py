@@ -260,10 +260,10 @@ class DataSheet:
 
 def _check_difference(difference: int, sheet: DataSheet) -> None:
     if difference % 2:
-        near = sheet.flexspline_teeth + difference
+        teeth = sheet.flexspline_teeth + difference
         allowed = (
             f"{sheet.flexspline_teeth} (flexspline_teeth) + 2, or another even number more: teeth "
             f"engage at both ends of the wave generator, which a difference of {difference} does "
             "not let them; likely a tooth number was miscounted or computed from a rounded ratio"
         )
-        raise InvalidInput("circular_spline_teeth", near, allowed)
+        raise InvalidInput("circular_spline_teeth", teeth, allowed)

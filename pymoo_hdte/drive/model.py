@@ -155,9 +155,9 @@ class DriveModel(ModelValues):
         ArithmeticError
             If the harmonics of a deeply varying stiffness do not die out.
         """
-        found, spectrum = found_steady_states(self.coefficients(parameters))
-        dte = np.full(len(found), np.nan)
-        dte[found] = spectrum.peak_to_peak(self.sheet.ratio) / ARCSEC
+        has_state, spectrum = found_steady_states(self.coefficients(parameters))
+        dte = np.full(len(has_state), np.nan)
+        dte[has_state] = spectrum.peak_to_peak(self.sheet.ratio) / ARCSEC
         return dte
 
     def at(self, input_speed: float, load_torque: float) -> DriveModel:

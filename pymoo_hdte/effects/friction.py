@@ -246,7 +246,7 @@ class PeriodicFriction(Periodic):
 
 def _varying(sizes: Sizes) -> list[Guess]:
     """Guess friction that varies about a mean, which is Coulomb's."""
-    found = []
+    guesses = []
     for family in sizes.varying:
         mean = unknown("mean", 0.0, sizes.largest, sizes.force, linear=True)
         unknowns = (*family.waves("level", sizes.largest, sizes.residual), mean)
@@ -256,8 +256,8 @@ def _varying(sizes: Sizes) -> list[Guess]:
             varying = [PeriodicFriction(order, phase, level) for order, level, phase in lines]
             return (*varying, CoulombFriction(values[-1]))
 
-        found.append(Guess(unknowns, starts_along_each(unknowns), build, family, family.form))
-    return found
+        guesses.append(Guess(unknowns, starts_along_each(unknowns), build, family, family.form))
+    return guesses
 
 
 register(

@@ -109,11 +109,14 @@ class Sizes:
         Those of its first ``most`` in ``shown``, and further ones up to the fifth that are seen: a
         rounded trapezoid has the third and the fifth.
         """
-        first = order / self.slower
-        count = harmonics_among(self.shown, first, most)
+        relative_order = order / self.slower
+        count = harmonics_among(self.shown, relative_order, most)
         further = range(count + 1, len(HARMONIC_NAMES) + 1)
         clear = set(self.shown) & {*self.seen, *self.clear}
-        multiples = [*range(1, count + 1), *(k for k in further if is_among(clear, k * first))]
+        multiples = [
+            *range(1, count + 1),
+            *(k for k in further if is_among(clear, k * relative_order)),
+        ]
         return Family(tuple(multiple * order for multiple in multiples))
 
     @property
@@ -179,7 +182,7 @@ class Guess:
     def begins(self) -> tuple[tuple[float, ...], ...]:
         """Values from which fits start."""
         given = tuple(tuple(start) for start in self.starts)
-        return given or (tuple(one.start for one in self.unknowns),)
+        return given or (tuple(parameter.start for parameter in self.unknowns),)
 
 
 def guess_of_lines(
@@ -212,7 +215,7 @@ def guess_of_lines(
     unknowns = family.waves(strength, largest, typical)
 
     def build(values: Values) -> tuple[Any, ...]:
-        return tuple(line(*one) for one in family.lines(values))
+        return tuple(line(*numbers) for numbers in family.lines(values))
 
     starts = starts_along_each(unknowns)
     return Guess(unknowns, starts, build, family, form, sentence, name=name, quantities=quantities)
@@ -241,7 +244,7 @@ def check_response(name: str, parts: Sequence[Any], sizes: Sizes) -> None:
         load=sizes.load * at,
         temperature=300.0,
     )
-    for law in (one for one in parts if hasattr(one, "respond")):
+    for law in (part for part in parts if hasattr(part, "respond")):
         with np.errstate(all="ignore"):
             response = law.respond(state)
         for what in ("torque", "slope", "damping"):

@@ -69,11 +69,15 @@ def joined_sentences(sentences: Sequence[str]) -> str:
     >>> joined_sentences([out_of_tolerance_sentence(one) for one in ("stiffness", "damping")])
     'The stiffness and damping lie outside their tolerances.'
     """
-    values = [one.removeprefix("The ").removesuffix(_OUT) for one in sentences if _OUT in one]
+    values = [
+        sentence.removeprefix("The ").removesuffix(_OUT)
+        for sentence in sentences
+        if _OUT in sentence
+    ]
     if len(values) < 2:
         return " ".join(sentences)
     of_values = f"The {listed(values)} lie outside their tolerances."
-    return " ".join([*(one for one in sentences if _OUT not in one), of_values])
+    return " ".join([*(sentence for sentence in sentences if _OUT not in sentence), of_values])
 
 
 def listed(words: Sequence[str]) -> str:
@@ -87,7 +91,7 @@ def orders_in_words(orders: Sequence[float]) -> str:
     >>> orders_in_words([200.0]), orders_in_words([200.0, 400.0])
     ('order 200', 'orders 200 and 400')
     """
-    return f"order{'s' if len(orders) > 1 else ''} {listed([f'{one:.5g}' for one in orders])}"
+    return f"order{'s' if len(orders) > 1 else ''} {listed([f'{order:.5g}' for order in orders])}"
 
 
 def in_words(text: str) -> str:
@@ -102,4 +106,4 @@ def _words(label: re.Match[str]) -> str:
     if name == "parameter":
         return f"{port} (out of tolerance)"
     details = [port, form, None if order is None else f"order {order}"]
-    return f"{name.replace('_', ' ')} ({', '.join(one for one in details if one)})"
+    return f"{name.replace('_', ' ')} ({', '.join(detail for detail in details if detail)})"

@@ -64,7 +64,7 @@ class DriveSizes(Sizes):
 
     def believes(self, order: float) -> bool:
         """Tell whether the static error is believed to have a line of an order."""
-        return any(abs(order - one) < 1e-6 for one in self.believed_orders)
+        return any(abs(order - believed) < 1e-6 for believed in self.believed_orders)
 
 
 @dataclass(frozen=True, eq=False)
@@ -228,13 +228,13 @@ class LawAtPort(DriveEffect):
 
 
 def _law_effect(name: str) -> Effect:
-    laws = [one.name for one in drive_effects() if one.change is None]
+    laws = [effect.name for effect in drive_effects() if effect.change is None]
     return effect_named(one_of("effect.name", name, laws))
 
 
 def drive_effects() -> list[Effect]:
     """Return the effects that a drive model may have."""
-    return [one for one in known_effects() if one.ports]
+    return [effect for effect in known_effects() if effect.ports]
 
 
 def effect_from_fields(table: Fields) -> DriveEffect:
@@ -245,12 +245,12 @@ def effect_from_fields(table: Fields) -> DriveEffect:
     InvalidInput
         For an unknown name, or a wrong, missing or superfluous field.
     """
-    effect = effect_named(table.choice("name", [one.name for one in drive_effects()]))
-    found: DriveEffect
+    effect = effect_named(table.choice("name", [known.name for known in drive_effects()]))
+    built: DriveEffect
     if effect.change is None:
         port = table.choice("port", effect.ports)
-        found = LawAtPort(effect.name, port, effect.from_fields(table))
+        built = LawAtPort(effect.name, port, effect.from_fields(table))
     else:
-        found = effect.from_fields(table)
+        built = effect.from_fields(table)
     table.finish()
-    return found
+    return built

@@ -102,8 +102,8 @@ class ThermalDrift(DriveEffect):
         records : Session
             Of r records, each with m lines.
         """
-        left = np.einsum("kr,rkm->rm", self.bends(records.elapsed), records.bends)
-        return self.after(records.elapsed) + left[:, 0].real, left[:, 1:]
+        bending = np.einsum("kr,rkm->rm", self.bends(records.elapsed), records.bends)
+        return self.after(records.elapsed) + bending[:, 0].real, bending[:, 1:]
 
 
 def _drift(sizes: DriveSizes) -> list[Guess]:
@@ -196,8 +196,8 @@ class NewZero(DriveEffect):
         records : Session
             Of r records, each with m lines; none of them is taken during the change.
         """
-        found = np.zeros((len(records.elapsed), len(records.orders)), dtype=complex)
-        return np.where(records.elapsed >= self.after, self.size, 0.0), found
+        lines = np.zeros((len(records.elapsed), len(records.orders)), dtype=complex)
+        return np.where(records.elapsed >= self.after, self.size, 0.0), lines
 
 
 def _new_zero(sizes: DriveSizes) -> list[Guess]:

@@ -155,10 +155,10 @@ class Coefficients:
         ndarray of complex, shape (...)
             kg.m2; without clutches one 0, of shape ().
         """
-        found = np.zeros((), dtype=complex)
+        total = np.zeros((), dtype=complex)
         for inertia, time in self.coupled:
-            found = found + inertia / (1.0 + 1j * frequency * time)
-        return found
+            total = total + inertia / (1.0 + 1j * frequency * time)
+        return total
 
     @property
     def stiffness_variations(self) -> tuple[PeriodicStiffness, ...]:

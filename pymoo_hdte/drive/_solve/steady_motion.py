@@ -91,11 +91,11 @@ class Tangents:
 
         def solved(places: NDArray[np.int_]) -> list[LinearSystem | None]:
             """Ask each part for its own; places rise."""
-            found: list[LinearSystem | None] = []
-            for part, first, last in zip(parts, ends[:-1], ends[1:], strict=True):
-                own = places[(first <= places) & (places < last)] - first
-                found += part.rows(own).systems()
-            return found
+            systems: list[LinearSystem | None] = []
+            for part, start, stop in zip(parts, ends[:-1], ends[1:], strict=True):
+                own = places[(start <= places) & (places < stop)] - start
+                systems += part.rows(own).systems()
+            return systems
 
         return cls(solved, np.arange(ends[-1]))
 

@@ -40,8 +40,10 @@ def over_the_limit(seconds: float) -> Failure:
 
 def limit_in(text: str) -> float | None:
     """Return the time limit in seconds that a failure's text tells; None for other failures."""
-    told = re.fullmatch(rf"(?:{TOO_LONG}: )?no result within (\d+(?:\.\d*)?(?:e[-+]?\d+)?) s", text)
-    return float(told[1]) if told else None
+    match = re.fullmatch(
+        rf"(?:{TOO_LONG}: )?no result within (\d+(?:\.\d*)?(?:e[-+]?\d+)?) s", text
+    )
+    return float(match[1]) if match else None
 
 
 def parcel(function: Callable[..., Any], *arguments: Any) -> bytes:
@@ -72,7 +74,7 @@ class Children:
     def __init__(self) -> None:
         self._lock = RLock()
         self._idle: list[subprocess.Popen[bytes]] = []
-        self._all: set[subprocess.Popen[bytes]] = set()
+        self._subprocesses: set[subprocess.Popen[bytes]] = set()
         self._process = os.getpid()
         self.round = 0
 
@@ -142,7 +144,7 @@ class Children:
                 stdout=subprocess.PIPE,
                 start_new_session=True,
             )
-            self._all.add(child)
+            self._subprocesses.add(child)
         assert child.stdin is not None
         # If it was ended meanwhile, the call will notice.
         with suppress(OSError):
@@ -151,7 +153,7 @@ class Children:
 
     def _drop(self, child: subprocess.Popen[bytes]) -> None:
         with self._lock:
-            self._all.discard(child)
+            self._subprocesses.discard(child)
         _kill(child)
         for stream in (child.stdin, child.stdout):
             # What could not be sent to a process that is gone.
@@ -166,7 +168,7 @@ class Children:
         with self._lock:
             self.round += 1
             idle, self._idle = self._idle, []
-            busy = self._all - set(idle)
+            busy = self._subprocesses - set(idle)
         for child in busy:
             _kill(child)
         for child in idle:

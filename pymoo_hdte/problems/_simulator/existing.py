@@ -28,10 +28,10 @@ class _Responses:
 
     def __call__(self, **variables: Array) -> dict[str, Array]:
         X = np.column_stack(list(variables.values()))
-        found = self.problem.evaluate(X, return_as_dictionary=True)
-        columns = dict(zip(self.objectives, np.atleast_2d(found["F"]).T, strict=True))
+        outputs = self.problem.evaluate(X, return_as_dictionary=True)
+        columns = dict(zip(self.objectives, np.atleast_2d(outputs["F"]).T, strict=True))
         if self.constraints:
-            columns |= dict(zip(self.constraints, np.atleast_2d(found["G"]).T, strict=True))
+            columns |= dict(zip(self.constraints, np.atleast_2d(outputs["G"]).T, strict=True))
         return columns
 
 

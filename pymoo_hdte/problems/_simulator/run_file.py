@@ -24,7 +24,7 @@ if sys.platform != "win32":
 
 _SAME = 1e-6
 """Relative difference of two runs of one simulator, on two machines say; set by hand."""
-_ASKED = 5
+_RERUNS = 5
 """Runs of a file that are made again, one after the other, until one does not fail; by hand. Also
 the most damaged lines that are told one by one."""
 _SHOWN = 80
@@ -180,10 +180,11 @@ class RunFile:
         self._finished = "finished" in line
 
     def _tell_damaged(self, damaged: Sequence[tuple[int, str]]) -> None:
-        told = "; ".join(f"line {number} ({why[:_SHOWN]})" for number, why in damaged[:_ASKED])
-        more = f" and {len(damaged) - _ASKED} more" if len(damaged) > _ASKED else ""
+        listing = "; ".join(f"line {number} ({why[:_SHOWN]})" for number, why in damaged[:_RERUNS])
+        ending = f" and {len(damaged) - _RERUNS} more" if len(damaged) > _RERUNS else ""
         message = (
-            f"{self.path}: damaged lines are left out, and their runs are made again: {told}{more}"
+            f"{self.path}: damaged lines are left out, and their runs are made again: "
+            f"{listing}{ending}"
         )
         warnings.warn(message, RuntimeWarning, stacklevel=5)
 
@@ -232,15 +233,15 @@ class RunFile:
             If it gives something else, or the first five of the file fail.
         """
         allowed = "runs of this simulator; delete the file"
-        for row, kept in islice(self.runs.items(), _ASKED):
+        for row, stored in islice(self.runs.items(), _RERUNS):
             gave = again(row)
             if gave is not None:
-                same = len(gave) == len(kept) and np.allclose(gave, kept, rtol=_SAME, atol=0.0)
+                same = len(gave) == len(stored) and np.allclose(gave, stored, rtol=_SAME, atol=0.0)
                 if not same:
                     raise InvalidInput("cache", str(self.path), allowed)
                 return
         if self.runs:
-            allowed += f", if it fails now at the first {_ASKED} of them by right"
+            allowed += f", if it fails now at the first {_RERUNS} of them by right"
             raise InvalidInput("cache", str(self.path), allowed)
 
     def finish(self) -> None:
@@ -250,24 +251,24 @@ class RunFile:
             self._finished = True
 
     def _append(self, line: dict[str, Any]) -> None:
-        left = (json.dumps(line) + "\n").encode()
-        while left:
-            left = left[os.write(self._descriptor, left) :]
+        remaining = (json.dumps(line) + "\n").encode()
+        while remaining:
+            remaining = remaining[os.write(self._descriptor, remaining) :]
         os.fsync(self._descriptor)
 
 
 def _texts(given: Any) -> list[str]:
     """Return a list of texts, or raise `TypeError`."""
-    if not isinstance(given, list) or not all(isinstance(one, str) for one in given):
+    if not isinstance(given, list) or not all(isinstance(entry, str) for entry in given):
         raise TypeError("it has no list of texts where there should be one")
     return given
 
 
 def _numbers(given: Any) -> list[float]:
     """Return a list of finite numbers as floats, or raise one of `_DAMAGED`."""
-    if not isinstance(given, list) or not all(type(one) in (int, float) for one in given):
+    if not isinstance(given, list) or not all(type(entry) in (int, float) for entry in given):
         raise TypeError("it has no list of numbers where there should be one")
-    values = [float(one) for one in given]
+    values = [float(entry) for entry in given]
     if not values or not all(map(math.isfinite, values)):
         raise ValueError("it has no response, or one that is not finite")
     return values

@@ -86,7 +86,7 @@ class Simulator:
         self.file, self.progress = file, progress
         self.responses = file.responses if file else ()
         self._ran = self._sized = False
-        self._last: Failure | None = None
+        self._last_failure: Failure | None = None
         self._given_up: set[tuple[float, ...]] = set()
         if file and file.goes_on:
             file.retry_within(workers.time_limit)
@@ -113,26 +113,28 @@ class Simulator:
             If what it returns is no set of numbers, or another one than before.
         """
         rows = [tuple(row) for row in values.tolist()]
-        kept = self.file.runs if self.file else {}
-        found: dict[tuple[float, ...], Any] = {row: kept.get(row) for row in rows}
+        stored = self.file.runs if self.file else {}
+        results: dict[tuple[float, ...], Any] = {row: stored.get(row) for row in rows}
         for _ in range(self.tries):
             missing = [
-                row for row in found if row not in self._given_up and not self._good(found[row])
+                row for row in results if row not in self._given_up and not self._good(results[row])
             ]
             for row, gave in self._run(missing) if missing else ():
-                found[row] = gave
+                results[row] = gave
                 if self.file and self._good(gave):
                     self.file.keep(row, gave, self.responses)
         self.progress.update(len(rows))
-        self._ran = self._ran or any(self._good(found[row]) for row in rows)
-        self._give_up([row for row in found if not self._good(found[row])])
+        self._ran = self._ran or any(self._good(results[row]) for row in rows)
+        self._give_up([row for row in results if not self._good(results[row])])
         if not self._ran:
             where = ", ".join(f"{n} = {v:g}" for n, v in zip(self.names, rows[0], strict=True))
             message = f"the simulator failed in all of {len(rows)} runs, the first at {where}"
-            message += f": {self._last.text}" if self._last else ""
-            raise SimulatorFailed(message) from (self._last.error if self._last else None)
+            message += f": {self._last_failure.text}" if self._last_failure else ""
+            raise SimulatorFailed(message) from (
+                self._last_failure.error if self._last_failure else None
+            )
         bad = [np.nan] * len(self.responses)
-        table = np.array([found[row] if self._good(found[row]) else bad for row in rows])
+        table = np.array([results[row] if self._good(results[row]) else bad for row in rows])
         if not self._sized:
             self._check_sizes(table)
         return table
@@ -144,7 +146,7 @@ class Simulator:
         """
         for row in rows:
             if self.file and self._ran and row not in self.file.failures:
-                why = self._last.text if self._last else "not a number"
+                why = self._last_failure.text if self._last_failure else "not a number"
                 self.file.keep_failure(row, why)
             self._given_up.add(row)
 
@@ -181,7 +183,7 @@ class Simulator:
             for _ in rows:
                 row, gave = self.workers.next()  # type: ignore[assignment]
                 if isinstance(gave, Failure):
-                    self._last = gave
+                    self._last_failure = gave
                     # Another try would last as long again.
                     if gave.kind == TOO_LONG:
                         self._give_up([row])

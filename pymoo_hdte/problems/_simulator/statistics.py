@@ -219,7 +219,7 @@ class MeanPlusStd(Statistic):
         object.__setattr__(self, "k", real_number("k", self.k))
 
     def _of(self, around: Around) -> tuple[Array, Array]:
-        parts = [one.value(around) for one in (Mean(), Std())]
+        parts = [moment.value(around) for moment in (Mean(), Std())]
         return parts[0][0] + self.k * parts[1][0], parts[0][1] + self.k * parts[1][1]
 
     @property
