@@ -50,9 +50,9 @@ class SeveralComplaints(InvalidInput):
     """
 
     def __init__(self, complaints: Sequence[InvalidInput]) -> None:
-        first = complaints[0]
-        super().__init__(first.field, first.value, first.allowed)
-        self.args = ("\n".join(str(one) for one in complaints),)
+        first_complaint = complaints[0]
+        super().__init__(first_complaint.field, first_complaint.value, first_complaint.allowed)
+        self.args = ("\n".join(str(complaint) for complaint in complaints),)
         self.complaints = tuple(complaints)
 
     def __reduce__(self) -> tuple[Any, ...]:

@@ -182,11 +182,11 @@ class ElitistSwarm(Swarm):
         points = self._points(self.pop).followed_by(self._evaluated(infills))
         everyone = Population.merge(self.pop, infills)
         self._note(everyone, points)
-        kept = self._survivors(points)
+        rows = self._survivors(points)
         survived = np.zeros(len(points), dtype=bool)
-        survived[kept] = True
+        survived[rows] = True
         self.success.learn(self.chosen, survived[-len(self.chosen) :])
-        self.pop = everyone[kept]
+        self.pop = everyone[rows]
 
     def _note(self, everyone: Population, points: Points) -> None:
         """Take down what a swarm needs of old and new particles, before it chooses."""

@@ -112,7 +112,7 @@ class _SteadyState:
         self._evaluations = runner.evaluations
         self._f = swarm.problem.elementwise_func(swarm.problem, (), {})
         self._limit = evaluation_limit(swarm.termination)
-        self._first = list(swarm.ask().tolist())
+        self._initial = list(swarm.ask().tolist())
         self._arrived: list[Individual] = []
         # Which move made a design, to be credited; None of a first or random one.
         self._under_way: dict[int, tuple[Individual, NDArray[np.int_] | None]] = {}
@@ -134,8 +134,8 @@ class _SteadyState:
 
     def _start(self) -> None:
         move = None
-        if self._first:
-            particle = self._first.pop(0)
+        if self._initial:
+            particle = self._initial.pop(0)
         elif not self._swarm.is_initialized:
             particle = self._random()
         else:
@@ -153,14 +153,14 @@ class _SteadyState:
     def _tell(self, particle: Individual, move: NDArray[np.int_] | None, output: Any) -> None:
         swarm = self._swarm
         self._runner.deliver(self._evaluations.filled(self._f, output))
-        told = Population([particle])
-        swarm.evaluator.eval(swarm.problem, told, algorithm=swarm)
+        reported = Population([particle])
+        swarm.evaluator.eval(swarm.problem, reported, algorithm=swarm)
         if move is not None:
             swarm.chosen = move
-            swarm.tell(infills=told)
+            swarm.tell(infills=reported)
         elif swarm.is_initialized:
             # Not asked for as an offspring: it joins the swarm as from a callback.
-            swarm.pop = Population.merge(swarm.pop, told)
+            swarm.pop = Population.merge(swarm.pop, reported)
         else:
             self._arrived.append(particle)
             if len(self._arrived) == swarm.pop_size:

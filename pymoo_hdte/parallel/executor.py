@@ -9,7 +9,7 @@ from typing import Any
 from pymoo_hdte.checks import InvalidInput, whole_number
 from pymoo_hdte.parallel.counts import Counts
 from pymoo_hdte.parallel.evaluations import Evaluations
-from pymoo_hdte.parallel.kept_designs import Output
+from pymoo_hdte.parallel.stored_designs import Output
 from pymoo_hdte.parallel.virtual import VirtualWorkers
 from pymoo_hdte.problems._simulator.workers import Workers
 

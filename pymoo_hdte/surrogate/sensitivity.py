@@ -167,12 +167,12 @@ def _indices(surrogate: ChebyshevSurrogate, rules: Sequence[Rule]) -> SobolIndic
         variance, shares = 0.0, np.zeros_like(shares)
     else:
         shares /= variance
-    first, total = np.empty((2, shares.ndim))
+    first_order, total = np.empty((2, shares.ndim))
     for axis in range(shares.ndim):
         by_degree = np.moveaxis(shares, axis, 0).reshape(shares.shape[axis], -1)
-        first[axis] = by_degree[1:, 0].sum()
+        first_order[axis] = by_degree[1:, 0].sum()
         total[axis] = by_degree[1:].sum()
-    return SobolIndices(surrogate.box.names, mean, variance, first, total)
+    return SobolIndices(surrogate.box.names, mean, variance, first_order, total)
 
 
 def _orthonormal_coefficients(

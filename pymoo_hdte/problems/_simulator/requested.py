@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.problems._simulator.statistics import RobustConstraint, Statistic
 from pymoo_hdte.surrogate._sparse.moments import SparseMoments
-from pymoo_hdte.surrogate.threads import MANY
+from pymoo_hdte.surrogate.threads import ENOUGH_FOR_THREADS
 
 Requested = tuple[Statistic, float, float, int]
 """Statistic, factor, bound and place of the response."""
@@ -60,7 +60,7 @@ def by_moments(
     None if there are few designs, or if mean and deviation do not suffice.
     """
     weights = [weight for statistic, *_ in requested if (weight := statistic.weights) is not None]
-    if len(x) < MANY or len(weights) < len(requested):
+    if len(x) < ENOUGH_FOR_THREADS or len(weights) < len(requested):
         return None
     mean, std = moments(x)
     values = np.empty((len(x), len(requested)))

@@ -151,7 +151,7 @@ class _Growth:
             fitted(features, values, weights, judged, self.lost, start)
             for values, start in zip(truth.T, starts, strict=True)
         ]
-        self.parameters = [one.regression.parameters for one in fits]
+        self.parameters = [fit.regression.parameters for fit in fits]
         polynomial = _joined(fits, polynomials)
         # Where there are no runs the polynomial runs away: its error would hide behind a scatter
         # that is not there.
@@ -163,10 +163,10 @@ class _Growth:
         )
         least = np.where(least > 0.0, least, np.finfo(float).tiny ** 0.25)
         self.scale = np.maximum(judged_std, least)
-        errors = [one.errors(judged, size) for one, size in zip(fits, least.tolist(), strict=True)]
+        errors = [fit.errors(judged, size) for fit, size in zip(fits, least.tolist(), strict=True)]
         of_mean, of_std = np.sqrt(np.mean(np.square(errors), axis=2)).T
         _, std = moments(nearest_designs(self.axes, points))
-        left_out = np.column_stack([one.left_out for one in fits])
+        left_out = np.column_stack([fit.left_out for fit in fits])
         return AdaptiveFit(
             polynomial,
             moments,
@@ -195,11 +195,11 @@ class _Growth:
 
 def _joined(fits: list[ResponseFit], polynomials: EvenPolynomials) -> SparsePolynomial:
     """Return all responses on the union of their terms."""
-    indices = closed(np.concatenate([one.indices for one in fits]))
+    indices = closed(np.concatenate([fit.indices for fit in fits]))
     places = {tuple(row): place for place, row in enumerate(indices.tolist())}
     coefficients = np.zeros((len(fits), len(indices)))
-    for row, one in zip(coefficients, fits, strict=True):
-        row[[places[tuple(index)] for index in one.indices.tolist()]] = one.coefficients
+    for row, fit in zip(coefficients, fits, strict=True):
+        row[[places[tuple(index)] for index in fit.indices.tolist()]] = fit.coefficients
     matrices = [polynomials.to_chebyshev()] * indices.shape[1]
     return SparsePolynomial.from_triangular(indices, coefficients, matrices)
 

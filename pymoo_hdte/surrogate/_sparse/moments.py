@@ -23,7 +23,7 @@ from pymoo_hdte.surrogate._sparse.measures import Measure, OrthonormalPolynomial
 from pymoo_hdte.surrogate._sparse.polynomial import SparsePolynomial
 from pymoo_hdte.surrogate.moments import divide_or_zero
 from pymoo_hdte.surrogate.tensor import chebyshev_basis
-from pymoo_hdte.surrogate.threads import MANY, in_blocks
+from pymoo_hdte.surrogate.threads import ENOUGH_FOR_THREADS, in_blocks
 
 Array = NDArray[np.float64]
 
@@ -74,8 +74,8 @@ class SparseMoments:
             step = AxisMap(indices, j, self.orthonormal[j].size)
             self._steps.append(step)
             indices = step.result
-        first = np.lexsort(indices.T[::-1])
-        self._order, self.indices = first, indices[first]
+        order = np.lexsort(indices.T[::-1])
+        self._order, self.indices = order, indices[order]
         largest = max(step.size for step in self._steps)
         self._at_once = max(1, _AT_ONCE // (largest * coefficients.shape[1]))
 
@@ -86,13 +86,13 @@ class SparseMoments:
 
     def __call__(self, designs: Array) -> tuple[Array, Array]:
         """Return mean and standard deviation, shape (n, r) each, in the responses' units."""
-        if COMPILES and len(designs) >= MANY:
+        if COMPILES and len(designs) >= ENOUGH_FOR_THREADS:
             return self._many_moments(designs)
         expansion = self.expansion(designs)
         return expansion[..., 0], deviation(expansion)
 
     def _many_moments(self, designs: Array) -> tuple[Array, Array]:
-        moments = self._many
+        moments = self._many_designs
         mean, std = np.empty((2, len(designs), self._coefficients.shape[1]))
 
         def fill(block: slice) -> None:
@@ -103,11 +103,11 @@ class SparseMoments:
             offsets, factors = np.moveaxis(np.array(around), 1, 0)
             mean[block], std[block] = moments(offsets, factors)
 
-        in_blocks(fill, len(designs), MANY)
+        in_blocks(fill, len(designs), ENOUGH_FOR_THREADS)
         return mean, std
 
     @cached_property
-    def _many(self) -> ManyDesigns:
+    def _many_designs(self) -> ManyDesigns:
         families = [self.orthonormal[j] for j in self.designed]
         return ManyDesigns(self._coefficients[0], self._steps, families)
 

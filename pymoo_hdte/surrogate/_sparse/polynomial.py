@@ -73,15 +73,15 @@ class SparsePolynomial:
     def _factors(self) -> list[tuple[NDArray[np.int_], ...]]:
         """By axis: terms that it is the last variable of, the same without it, and its degrees."""
         places = {tuple(row): place for place, row in enumerate(self.indices.tolist())}
-        last = np.max(np.where(self.indices > 0, np.arange(self.indices.shape[1]), -1), axis=1)
-        found: list[tuple[NDArray[np.int_], ...]] = []
+        last_axis = np.max(np.where(self.indices > 0, np.arange(self.indices.shape[1]), -1), axis=1)
+        factors: list[tuple[NDArray[np.int_], ...]] = []
         for axis in range(self.indices.shape[1]):
-            terms = np.flatnonzero(last == axis)
+            terms = np.flatnonzero(last_axis == axis)
             without = self.indices[terms]
             without[:, axis] = 0
             before = np.array([places[tuple(row)] for row in without.tolist()], dtype=int)
-            found.append((terms, before, self.indices[terms, axis]))
-        return found
+            factors.append((terms, before, self.indices[terms, axis]))
+        return factors
 
     def _products(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the terms, shape (p, n), each from the one without its last variable."""

@@ -17,7 +17,7 @@ Output = dict[str, Any]
 Row = tuple[float, ...]
 
 
-class KeptDesigns:
+class StoredDesigns:
     """What was evaluated, by design, in a file that a killed run goes on from.
 
     Parameters
@@ -106,7 +106,7 @@ class KeptDesigns:
         return tuple(names), flat
 
     def _whole(self, flat: list[float]) -> Output:
-        found: dict[str, list[float]] = {}
+        output: dict[str, list[float]] = {}
         for name, number in zip(self._file.responses, flat, strict=True):
-            found.setdefault(name.rpartition("[")[0], []).append(number)
-        return {key: np.array(numbers) for key, numbers in found.items()}
+            output.setdefault(name.rpartition("[")[0], []).append(number)
+        return {key: np.array(numbers) for key, numbers in output.items()}
