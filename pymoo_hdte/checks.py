@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 MOST_SHOWN = 200
-"""Most characters of a field or value in a message; a damaged file may hold a million."""
+"""Largest number of characters shown of a field or value; a damaged file may hold a million."""
 
 
 class InvalidInput(ValueError):

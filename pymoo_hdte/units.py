@@ -135,7 +135,7 @@ def suggestion(unit: str, units: Collection[str]) -> str:
     ----------
     unit : str
     units : collection of str
-        Those that are allowed.
+        Units that are allowed.
 
     Examples
     --------

@@ -34,7 +34,7 @@ class Budget:
         Lines of a text, or length of an array; each number that is read takes 8 bytes of memory,
         and as much again while it is read.
     characters : int
-        Of a line with its end, of the lines of a quoted cell, and of blank lines at a stretch.
+        Of a line with its end, all lines of a quoted cell, or consecutive blank lines.
 
     Examples
     --------

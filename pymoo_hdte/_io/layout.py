@@ -51,7 +51,7 @@ class Channel:
     wraps : float, optional
         Interval, in the unit, after which the readings of an overflowing counter begin anew.
     counts_per_turn : float, optional
-        With `COUNTS` only.
+        Counts of a turn of the encoder, for the unit `COUNTS` only.
     zero : float
         Reading where the channel is zero, in the unit.
     integrated : bool

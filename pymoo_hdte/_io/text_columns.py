@@ -32,13 +32,13 @@ class TextTable:
     file : str
         Name, for error messages.
     titles : list of str, or of int
-        Of the columns; their numbers from 0 if the file has no titles.
+        Titles of the columns; their numbers from 0 if the file has none.
     title_line : int
         The number of the line of titles, from 1.
     mark : str or None
         What separates the cells of a row; None for any white space.
     units : dict of str to str
-        Of the columns, from the row of units below the titles; empty without such a row.
+        Units of the columns, from a row below the titles; empty without such a row.
     decimal : {".", ","} or None
         What stands before decimals; None to find out.
     blocks : callable

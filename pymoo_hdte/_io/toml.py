@@ -30,7 +30,7 @@ def toml_text(table: Mapping[str, Any]) -> str:
     Parameters
     ----------
     table : mapping
-        Of texts, numbers, truth values, lists and tables of these; numpy scalars are numbers.
+        Table of texts, numbers, truth values, lists and tables of these; numpy scalars are numbers.
 
     Returns
     -------

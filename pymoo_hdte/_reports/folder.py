@@ -113,7 +113,7 @@ class ReportFolder:
         page : str
             HTML.
         document : dict
-            Of plain types and finite numbers.
+            Document of plain types and finite numbers.
         texts : mapping of str
             Contents of the further files, by name.
 

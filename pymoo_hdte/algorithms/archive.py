@@ -100,8 +100,8 @@ class FrontArchive:
         Largest number of members.
     truncation : Truncation
         Chooses who stays above the capacity.
-    left : int, optional
-        How many it leaves, the capacity by default; fewer, and it is seldom needed.
+    thinned_to : int, optional
+        Number that a truncation leaves, by default the capacity; with fewer it is seldom needed.
 
     Attributes
     ----------

@@ -51,7 +51,7 @@ class Swarm(Algorithm):
         Parameters
         ----------
         problem : Problem
-            With real variables, finite bounds and two objectives or more.
+            A problem with real variables, finite bounds and two objectives or more.
         **kwargs
             What `pymoo.core.algorithm.Algorithm.setup` takes: termination, seed and others.
 

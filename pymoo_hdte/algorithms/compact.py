@@ -24,7 +24,7 @@ from pymoo_hdte.algorithms.survival import Quality
 from pymoo_hdte.checks import whole_number
 
 SMALLEST, LARGEST = 10, 100
-"""Particles of a swarm that grows."""
+"""Smallest and largest number of particles of a swarm that grows."""
 _AT_ONCE = 10
 """Generations after which what they found enters the archive of all."""
 

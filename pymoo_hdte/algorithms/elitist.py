@@ -65,7 +65,7 @@ class ElitistSwarm(Swarm):
     n_offsprings : int, optional
         New positions in a generation, ``pop_size`` by default.
     repair : Repair, optional
-        Of pymoo, for all positions before they are evaluated; `RoundingRepair` makes integers.
+        Repair of pymoo for positions before they are evaluated; `RoundingRepair` makes integers.
     **kwargs
         Any other argument of `pymoo.core.algorithm.Algorithm`.
 

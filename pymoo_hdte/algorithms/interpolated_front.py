@@ -30,7 +30,7 @@ Values = NDArray[np.float64]
 Evaluate = Callable[[Values], Values]
 
 POINTS = 20
-"""Designs along the front that are evaluated in a round, if nothing else is asked for."""
+"""Designs along the front that are evaluated in a round, by default."""
 EXPLORERS = 16
 """Designs anywhere that are evaluated in a round."""
 _FIRST_DESIGNS = 64
@@ -39,18 +39,18 @@ _CORNERS_UP_TO = 6
 """Variables up to which all corners of the box are evaluated."""
 _POPULATION, _GENERATIONS = 100, 60
 _AT_ONCE = 16
-"""Designs evaluated before somebody who waits is told."""
+"""Designs evaluated between two notifications."""
 _SAME = 1e-4
 """Distance in the unit cube below which a design counts as evaluated already."""
 _OUTLYING = 2.0
 """Designs worse than the front by this factor, as in a resonance, would bend the interpolation."""
 _BEYOND = 1.0
-"""Above the largest logarithm interpolated by this much, an interpolation is cut off."""
+"""Distance above the largest interpolated logarithm at which the interpolation is cut off."""
 
 
 @dataclass(frozen=True, eq=False)
 class FoundFront:
-    """What a search found.
+    """The result of a search.
 
     Attributes
     ----------
@@ -60,7 +60,7 @@ class FoundFront:
     front : ndarray, shape (n, 2)
         Their objectives as evaluated, in their own units.
     width : ndarray, shape (2,)
-        Of the front in each objective's unit, or ``least_width`` of its least value if that is
+        Width of the front in the objectives' units, or ``least_width`` of its least value if that is
         more.
     difference : float
         Dimensionless, in widths: largest difference of interpolation and evaluation along the last
@@ -69,7 +69,7 @@ class FoundFront:
     evaluated : int
         Number of designs evaluated.
     lost : ndarray, shape (k, n_var)
-        Those of them without objectives, in their own units.
+        Evaluated designs without objectives, in their own units.
 
     Examples
     --------
@@ -196,7 +196,7 @@ class _Known:
 
     @property
     def good(self) -> NDArray[np.bool_]:
-        """Which have objectives, shape (n,)."""
+        """Which designs have objectives, shape (n,)."""
         return np.asarray(np.isfinite(self.values).all(axis=1))
 
     @property

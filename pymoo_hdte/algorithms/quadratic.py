@@ -32,7 +32,7 @@ _LEAST_SHIFT = 1e-100
 def fitted(Z: NDArray[np.float64], F: NDArray[np.float64]) -> Quadratic:
     """Return quadratics near objectives ``F`` (n, m) at places ``Z`` (n, d) of size one.
 
-    Of all that fit alike it is the one of smallest second derivatives, so that fewer points than
+    Of all that fit alike they have the smallest second derivatives, so that fewer points than
     coefficients do: ridge regression with a polynomial kernel, in which constant and gradient are
     all but free (M. J. D. Powell, "The NEWUOA software for unconstrained optimization without
     derivatives", 2006, takes the smallest change of second derivatives).

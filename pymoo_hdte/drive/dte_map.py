@@ -82,7 +82,7 @@ class TorsionalMode:
 def torsional_mode(model: DriveModel) -> TorsionalMode:
     """Return the torsional mode of the nominal design, its bearings left out.
 
-    With an inertia in a clutch that of its least damped vibration, with bearings.
+    With an inertia in a clutch, it is the least damped vibration, bearings included.
     """
     coefficients = model.coefficients(model.nominal[None])
     if coefficients.coupled:

@@ -205,7 +205,7 @@ class DriveModel(ModelValues):
         Parameters
         ----------
         path : str or path-like
-            Of a file in the format of ``docs/file_format.md``.
+            A file in the format of ``docs/file_format.md``.
 
         Returns
         -------
@@ -225,9 +225,9 @@ def load_model(path: str | Path, sheet: DataSheet) -> DriveModel:
     Parameters
     ----------
     path : str or Path
-        Of a TOML file, in which every quantity has its unit.
+        A TOML file, in which every quantity has its unit.
     sheet : DataSheet
-        Of the drive that the model is of.
+        Data sheet of the drive.
 
     Returns
     -------

@@ -133,7 +133,7 @@ def bouc_wen(force: Parameter, torsion: Parameter, starts: Sequence[tuple[float,
     Parameters
     ----------
     force, torsion : Parameter
-        Of the springs, N.m and rad.
+        Force and torsion of the springs, N.m and rad.
     starts : sequence of (float, float)
         Forces and torsions from which fits of springs start, the typical torsion among them.
     """

@@ -73,7 +73,7 @@ class Effect:
     Attributes
     ----------
     name : str
-        In model files and verdicts: lower case with underscores, e.g. ``"coulomb_friction"``.
+        Name in model files and verdicts: lower case with underscores, e.g. ``"coulomb_friction"``.
     law : type or None
         Dataclass of the law, whose fields are numbers in SI; None if it is no law at a port.
     ports : tuple of str
@@ -86,7 +86,7 @@ class Effect:
         Its description in a report, which may contain ``{port}``, ``{order}`` and ``{force}``
         (``"torque"`` in a drive).
     guess : callable or None
-        From `Sizes` of a port to a list of `Guess`, empty where it is impossible; None: not sought.
+        Maps `Sizes` of a port to a list of `Guess`, empty where it is impossible; None: not sought.
     sought : tuple of str or None
         Ports of a drive where it is searched for; by default all of ``ports``.
     change : type or None
@@ -261,7 +261,7 @@ class Effect:
         Raises
         ------
         InvalidInput
-            With the field ``name.number``: for an unknown number, or one that is missing or that
+            Naming the field ``name.number``: for an unknown number, or one that is missing or that
             the law does not take.
         """
         if self.law is None:

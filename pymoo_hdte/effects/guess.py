@@ -38,13 +38,13 @@ class Sizes:
         Residual of the base in the balance there. The base absorbs no part of a line, so that this
         is the size of a line, while ``force`` is larger where the base absorbs most of a force.
     largest : float
-        The largest that may be missing.
+        Largest size of a force that may be missing there.
     speed : float
         Largest speed of the port.
     travel : float
         Largest deflection from the middle of its motion.
     stiffness, damping : float
-        Of the believed spring and damper there; 0 without.
+        Stiffness and damping of the nominal spring and damper there; 0 without.
     both_ways : bool
         Whether records move it in both directions.
     loaded : bool
@@ -106,7 +106,7 @@ class Sizes:
     def family(self, order: float, most: int = 2) -> Family:
         """Return an order of the port with its harmonics: what varies with an angle is no cosine.
 
-        Those of its first ``most`` in ``shown``, and further ones up to the fifth that are seen: a
+        It has its first ``most`` in ``shown``, and further ones up to the fifth that are seen: a
         rounded trapezoid has the third and the fifth.
         """
         relative_order = order / self.slower
@@ -145,10 +145,10 @@ class Guess:
     starts : sequence of sequence of float
         Values from which fits start; by default the typical ones.
     build : callable, optional
-        From values to laws (or other changes of a drive), (n,) to a tuple. By default the one law
+        Maps values (n,) to a tuple of laws (or other changes of a drive). By default the one law
         whose numbers are the unknowns, by name.
     family : Family, optional
-        Orders at which it varies.
+        Orders at which the effect varies.
     form : str
         Word for the form, where there are several.
     sentence : str
@@ -207,7 +207,7 @@ def guess_of_lines(
     largest, typical : float
         Amplitudes.
     line : callable
-        From order, amplitude and phase to a law (or another change of a drive).
+        Maps order, amplitude and phase to a law (or another change of a drive).
     form, sentence, name : str
     quantities : mapping of str to str
         As of `Guess`.
@@ -229,11 +229,11 @@ def check_response(name: str, parts: Sequence[Any], sizes: Sizes) -> None:
     Parameters
     ----------
     name : str
-        Of the effect.
+        Name of the effect.
     parts : sequence
         Laws; other changes of a drive are passed over.
     sizes : Sizes
-        Of the port.
+        Sizes of the port.
     """
     at = np.linspace(-1.0, 1.0, 6)[None]
     state = PortState(

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from pymoo_hdte.checks import InvalidInput, one_of
 
 BLANKS = ("port", "order", "force")
-"""What a sentence may leave open: the port, the orders, and the word for what acts there."""
+"""Blanks of a sentence: the port, the orders, and the word for the force there."""
 _OUT = " lies outside its tolerance."
 _PORT = r"([A-Za-z]\w*(?:\.\w+)*(?: of \w+)?)"
 _FORM = r"(?:/([a-z\d.+]+(?: s)?))?"
@@ -44,7 +44,7 @@ def sentence_at(sentence: str, port: str, orders: str, force: str) -> str:
     Parameters
     ----------
     sentence : str
-        Of an effect or of one of its guesses.
+        Sentence of an effect or of one of its guesses.
     port, orders : str
         Where it is, and its orders in words; empty for an effect that has none.
     force : str
@@ -81,7 +81,7 @@ def joined_sentences(sentences: Sequence[str]) -> str:
 
 
 def listed(words: Sequence[str]) -> str:
-    """Return words as a list with commas and a last and; one word as it is."""
+    """Return words as a list with commas and a final "and"; a single word as it is."""
     return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
 
 

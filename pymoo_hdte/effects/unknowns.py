@@ -97,7 +97,7 @@ def wave(
     Parameters
     ----------
     name : str
-        Of the amplitude.
+        Name of the amplitude.
     largest, typical : float
         Amplitudes.
     harmonics : sequence of int
@@ -125,7 +125,7 @@ def number_of(name: str) -> str:
     Parameters
     ----------
     name : str
-        Of a line or of another unknown.
+        Name of a line or of another unknown.
 
     Examples
     --------
@@ -136,7 +136,7 @@ def number_of(name: str) -> str:
 
 
 def starts_along_each(parameters: Sequence[Parameter]) -> tuple[tuple[float, ...], ...]:
-    """Return one start along each unknown, which are those of a `wave` or others that add up."""
+    """Return one start along each unknown of a `wave`, or of other unknowns that add up."""
     sizes = np.diag([parameter.scale for parameter in parameters])
     return tuple(tuple(row) for row in sizes.tolist())
 
@@ -204,7 +204,7 @@ def harmonics_among(orders: Sequence[float], order: float, most: int) -> int:
 
 
 def is_among(orders: Iterable[float], order: float) -> bool:
-    """Tell whether ``orders`` hold one, to within rounding."""
+    """Tell whether an order is among ``orders``, to within rounding."""
     return any(abs(order - known) < 1e-6 for known in orders)
 
 

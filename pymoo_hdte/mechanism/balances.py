@@ -83,7 +83,7 @@ class ForceBalance:
     moving : MovingRows
         Rows of the working rate that are not left out.
     motions : dict of str to Motion
-        Of the coordinates and of followed angles, at the rate of the record.
+        Motions of the coordinates and of followed angles, at the rate of the record.
     cutoff : float
 
     Raises

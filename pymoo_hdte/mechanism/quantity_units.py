@@ -18,7 +18,7 @@ def unit_of(mechanism: Mechanism, name: str, quantity: str = "force") -> str:
     ----------
     mechanism : Mechanism
     name : str
-        Of a coordinate, or of a port.
+        Name of a coordinate or of a port.
     quantity : str
         ``"force"``, ``"position"`` or ``"speed"``.
 
@@ -38,9 +38,9 @@ def unit_at(mechanism: Mechanism, name: str, unit: str) -> str:
     ----------
     mechanism : Mechanism
     name : str
-        Of a coordinate, or of a port.
+        Name of a coordinate or of a port.
     unit : str
-        What it is at a shaft.
+        Unit of the number at a shaft.
 
     Returns
     -------
@@ -70,11 +70,11 @@ def unit_of_number(mechanism: Mechanism, name: str, number: str, unit: str) -> s
     ----------
     mechanism : Mechanism
     name : str
-        Of a coordinate, or of a port.
+        Name of a coordinate or of a port.
     number : str
         Such as ``"order"`` or ``"amplitude"``.
     unit : str
-        What it is at a shaft.
+        Unit of the number at a shaft.
 
     Returns
     -------

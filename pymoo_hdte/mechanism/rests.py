@@ -28,7 +28,7 @@ like a force."""
 _WHOLE = 0.999
 """Weight of a row that counts fully, but for rounding."""
 _FEWEST = 100
-"""Coefficients of force balances that have to be left, or the record is taken as it is. They hold
+"""Least number of coefficients of force balances without rests, or rests stay in. They hold
 the dozen unknowns of a mechanism with three effects, and their chi-square is known to 14 %."""
 
 

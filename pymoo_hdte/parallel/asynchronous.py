@@ -47,7 +47,7 @@ def minimize_asynchronously(
     algorithm : ElitistSwarm
         Or a `CompactSwarm`; it is copied.
     termination : Termination or tuple
-        Of pymoo: ``("n_eval", 500)``, or a time. Every finished design counts as a generation. What
+        Termination of pymoo, as ``("n_eval", 500)`` or a time. Each design is a generation. What
         is under way when another termination ends the run is dropped.
     at_once : int, optional
         Evaluations under way; by default as many as the executor says that it has workers.

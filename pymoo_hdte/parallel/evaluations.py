@@ -34,13 +34,13 @@ class Evaluations:
     Parameters
     ----------
     workers : Workers or VirtualWorkers
-        That make the evaluations.
+        Workers that make the evaluations.
     tries : int
-        How often one is made that fails.
+        How often a failing evaluation is made.
     cache : path or None
-        File of finished ones.
+        File of finished evaluations.
     counts : Counts
-        Where they are counted.
+        Counts of their outcomes.
     """
 
     def __init__(
@@ -61,7 +61,7 @@ class Evaluations:
         number : int
             Tells the design from others under way.
         f : callable
-            Of pymoo: from a design to its outputs by name.
+            Function of pymoo that maps a design to its outputs by name.
         x : object
             The design; with a file n_var real numbers.
 
@@ -153,7 +153,7 @@ class Evaluations:
         Raises
         ------
         SimulatorFailed
-            Then, with what was said at the first one.
+            In that case, with the text of the first failure.
         """
         if self._counts.n_lost and not self._counts.made + self._counts.from_file:
             raise SimulatorFailed(f"no evaluation gave a result: {self._counts}")

@@ -18,14 +18,14 @@ Row = tuple[float, ...]
 
 
 class StoredDesigns:
-    """What was evaluated, by design, in a file that a killed run goes on from.
+    """Evaluated designs in a file, from which a killed run goes on.
 
     Parameters
     ----------
     path : str or path-like
-        Of the file.
+        The file.
     problem : object
-        Whose state and source tell it from others.
+        The problem, identified by its state and source.
     n_var : int
         Number of its variables.
     again : callable
@@ -36,7 +36,7 @@ class StoredDesigns:
     Attributes
     ----------
     order : dict
-        Which design was finished when, from 0 on.
+        Position of each design in the order in which they were finished, from 0.
     """
 
     def __init__(

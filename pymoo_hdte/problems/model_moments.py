@@ -115,7 +115,7 @@ class ModelMoments:
         Parameters
         ----------
         designs : ndarray, shape (n, 4)
-            Those looked at; they have steady states.
+            Designs at which the change is measured; they have steady states.
         wanted : ndarray, shape (2,)
             Largest change of mean and standard deviation, summed over the inputs, arcsec.
 

@@ -40,7 +40,7 @@ class RobustDTEDirect(StoredFront, Problem):
     conditions : sequence of OperatingCondition, optional
         As for `RobustDTE`.
     nodes : sequence of int
-        Of the Gauss rules of theta_s, K, J_in, B_in and B_fc.
+        Numbers of nodes of the Gauss rules of theta_s, K, J_in, B_in and B_fc.
 
     Attributes
     ----------

@@ -32,9 +32,9 @@ class SobolIndices:
     Attributes
     ----------
     names : tuple of str, length d
-        Of the inputs.
+        Names of the inputs.
     mean, variance : float
-        Of the output, in its unit and the square of that.
+        Mean and variance of the output, in its unit and the square of that.
     first : ndarray, shape (d,)
         First-order indices: the share of the variance that is due to one input alone. The
         variance would be less by it, on average, if the input were known.
@@ -125,7 +125,7 @@ def sobol_indices_over_box(surrogate: ChebyshevSurrogate, box: Box) -> SobolIndi
     surrogate : ChebyshevSurrogate
         Polynomial in d variables, of any orders.
     box : Box
-        Of the surrogate's variables, e.g. ``surrogate.box`` itself.
+        Box of the surrogate's variables, e.g. ``surrogate.box`` itself.
 
     Returns
     -------

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 
 ENOUGH_FOR_THREADS = 4096
-"""Designs from which on threads, and machine code that is made at its first use, pay."""
+"""Least number of designs for which threads, and machine code made at its first use, pay."""
 _SHARES = 4
 """Shares of the work for each core: one that is kept busy by others then holds up less."""
 

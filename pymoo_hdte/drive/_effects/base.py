@@ -33,15 +33,15 @@ class DriveSizes(Sizes):
     error : float
         Typical size of a line of the transmission error that may be missing, rad.
     largest_error : float
-        The largest, rad.
+        Largest size of such a line, rad.
     believed_orders : tuple of float
-        Of the lines of the static error that are believed to be there.
+        Orders of the nominal lines of the static error.
     ratio : float
         Transmission ratio N.
     inertia : float
-        Of the load, kg.m2: the size of an inertia that may be missing.
+        Inertia of the load, kg.m2: the size of an inertia that may be missing.
     duration : float
-        Of the session, s.
+        Duration of the session, s.
     changes : tuple of float
         Times of the session between records, at which a reading may have changed at once, s.
     """
@@ -103,7 +103,7 @@ class DriveEffect:
     """
 
     name: ClassVar[str]
-    """Of the effect, in model files and verdicts."""
+    """Name of the effect, in model files and verdicts."""
 
     def apply(self, coefficients: Coefficients) -> Coefficients:
         """Return the coefficients with this effect added."""
@@ -136,7 +136,7 @@ class DriveEffect:
         Parameters
         ----------
         records : Session
-            Of r records, each with m lines.
+            r records, each with m lines.
 
         Returns
         -------
@@ -163,12 +163,12 @@ class DriveEffect:
         Parameters
         ----------
         other : DriveEffect
-            Of the same type.
+            An effect of the same type.
 
         Raises
         ------
         InvalidInput
-            Where a model cannot take the two.
+            If a model cannot take the two.
         """
         raise InvalidInput("effects", self.name, "each effect once, at each port and order")
 
@@ -184,11 +184,11 @@ class LawAtPort(DriveEffect):
     Attributes
     ----------
     name : str
-        Of the effect, in model files and verdicts, e.g. ``"coulomb_friction"``.
+        Name of the effect, in model files and verdicts, e.g. ``"coulomb_friction"``.
     port : str
         ``"input"``, ``"output"`` or ``"mesh"``, where the law may be.
     law : Law
-        Of the type that belongs to the name; its numbers are in SI.
+        A law of the type that belongs to the name; its numbers are in SI.
 
     Raises
     ------

@@ -79,7 +79,7 @@ class Eccentricity(DriveEffect):
         Parameters
         ----------
         records : Session
-            Of r records, each with m lines.
+            r records, each with m lines.
         """
         lines = np.zeros((len(records.elapsed), len(records.orders)), dtype=complex)
         # theta_out is theta_in / N except for the transmission error, a part in 10^3.

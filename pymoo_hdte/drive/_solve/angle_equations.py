@@ -32,7 +32,7 @@ _BY_ROW = (
     "speed", "load", "output_inertia", "output_damping", "static", "_static_slope", "_stiffness",
     "_backward", "_share_of_mesh", "rate", "input_operator",
 )  # fmt: skip
-"""What `AngleEquations` has by row, the last three once they are asked for."""
+"""Attributes of `AngleEquations` with a row per case; the last three are computed on demand."""
 
 Values = NDArray[np.float64]
 
@@ -197,7 +197,7 @@ class AngleEquations:
     def recollection(self, torsion: Phasors) -> Recollection:
         """Return how the mesh torque depends on the torsion elsewhere, by laws with memory.
 
-        To be added to what ``mesh_slope`` gives.
+        It is added to the torque by ``mesh_slope``.
         """
         memories = [cast(Memory, law) for _, law in self.coefficients.laws if law.states]
         along = self._path(self.torus.signal(torsion))
@@ -305,7 +305,7 @@ class AngleEquations:
 
     @cached_property
     def _of_inertia(self) -> tuple[Phasors, Phasors]:
-        """What the inertia adds to P (before it is shared) and to C of `impedance`."""
+        """Contributions of the inertia to P (before it is shared) and to C of `impedance`."""
         frequency = self.torus.orders * self.speed
         rates = self.coefficients.load_rates
         inertia = self.output_inertia + self.coefficients.inertia_in_clutches(frequency)

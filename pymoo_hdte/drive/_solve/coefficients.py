@@ -61,7 +61,7 @@ class Coefficients:
         Share of the mesh torque's reaction on the input through the slope of theta_s: 0 in
         Eq. (9), 1 by the principle of virtual work; dimensionless.
     temperature : float or ndarray, shape (n,)
-        Of the drive in kelvin; NaN where it is not known.
+        Temperature of the drive in kelvin; NaN where it is not known.
     load_rates : tuple of (int, float)
         What a load that is not rigidly on the output adds to its inertia: numbers k with sizes s,
         each a torque of s times the k-th time derivative of the output's acceleration, s in

@@ -82,7 +82,7 @@ def harmonic_balance(
     Parameters
     ----------
     coefficients : Coefficients
-        Of n designs.
+        Coefficients of n designs.
     input_speed, load_torque : ndarray, shape (n,), optional
         An operating condition for each row, rad/s and N.m, in place of that of ``coefficients``. A
         negative speed is the reverse direction; a load keeps its sense in space.
@@ -161,7 +161,7 @@ def continued_from_neighbours(coefficients: Coefficients, motion: SteadyMotion) 
     Parameters
     ----------
     coefficients : Coefficients
-        Of n designs.
+        Coefficients of n designs.
     motion : SteadyMotion
         What `harmonic_balance` found for them.
     """

@@ -20,7 +20,7 @@ The second where a torus is smaller with it: for a crest with many harmonics of 
 def fundamental_orders(orders: Sequence[float]) -> tuple[float, ...]:
     """Return 1 and the fractions from which all ``orders`` are whole multiples and sums.
 
-    Those from which most of the others follow are taken, for each needs an angle of its own. The
+    Fractions from which most of the others follow are taken, for each needs its own angle. The
     harmonics of 0.5644, for instance, lie at the fractions 0.4356, 0.1287 and 0.3069 of a turn,
     of which the second and third are multiples of the first, up to whole turns.
     """
@@ -34,7 +34,7 @@ def fundamental_orders(orders: Sequence[float]) -> tuple[float, ...]:
 
 @lru_cache(maxsize=1024)
 def _fundamentals(orders: tuple[float, ...], most: int) -> tuple[float, ...]:
-    """Return `fundamental_orders` with multiples up to ``most``; each prediction asks for them."""
+    """Return `fundamental_orders` with multiples up to ``most``; each prediction needs them."""
     fractions = sorted({round(abs(order - np.rint(order)), 9) for order in orders} - {0.0})
     fundamentals: list[float] = []
     while fractions:

@@ -36,7 +36,7 @@ def transfer_function(
     Parameters
     ----------
     coefficients : Coefficients
-        Of n designs; laws at ports and the variation of the stiffness are left out.
+        Coefficients of n designs; laws at ports and a varying stiffness are left out.
     orders : ndarray, shape (n_orders,)
         Cycles per input turn; w is their multiple of the input speed.
 
@@ -67,7 +67,7 @@ def hill_steady_state(coefficients: Coefficients) -> OrderSpectrum:
     Parameters
     ----------
     coefficients : Coefficients
-        Of n designs, a row of the spectrum each.
+        Coefficients of n designs, a row of the spectrum each.
 
     Returns
     -------
@@ -144,7 +144,7 @@ def _solved(coefficients: Coefficients) -> tuple[NDArray[np.bool_], OrderSpectru
 def _family(
     coefficients: Coefficients, lowest: float, lines: NDArray[np.int_]
 ) -> tuple[NDArray[np.float64], NDArray[np.complex128]]:
-    """Return all orders ``first + 2 m`` that matter, and their theta_d.
+    """Return all orders ``lowest + 2 m`` that matter, and their theta_d.
 
     ``lines`` are the error lines of this family.
 

@@ -24,7 +24,7 @@ _RESIDUAL = 1e-5
 """Share of the right side that an iteration may leave: so steps shrink faster than they have to to
 go on with the system of another place (to a tenth)."""
 _MOST = (40, 5)
-"""Directions kept by an iteration until it begins anew, and how often it does."""
+"""Directions kept by an iteration until it restarts, and the largest number of restarts."""
 
 
 class LinearSystem(Protocol):
@@ -61,9 +61,9 @@ class Linearised(NamedTuple):
     ----------
     torus : Torus
     slope : ndarray, shape (n, G)
-        Of the torque by the torsion on the grid.
+        Slope of the torque by the torsion on the grid.
     viscous : ndarray of complex, shape (n, H)
-        By which each harmonic is multiplied besides.
+        Factor by which each harmonic is multiplied besides.
     recollection : Recollection, optional
         How the torque depends on the torsion elsewhere.
     """
@@ -84,7 +84,7 @@ class Linearised(NamedTuple):
         return matrix
 
     def core(self) -> Linearised:
-        """Return the same among the harmonics of one beat at a time."""
+        """Return the linearisation among the harmonics of one beat at a time."""
         viscous = self.viscous[:, self.torus.of_core]
         return Linearised(self.torus.core, self.slope, viscous, self.recollection)
 
@@ -141,7 +141,7 @@ class Iterated:
         return stacked(torus.phasors(torque) + row.viscous * phasors)[0]
 
     def _precondition(self, values: Vector) -> Vector:
-        """Return about what `solve` returns."""
+        """Return an approximation of `solve`."""
         unknowns = stacked(unstacked(values) / self._alone)
         unknowns[self._core_places] = self._core.solve(values[self._core_places])
         return unknowns

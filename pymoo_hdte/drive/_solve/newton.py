@@ -84,7 +84,7 @@ class Place:
     def replaced(
         self, rows: NDArray[np.int_], source: Place, source_rows: NDArray[np.int_]
     ) -> Place:
-        """Return the place with other rows, of another place, in place of some rows."""
+        """Return this place with some rows taken over from another place."""
         merged = copy(self)
         for name in _BY_ROW:
             values = getattr(self, name).copy()

@@ -19,7 +19,7 @@ class Recollection(NamedTuple):
     Attributes
     ----------
     retained, gained : ndarray, shape (k, n, 2 G)
-        Of each of k parts, at each step of two passages.
+        Retained share and gain of each of k parts, at each step of two passages.
     places : ndarray of int, shape (n, G)
         Points of a passage in its order.
     """
@@ -29,7 +29,7 @@ class Recollection(NamedTuple):
     places: Places
 
     def rows(self, rows: slice) -> Recollection:
-        """Return those of some of the rows."""
+        """Return the recollection of some of the rows."""
         return Recollection(self.retained[:, rows], self.gained[:, rows], self.places[rows])
 
     def of_signals(self, signals: Values, row: int = 0) -> Values:
@@ -53,12 +53,12 @@ def recall(
     Parameters
     ----------
     retained, gained : ndarray, shape (k, 2 G)
-        Of each part at each step of two passages.
+        Retained share and gain of each part at each step of two passages.
     places : ndarray of int, shape (G,)
         Points of a passage in its order.
     signals : ndarray, shape (G, m)
-        At each point.
-    found : ndarray, shape (G, m)
+        Signals at each point.
+    forces : ndarray, shape (G, m)
     """
     size = len(places)
     force = np.empty(signals.shape[1])

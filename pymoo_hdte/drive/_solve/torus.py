@@ -233,7 +233,7 @@ class Torus:
     def recall_matrix(self, recollection: Recollection) -> NDArray[np.float64]:
         """Return the real matrices by which forces depend on the signal elsewhere.
 
-        Of n rows, along a `path`. Matrices act as those of `product_matrix`.
+        There is one for each of n rows, along a `path`; it acts as those of `product_matrix`.
         """
         n, size = len(recollection.places), 2 * len(self.orders)
         matrices = np.empty((n, size, size))

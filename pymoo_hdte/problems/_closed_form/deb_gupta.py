@@ -25,7 +25,7 @@ Array = NDArray[np.float64]
 
 _WIDE, _NARROW = 0.25, 0.03
 _CENTRE = 0.85
-"""Widths of the two valleys of the last two problems, and the centre of the narrow one."""
+"""Widths of the two valleys of problems 3 and 4, and the centre of the narrow valley."""
 _NODES, _WEIGHTS = leggauss(32)
 _LEVELS = 401
 _COARSE, _FINE = 33, 13
@@ -33,7 +33,7 @@ _COARSE, _FINE = 33, 13
 
 
 class DebGupta(ClosedFormProblem):
-    """What the four have in common.
+    """Base of the four problems of Deb and Gupta.
 
     Parameters
     ----------
@@ -182,7 +182,7 @@ class DebGupta3(DebGupta):
         return float(50.0 * (self.n_var - 2) * _square(np.zeros(1), self.deltas[-1])[0])
 
     def _best(self, x1: Array) -> Array:
-        """Return the x2 that is best for each x1, shape (n,)."""
+        """Return the best x2 for each x1, shape (n,)."""
         low, high = float(self.xl[1]), float(self.xu[1])
         coarse = np.linspace(low, high, _COARSE)
         valley = np.linspace(-2.0, 2.0, _FINE)[:, None] * _NARROW + self._narrow_valley(x1)

@@ -86,7 +86,7 @@ class ExponentialNoise(ClosedFormProblem):
     n_var : int
         1 or more.
     limit : float
-        Of the CVaR; None for what cuts off a quarter of the front, at the side of the mean.
+        Limit of the CVaR; None cuts off a quarter of the front, at the side of the mean.
 
     Raises
     ------
@@ -115,7 +115,7 @@ class ExponentialNoise(ClosedFormProblem):
         return {"y": self._statistic(e, np.column_stack(x))}
 
     def _statistic(self, factor: Array | float, x: Array) -> Array:
-        """Return y where the noise has a value, or a statistic of which that is the noise's."""
+        """Return y for a value of the noise, or its statistic for that of the noise."""
         from_a, from_b = (np.sum((x - place) ** 2, axis=1) for place in (self._a, self._b))
         return from_a + (0.2 + from_b) * factor
 
@@ -246,7 +246,7 @@ class Portfolio(ClosedFormProblem):
         return np.column_stack([designs, 1.0 - designs.sum(axis=1)])
 
     def closed_form(self, designs: Array) -> tuple[Array, Array]:
-        """Return mean loss and CVaR, shape (n, 2), and what is invested too much, shape (n, 1)."""
+        """Return mean loss and CVaR, shape (n, 2), and the excess of investment, shape (n, 1)."""
         shares = self._shares(designs)
         loss = -shares @ self._returns
         std = np.sqrt(np.einsum("ni,ij,nj->n", shares, self.covariance, shares))

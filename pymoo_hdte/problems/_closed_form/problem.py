@@ -28,9 +28,9 @@ class ClosedFormProblem(Problem):
     designs : mapping of str to Design
         Design variables with bounds and scatter. X has their order.
     objectives : sequence of Statistic
-        To be minimised.
+        Objectives to be minimised.
     constraints : sequence of RobustConstraint
-        To be met.
+        Constraints to be met.
 
     Attributes
     ----------

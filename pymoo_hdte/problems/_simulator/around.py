@@ -33,7 +33,7 @@ class CommonSamples:
     ----------
     moments : SparseMoments
     seed : int
-        Of the scrambling.
+        Seed of the scrambling.
 
     Attributes
     ----------
@@ -86,9 +86,9 @@ class Around:
     ----------
     common : CommonSamples
     expansion : ndarray, shape (n, q)
-        Of the response, from `SparseMoments.expansion`.
+        Expansion of the response, from `SparseMoments.expansion`.
     part : slice
-        Which of the samples to use.
+        The samples to use.
     """
 
     def __init__(self, common: CommonSamples, expansion: Array, part: slice = slice(None)) -> None:

@@ -31,7 +31,7 @@ def receive(stream: IO[bytes]) -> bytes:
 
 
 def serve() -> None:
-    """Make calls until nobody asks any more."""
+    """Make calls until the requests end."""
     # What a simulator prints or reads must not mix with the messages.
     requests, answers = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
     os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
@@ -39,7 +39,7 @@ def serve() -> None:
     calls: SimpleQueue[bytes] = SimpleQueue()
     Thread(target=_read, args=(requests, calls), daemon=True).start()
     sys.path[:] = pickle.loads(calls.get())
-    # Whoever asked may be gone before the answer.
+    # Whoever requested it may be gone before the answer.
     with suppress(BrokenPipeError):
         while True:
             _answer(calls.get(), answers)
@@ -50,7 +50,7 @@ def _read(requests: IO[bytes], calls: SimpleQueue[bytes]) -> None:
         while True:
             calls.put(receive(requests))
     except (EOFError, OSError):
-        # Whoever asked is gone: programs that the simulator started end with it, if they can be.
+        # Whoever requested it is gone: programs that the simulator started end too, if possible.
         if hasattr(os, "killpg"):
             os.killpg(0, signal.SIGKILL)
         os._exit(1)

@@ -21,12 +21,12 @@ from pymoo_hdte.problems._simulator.child import receive, send
 
 RAISED, NOT_A_NUMBER = "raised", "not a number"
 TOO_LONG, LOST = "over the time limit", "worker lost"
-"""What becomes of evaluations that give nothing."""
+"""Kinds of failures of evaluations that give no result."""
 
 
 @dataclass(frozen=True)
 class Failure:
-    """What stands in the place of a result: the kind, one of four, what was said, and by what."""
+    """A failed evaluation in place of a result: its kind, one of four, its text and its error."""
 
     kind: str
     text: str
@@ -34,12 +34,12 @@ class Failure:
 
 
 def over_the_limit(seconds: float) -> Failure:
-    """Return what stands in the place of a result that did not come within a time limit."""
+    """Return the failure of an evaluation that exceeded a time limit."""
     return Failure(TOO_LONG, f"no result within {seconds!r} s")
 
 
 def limit_in(text: str) -> float | None:
-    """Return the time limit in seconds that a failure's text tells; None for other failures."""
+    """Return the time limit in seconds that a failure's text names; None for other failures."""
     match = re.fullmatch(
         rf"(?:{TOO_LONG}: )?no result within (\d+(?:\.\d*)?(?:e[-+]?\d+)?) s", text
     )
@@ -69,7 +69,7 @@ def parcel(function: Callable[..., Any], *arguments: Any) -> bytes:
 
 
 class Children:
-    """Processes that make one call at a time each, started when there is none to spare."""
+    """Processes that make one call at a time each; one is started when all are busy."""
 
     def __init__(self) -> None:
         self._lock = RLock()

@@ -30,7 +30,7 @@ def joint_distribution(field: str, given: Any, count: int) -> Any:
     Parameters
     ----------
     field : str
-        What to call it in an error.
+        Name of the distribution in an error.
     given : object
         A joint distribution of `chaospy`, or a frozen ``multivariate_normal`` of `scipy.stats`.
     count : int
@@ -76,7 +76,7 @@ def described(field: str, given: Any) -> dict[str, Any]:
     Parameters
     ----------
     field : str
-        What to call it in an error.
+        Name of the distribution in an error.
     given : object
         A distribution of `chaospy`, of several variables too, a frozen one of `scipy.stats`, or a
         `TruncatedNormal`.

@@ -51,7 +51,7 @@ def Robust(
     Parameters
     ----------
     problem : pymoo.core.problem.Problem
-        With real variables and finite bounds, without equality constraints. Objectives are called
+        It has real variables, finite bounds and no equality constraints. Objectives are called
         ``F1``, ``F2``, .., constraints ``G1``, .., variables ``x1``, ..
     scatter : float, sequence or mapping
         Absolute deviation of each variable in its unit: a number d stands for uniform in -d..d, a

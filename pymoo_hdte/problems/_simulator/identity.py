@@ -1,4 +1,4 @@
-"""What tells a simulator from others: its state, what it reads beside its inputs, and sources."""
+"""What identifies a simulator: its state, what it reads beside its inputs, and sources."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from typing import Any
 
 
 def identity(simulator: Callable[..., Any]) -> str | None:
-    """Return what tells a simulator from others.
+    """Return a digest that identifies a simulator.
 
     That is its state; globals, closures and defaults of its functions, and of those of the same
     file that they call; that file, and those of the modules named there. Files that it reads while

@@ -82,7 +82,7 @@ class Design:
         Parameters
         ----------
         name : str
-            Of the variable.
+            Name of the variable.
 
         Returns
         -------
@@ -137,7 +137,7 @@ class Inputs:
     axes : list of Axis
         The designs first, in their order.
     names : tuple of str
-        Of the simulator's inputs, in the order of the axes.
+        Names of the simulator's inputs, in the order of the axes.
 
     Raises
     ------
@@ -200,7 +200,7 @@ class Inputs:
     def reach(self) -> dict[str, tuple[float, float]]:
         """Return smallest and largest value at which the simulator will be called, by name.
 
-        Of dependent noise, those along the lines through its centre.
+        For dependent noise, they are taken along the lines through its centre.
         """
         ends = np.vstack([np.diag(np.full(len(self.axes), side)) for side in (-1.0, 1.0)])
         extremes = self.values(ends)

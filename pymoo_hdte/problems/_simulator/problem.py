@@ -45,9 +45,9 @@ class SimulatorProblem(Problem):
     responses : tuple of str
         Names of the responses.
     objectives : sequence of Statistic
-        To be minimised.
+        Objectives to be minimised.
     constraints : sequence of RobustConstraint
-        To be met.
+        Constraints to be met.
     n_runs : int
         Runs of the simulator that were made.
 
@@ -134,7 +134,7 @@ class SimulatorProblem(Problem):
         Parameters
         ----------
         path : str or path-like
-            Of the file.
+            The file.
 
         Returns
         -------
@@ -244,14 +244,14 @@ class SimulatorProblem(Problem):
         return np.median(shares, axis=0)
 
     def _evaluate(self, x: Array, out: dict[str, Any], *args: Any, **kwargs: Any) -> None:
-        """Fill F and G, and dF, dG and F_band if asked for.
+        """Fill F and G, and dF, dG and F_band if requested.
 
         Raises
         ------
         ExtrapolationError
             If a design is outside the box or NaN.
         InvalidInput
-            If the gradient of a statistic is asked for that has none.
+            If a gradient is requested of a statistic that has none.
         """
         x = self.design_box.settle(x)
         slopes: list[str] = [key for key in ("dF", "dG") if key in out]

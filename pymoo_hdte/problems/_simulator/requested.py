@@ -55,7 +55,7 @@ def requested_of(
 def by_moments(
     requested: Sequence[Requested], moments: SparseMoments, x: NDArray[np.float64]
 ) -> NDArray[np.float64] | None:
-    """Return what is asked for at very many designs, shape (n, n_asked).
+    """Return the requested values at very many designs, shape (n, n_requested).
 
     None if there are few designs, or if mean and deviation do not suffice.
     """

@@ -99,7 +99,7 @@ def robust_problem(
         variance), or from a tuple of names to a joint one of `chaospy`. Together with the designs
         at most 20 inputs.
     objectives : sequence of Statistic
-        To be minimised; ``-Mean()`` is maximised.
+        Objectives to be minimised; ``-Mean()`` is maximised.
     constraints : sequence of RobustConstraint
         As ``Quantile(0.99, response="stress") <= 250e6``.
     accuracy : float
@@ -130,14 +130,14 @@ def robust_problem(
         or the modules that it names are others or cannot be told. What else it reads or calls, as
         files and programs, is not seen: delete the file where that has changed.
     seed : int
-        Of where the runs are.
+        Seed of the positions of the runs.
     progress : bool
         Whether to tell runs and memory on the error stream before the first run, and show a bar.
 
     Returns
     -------
     SimulatorProblem
-        With ``accuracy`` and ``n_runs``.
+        The problem, with ``accuracy`` and ``n_runs``.
 
     Raises
     ------

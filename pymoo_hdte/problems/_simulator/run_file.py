@@ -26,9 +26,9 @@ _SAME = 1e-6
 """Relative difference of two runs of one simulator, on two machines say; set by hand."""
 _RERUNS = 5
 """Runs of a file that are made again, one after the other, until one does not fail; by hand. Also
-the most damaged lines that are told one by one."""
+the largest number of damaged lines that are listed."""
 _SHOWN = 80
-"""Characters of the reason why a line is damaged; by hand."""
+"""Characters that are shown of the reason why a line is damaged; set by hand."""
 _DAMAGED = (ValueError, TypeError, OverflowError, RecursionError)
 """What is raised by a line that is no JSON, or other JSON than a run file has: no text in UTF-8,
 too many digits, nested too deeply, a number beyond those of floats, another type."""
@@ -44,22 +44,22 @@ class RunFile:
     Parameters
     ----------
     path : str or path-like
-        Of the file; made if it is not there.
+        The file; it is made if it is not there.
     names : tuple of str
-        Of the simulator's inputs. A file of others is refused.
+        Names of the simulator's inputs. A file with other names is refused.
     simulator : str or None
         What tells the simulator from others (`pymoo_hdte.problems._simulator.identity`).
 
     Attributes
     ----------
     runs : dict
-        What the simulator gave, by inputs.
+        Results of the simulator, by inputs.
     failures : dict
-        Why a run gave nothing, by inputs.
+        Reasons why runs gave no result, by inputs.
     order : dict
-        Which run ended when, from 0 on, by inputs.
+        Position of each run in the order in which they ended, from 0, by inputs.
     responses : tuple of str
-        Names of what it gives; empty before the first run.
+        Names of the results; empty before the first run.
     goes_on : bool
         Whether this simulator wrote the file and was stopped before the study's end.
 
@@ -155,7 +155,7 @@ class RunFile:
         self.goes_on = known and named and not self._finished
 
     def _read_line(self, line: Any) -> None:
-        """Take in what a line says, or raise one of `_DAMAGED` and take in nothing."""
+        """Take over the contents of a line, or raise one of `_DAMAGED` and change nothing."""
         if not isinstance(line, dict):
             raise ValueError("it is no table")
         if "responses" in line:
@@ -245,7 +245,7 @@ class RunFile:
             raise InvalidInput("cache", str(self.path), allowed)
 
     def finish(self) -> None:
-        """Note that the study came to its end."""
+        """Note in the file that the study has ended."""
         if not self._finished:
             self._append({"finished": True})
             self._finished = True

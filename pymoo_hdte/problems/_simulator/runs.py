@@ -48,15 +48,15 @@ class Simulator:
         Takes the inputs by name. Returns a number, a mapping of names to numbers, or a sequence of
         numbers; with ``vectorised`` arrays of shape (n,) in their place.
     names : tuple of str
-        Of the inputs.
+        Names of the inputs.
     vectorised : bool
         Whether it takes and returns arrays of shape (n,).
     workers : Workers
-        That make the runs, unless it is vectorised.
+        Workers that make the runs, unless the function is vectorised.
     tries : int
         How often a run is made before it counts as failed.
     file : RunFile or None
-        Of finished runs.
+        File of finished runs.
     progress : tqdm
         A bar to move.
 
@@ -68,7 +68,7 @@ class Simulator:
     Attributes
     ----------
     responses : tuple of str
-        Names of what it returns; empty before the first run.
+        Names of the results; empty before the first run.
     """
 
     def __init__(
@@ -95,7 +95,7 @@ class Simulator:
             file.check(self.again)
 
     def again(self, row: tuple[float, ...]) -> Any:
-        """Return what a run made anew gives, whatever the file has; None if it fails."""
+        """Return the result of a new run, whatever the file has; None if it fails."""
         for _ in range(self.tries):
             ((_, gave),) = self._run([row])
             if self._good(gave):

@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 FEWEST = 10
 """Samples that have to lie beyond a quantile or a limit: ten have an error of a third."""
 RESOLVED = FEWEST / SAMPLES
-"""Smallest probability that the samples tell."""
+"""Smallest probability that the samples resolve."""
 STUDENT = 3.182
 """Standard errors of a mean of four parts within which it lies with 95 %: Student's t(3).
 

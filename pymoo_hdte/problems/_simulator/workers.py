@@ -32,7 +32,7 @@ class Workers:
     Parameters
     ----------
     executor : int, object or None
-        Of `concurrent.futures`, or a client of Dask; a number of processes of our own, each ended
+        Executor of `concurrent.futures`, client of Dask, or a number of own processes, each ended
         and replaced alone; None for this process, one call after the other.
     time_limit : float, optional
         Seconds after which a call is ended, imports not counted. Calls then run in a process beside

@@ -51,7 +51,7 @@ JUDGED_DRAWS = 128
 DEGREES = (6, 40)
 """Least and largest degree in one variable; between them a third of the runs."""
 LARGEST_ACCURACY = 0.01
-"""Accuracy asked for above which no more terms are left out."""
+"""Requested accuracy above which no more terms are left out."""
 SMALLEST_SCATTER = 0.1
 """Scatter below this share of its median over the designs is judged as if it were that; by hand."""
 SCATTER_OF_RANGE = 1e-4
@@ -60,20 +60,20 @@ SCATTER_OF_RANGE = 1e-4
 
 @dataclass(frozen=True)
 class AdaptiveFit:
-    """What growth ended with.
+    """The surrogate with which its building ended.
 
     Attributes
     ----------
     polynomial : SparsePolynomial
-        In -1..1 of every axis, r responses in their units.
+        Polynomial in -1..1 of every axis, of r responses in their units.
     moments : SparseMoments
-        Of it.
+        Moments of the polynomial.
     mean_error, std_error : ndarray, shape (r,)
         Estimated errors of mean and standard deviation as shares of the scatter.
     n_runs : int
         Calls of the function.
     smallest_scatter : ndarray, shape (r,)
-        What a smaller scatter is judged as, in the responses' units.
+        A smaller scatter is judged as this, in the responses' units.
     failed : ndarray, shape (k, d)
         Points in -1..1 at which the function failed.
     held_out_points : ndarray, shape (v, d)
@@ -81,7 +81,7 @@ class AdaptiveFit:
     held_out_error : ndarray, shape (v, r)
         Each of them minus what the others predict, as a share of the scatter.
     confirmed : bool
-        Whether as many judgements as are asked for have passed before the budget was spent.
+        Whether the required judgements passed before the budget was spent.
     """
 
     polynomial: SparsePolynomial
@@ -97,17 +97,17 @@ class AdaptiveFit:
 
     @property
     def errors(self) -> Array:
-        """Those of the mean above those of the standard deviation, shape (2, r)."""
+        """Errors of the mean above those of the standard deviation, shape (2, r)."""
         return np.array([self.mean_error, self.std_error])
 
     @property
     def largest_error(self) -> float:
-        """Of mean and standard deviation of all responses, as a share of the scatter."""
+        """Largest error of mean and deviation of all responses, as a share of the scatter."""
         return float(self.errors.max())
 
 
 class _Growth:
-    """The runs so far."""
+    """The runs of the function so far, and the fit to them."""
 
     def __init__(
         self,
@@ -232,12 +232,12 @@ def fit_adaptively(
     at_once : int
         Least number of runs to add together.
     error_of : callable
-        What is to be as small as asked for, of a fit; by default the errors of all responses.
+        Error of a fit that must be as small as requested; by default the largest of all responses.
 
     Returns
     -------
     AdaptiveFit
-        Of the accuracy asked for unless the budget is spent.
+        A surrogate of the requested accuracy unless the budget is spent.
     """
     growth = _Growth(axes, function, accuracy, random_state)
     growth.run(min(first_runs(len(axes)), budget))

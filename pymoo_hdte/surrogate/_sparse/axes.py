@@ -37,7 +37,7 @@ class Scatter:
     Parameters
     ----------
     distribution : Distribution
-        Of the variable.
+        Distribution of the variable.
     measure : Measure
         The same as weighted nodes.
 
@@ -88,9 +88,9 @@ class Axis:
     Parameters
     ----------
     name : str
-        Of the variable.
+        Name of the variable.
     scatter : Scatter or None
-        Of the deviation of a designed variable, None for one without, or of a noise variable.
+        Scatter of the deviation of a designed variable, or of a noise variable; None for none.
     design : tuple of float or None
         Lower and upper bound of a designed variable in its unit, None for noise.
     relative : bool
@@ -104,7 +104,7 @@ class Axis:
     Attributes
     ----------
     measure, cut, ended : Measure
-        Of s, a single node where nothing scatters: the whole, and those of `Scatter`.
+        Measures of s: the whole, and those of `Scatter`; a single node where nothing scatters.
     """
 
     def __init__(
@@ -173,7 +173,7 @@ class Axis:
     def sample(self, p: Array) -> Array:
         """Return values of s below which these shares of its probability lie, same shape.
 
-        Those beyond the interval for nodes are moved to its ends.
+        Values beyond the interval for nodes are moved to its ends.
         """
         if self.scatter is None:
             return np.zeros_like(p)

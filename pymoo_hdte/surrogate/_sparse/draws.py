@@ -40,7 +40,7 @@ class SpreadPoints:
     ----------
     axes : list of Axis, length d
     random_state : numpy.random.Generator
-        Of the scrambling.
+        Generator of the scrambling.
     """
 
     def __init__(self, axes: list[Axis], random_state: np.random.Generator) -> None:
@@ -60,13 +60,13 @@ class SpreadPoints:
 
 
 def relevance(axes: list[Axis], points: Array) -> Array:
-    """Return how much oftener than the runs are spread the scatter gives points, shape (n,).
+    """Return the density of the scatter at points over that of the runs, shape (n,).
 
     Parameters
     ----------
     axes : list of Axis, length d
     points : ndarray, shape (n, d)
-        In -1..1.
+        Points in -1..1.
     """
     ratio = np.prod(np.maximum(1.0 - points**2, 0.0), axis=1) ** OUTWARD
     for axis, z in zip(axes, points.T, strict=True):
@@ -119,9 +119,9 @@ def draw_around(
     Returns
     -------
     points : ndarray, shape (v, count, d)
-        In -1..1.
+        Points in -1..1.
     weights : ndarray, shape (v, count)
-        They sum to 1 at each design.
+        Weights, which sum to 1 at each design.
     """
     shape = len(designs), count
     p = scipy.stats.qmc.LatinHypercube(len(axes), rng=random_state).random(shape[0] * count)

@@ -18,7 +18,8 @@ from pymoo_hdte.surrogate._sparse.measures import Measure, OrthonormalPolynomial
 Array = NDArray[np.float64]
 
 PARAMETERS = 3
-"""Of an axis: the logarithm of s, and the logits of q and of the share of even degrees."""
+"""Number of parameters of an axis: the logarithm of s, and the logits of q and of the share of
+even degrees."""
 START = (np.log(0.1), 0.0, 0.0)
 """Where parameters start, and the middle of what they are expected to be."""
 EXPECTED = (4.0, 2.0, 2.0)

@@ -26,11 +26,11 @@ class ManyDesigns:
     Parameters
     ----------
     coefficients : ndarray, shape (r, p)
-        Before the first step.
+        Coefficients before the first step.
     steps : list of AxisMap, length m
-        Of the designed axes, in their order.
+        Steps of the designed axes, in their order.
     families : list of OrthonormalPolynomials, length m
-        Of their scatter.
+        Orthonormal polynomials under their scatter.
     """
 
     def __init__(

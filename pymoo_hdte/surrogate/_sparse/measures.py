@@ -28,7 +28,7 @@ _PANEL_ERROR = 1e-13
 _CONTRADICTION = 1e-4
 """Largest difference from 1 of what the density integrates to; Trunc of chaospy has 2e-6."""
 _SHORTEST_PANEL = 1e-11
-"""As a share of the support; nearer to an end of it nodes would be rounded onto the end."""
+"""Shortest panel as a share of the support: nodes of a shorter one would be rounded onto an end."""
 _NO_VARIANCE = 0.499
 """Exponent of the quantiles of a tail above which it has no variance: 1/2, less rounding."""
 _SHORTENS = 0.95
@@ -42,7 +42,7 @@ class Distribution:
     Parameters
     ----------
     field : str
-        What to call it in an error.
+        Name of the distribution in an error.
     given : object
         A distribution of `chaospy`, a frozen one of `scipy.stats`, or a `TruncatedNormal`.
 

@@ -37,18 +37,18 @@ class SparseMoments:
     Parameters
     ----------
     polynomial : SparsePolynomial
-        Of d variables.
+        Polynomial in d variables.
     axes : sequence of Axis, length d
         Their coordinates and scatter; m of them, one or more, have designs.
     measures : list of Measure, length d, optional
-        Of the scatter, in the place of the whole of each axis.
+        Measures of the scatter, in place of the whole measure of each axis.
 
     Attributes
     ----------
     indices : ndarray of int, shape (q, d)
         Degrees of the expansion's terms in the scatter of each variable; the first is 0.
     orthonormal : list of OrthonormalPolynomials, length d
-        Of the scatter of each variable.
+        Orthonormal polynomials under the scatter of each variable.
     """
 
     def __init__(
@@ -168,7 +168,7 @@ class SparseMoments:
     def _matrices(self, j: int, columns: int, designs: Array | None) -> tuple[Array, Array]:
         """Return what changes T_k(A + B s) into the orthonormal p_l(s), and its slope.
 
-        Both of shape (n, rows, columns), n = 1 for noise.
+        Both have shape (n, rows, columns), with n = 1 for noise.
         """
         axis, family = self.axes[j], self.orthonormal[j]
         offset, factor, d_offset, d_factor = axis.around(designs)

@@ -22,7 +22,7 @@ class SparsePolynomial:
     indices : ndarray of int, shape (p, d)
         Degrees of the terms.
     coefficients : ndarray, shape (r, p)
-        Of r responses, in their units.
+        Coefficients of r responses, in their units.
     """
 
     def __init__(self, indices: NDArray[np.int_], coefficients: NDArray[np.float64]) -> None:
@@ -46,7 +46,7 @@ class SparsePolynomial:
             A downward-closed set.
         coefficients : ndarray, shape (r, p)
         matrices : list of ndarray
-            Of every variable: column j holds the polynomial of degree j in T_0, T_1, ..
+            For every variable, column j holds the polynomial of degree j in T_0, T_1, ..
         """
         changed = coefficients[None]
         for axis, matrix in enumerate(matrices):
@@ -71,7 +71,7 @@ class SparsePolynomial:
 
     @cached_property
     def _factors(self) -> list[tuple[NDArray[np.int_], ...]]:
-        """By axis: terms that it is the last variable of, the same without it, and its degrees."""
+        """For each axis: terms whose last variable it is, the same without it, and its degrees."""
         places = {tuple(row): place for place, row in enumerate(self.indices.tolist())}
         last_axis = np.max(np.where(self.indices > 0, np.arange(self.indices.shape[1]), -1), axis=1)
         factors: list[tuple[NDArray[np.int_], ...]] = []

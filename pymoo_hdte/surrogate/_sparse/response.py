@@ -42,9 +42,9 @@ class Judged:
     Attributes
     ----------
     weights : ndarray, shape (v, k)
-        Of the draws; they sum to 1 at each design.
+        Weights of the draws; they sum to 1 at each design.
     features : list of list of ndarray
-        By design and axis, the polynomials there.
+        The polynomials at the draws, by design and axis.
     """
 
     weights: Array
@@ -68,7 +68,7 @@ class ResponseFit:
     indices : ndarray of int, shape (p, d)
         Degrees of the terms, a downward-closed set.
     coefficients : ndarray, shape (p,)
-        Of the orthonormal polynomials, in the response's unit.
+        Coefficients of the orthonormal polynomials, in the response's unit.
     left_out : ndarray, shape (n,)
         Every run minus what the others predict there.
     alone : bool
@@ -122,14 +122,14 @@ def fitted(
     Parameters
     ----------
     features : list of ndarray
-        Of the runs.
+        Features of the runs.
     values : ndarray, shape (n,)
         The response there.
     relevance : ndarray, shape (n,)
-        How much every run counts when errors are told.
+        How much every run counts in the estimated errors.
     judged : Judged
     lost : float
-        What terms left out may change, as a share of the least scatter.
+        Largest change by terms left out, as a share of the least scatter.
     start : ndarray, shape (d, 3), or None
         Parameters of the regression to start from.
     """

@@ -52,7 +52,7 @@ def beyond_all_runs(
     scale : ndarray, shape (n, r)
         Scatter there, of which errors are shares.
     error : float
-        Of the surrogate inside, as a share of the scatter.
+        Error of the surrogate inside, as a share of the scatter.
     """
     whole = SparseMoments(polynomial, axes)
     unbounded = [j for j, axis in enumerate(axes) if axis.is_unbounded]
