@@ -60,7 +60,7 @@ class FoundFront:
     front : ndarray, shape (n, 2)
         Their objectives as evaluated, in their own units.
     width : ndarray, shape (2,)
-        Width of the front in the objectives' units, or ``least_width`` of its least value if that is
+        Width of the front in their units, or ``least_width`` of its least value if that is
         more.
     difference : float
         Dimensionless, in widths: largest difference of interpolation and evaluation along the last

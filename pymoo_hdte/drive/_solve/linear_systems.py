@@ -121,7 +121,7 @@ class Iterated:
         if self._whole is None:
             size, (restart, most) = len(right), _MOST
             whole = LinearOperator((size, size), matvec=self._times, dtype=float)
-            preconditioner = LinearOperator((size, size), matvec=self._near, dtype=float)
+            preconditioner = LinearOperator((size, size), matvec=self._precondition, dtype=float)
             unknowns, failed = gmres(
                 whole, right, rtol=_RESIDUAL, restart=restart, maxiter=most, M=preconditioner
             )
