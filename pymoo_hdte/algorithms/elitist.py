@@ -127,7 +127,7 @@ class ElitistSwarm(Swarm):
     def _check(self, problem: Problem) -> None:
         check_problem(problem, integers=type(self.repair) is not NoRepair)
 
-    def _n_asked(self) -> int:
+    def _n_requested(self) -> int:
         started = self.is_initialized and self.n_offsprings is not None
         return self.n_offsprings if started else self.pop_size  # type: ignore[return-value]
 
@@ -157,9 +157,9 @@ class ElitistSwarm(Swarm):
 
     def _movers(self, n: int) -> NDArray[np.int_]:
         """Return which of ``n`` particles move."""
-        if self._n_asked() < min(n, self.pop_size):
-            return self.random_state.permutation(n)[: self._n_asked()]
-        return np.resize(np.arange(n), self._n_asked())
+        if self._n_requested() < min(n, self.pop_size):
+            return self.random_state.permutation(n)[: self._n_requested()]
+        return np.resize(np.arange(n), self._n_requested())
 
     def _front(self, swarm: Points) -> Points:
         """Return the points that lead."""
@@ -167,7 +167,7 @@ class ElitistSwarm(Swarm):
 
     def _leaders(self, front: Points) -> NDArray[np.float64]:
         """Draw a leader's position for every particle that moves, shape (n, d)."""
-        return front.X[crowding_tournaments(front.F, self._n_asked(), self.random_state)]
+        return front.X[crowding_tournaments(front.F, self._n_requested(), self.random_state)]
 
     def _around(self, move: Move, swarm: Points, rows: NDArray[np.int_]) -> NDArray[np.float64]:
         """Return the positions a move draws from: all, or the neighbours of every row."""

@@ -126,11 +126,11 @@ class _SteadyState:
             if not self._under_way:
                 break
             number, output = self._evaluations.next()
-            self._tell(*self._under_way.pop(number), output)
+            self._report(*self._under_way.pop(number), output)
         if not self._swarm.is_initialized and self._arrived:
             # Fewer evaluations than the first swarm has designs.
             self._swarm.pop_size = len(self._arrived)
-            self._tell_the_first()
+            self._report_initial()
 
     def _start(self) -> None:
         move = None
@@ -150,7 +150,7 @@ class _SteadyState:
         drawn = FloatRandomSampling().do(swarm.problem, 1, random_state=swarm.random_state)
         return swarm.repair.do(swarm.problem, drawn, random_state=swarm.random_state)[0]
 
-    def _tell(self, particle: Individual, move: NDArray[np.int_] | None, output: Any) -> None:
+    def _report(self, particle: Individual, move: NDArray[np.int_] | None, output: Any) -> None:
         swarm = self._swarm
         self._runner.deliver(self._evaluations.filled(self._f, output))
         reported = Population([particle])
@@ -164,8 +164,8 @@ class _SteadyState:
         else:
             self._arrived.append(particle)
             if len(self._arrived) == swarm.pop_size:
-                self._tell_the_first()
+                self._report_initial()
 
-    def _tell_the_first(self) -> None:
+    def _report_initial(self) -> None:
         self._evaluations.refuse_failures()
         self._swarm.tell(infills=Population(self._arrived))

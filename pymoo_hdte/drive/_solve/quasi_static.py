@@ -108,7 +108,7 @@ def _means(leg: _Leg) -> Values:
     return np.asarray(low + steady)
 
 
-class _AskedForTheWay(Exception):
+class _PathNeeded(Exception):
     """A law depends on where the torsion was before."""
 
 
@@ -122,12 +122,12 @@ class _Mesh:
     def respond(self, torsion: Values, turns: Values | None) -> Response:
         """Return the torque at torsions (n, m) that each follow the turning points (n, k).
 
-        Without these a law that asks for the way raises `_AskedForTheWay`.
+        Without these a law that depends on the path raises `_PathNeeded`.
         """
 
         def path(values: Values) -> Values:
             if turns is None:
-                raise _AskedForTheWay
+                raise _PathNeeded
             return np.column_stack([np.repeat(turns, torsion.shape[1], axis=0), values.ravel()])
 
         def back(values: Values) -> Values:
@@ -185,7 +185,7 @@ class _Mesh:
     def whole(self, steps: Values, held: Values) -> _Leg:
         """Return the path as one leg: of each torque the torsion nearest to zero that carries it.
 
-        Raises `_AskedForTheWay` where a law depends on more.
+        Raises `_PathNeeded` where a law depends on more.
         """
         before = np.zeros((len(self.stiffness), 1))
         # A law may make a torque without any torsion.
@@ -240,7 +240,7 @@ def _by_legs(
     steps = np.diff(torque, prepend=0.0)
     try:
         return of_leg(mesh.whole(steps, held))
-    except _AskedForTheWay:
+    except _PathNeeded:
         return np.hstack([*map(of_leg, mesh.legs(steps, held))])
 
 

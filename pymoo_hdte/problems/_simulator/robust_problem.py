@@ -202,9 +202,9 @@ def robust_problem(
         file.finish()
     responses = simulate.responses
     problem = SimulatorProblem(inputs, fit, responses, objectives, constraints, fit.n_runs)
-    _tell_failures(problem)
+    _warn_of_failures(problem)
     if not fit.confirmed:
-        _tell_budget(fit, responses, requested_places())
+        _warn_of_budget(fit, responses, requested_places())
     return problem
 
 
@@ -229,7 +229,7 @@ def _refuse_untrusted(
         raise UntrustedSurrogate(*refusal)
 
 
-def _tell_budget(fit: AdaptiveFit, responses: tuple[str, ...], places: Sequence[int]) -> None:
+def _warn_of_budget(fit: AdaptiveFit, responses: tuple[str, ...], places: Sequence[int]) -> None:
     error, _, place = largest_error(fit, places)
     message = (
         f"the budget of {fit.n_runs} runs is used up: the error of {responses[place]!r} is "
@@ -321,7 +321,7 @@ def _hint(field: str, given: Any) -> str:
     return ""
 
 
-def _tell_failures(problem: SimulatorProblem) -> None:
+def _warn_of_failures(problem: SimulatorProblem) -> None:
     if not len(problem.failed):
         return
     rows = [

@@ -148,7 +148,7 @@ class RunFile:
             except _DAMAGED as error:
                 damaged.append((number, str(error) or type(error).__name__))
         if damaged:
-            self._tell_damaged(damaged)
+            self._warn_of_damaged(damaged)
         known = self._simulator is not None and header.get("simulator") == self._simulator
         # Without the names of the responses a run has to be made again, which tells them.
         named = bool(self.responses) or not self.runs
@@ -179,7 +179,7 @@ class RunFile:
             raise ValueError("it is neither a run nor a remark on one")
         self._finished = "finished" in line
 
-    def _tell_damaged(self, damaged: Sequence[tuple[int, str]]) -> None:
+    def _warn_of_damaged(self, damaged: Sequence[tuple[int, str]]) -> None:
         listing = "; ".join(f"line {number} ({why[:_SHOWN]})" for number, why in damaged[:_RERUNS])
         ending = f" and {len(damaged) - _RERUNS} more" if len(damaged) > _RERUNS else ""
         message = (

@@ -106,7 +106,7 @@ class AdaptiveFit:
         return float(self.errors.max())
 
 
-class _Growth:
+class _SurrogateBuild:
     """The runs of the function so far, and the fit to them."""
 
     def __init__(
@@ -239,22 +239,22 @@ def fit_adaptively(
     AdaptiveFit
         A surrogate of the requested accuracy unless the budget is spent.
     """
-    growth = _Growth(axes, function, accuracy, random_state)
-    growth.run(min(first_runs(len(axes)), budget))
+    build = _SurrogateBuild(axes, function, accuracy, random_state)
+    build.run(min(first_runs(len(axes)), budget))
     passed, goal = 0, min(accuracy, LOOSEST)
     while True:
-        fit = growth.judge()
+        fit = build.judge()
         inside = error_of(fit)
         if inside <= accuracy:
-            fit = growth.with_tails(fit, inside)
+            fit = build.with_tails(fit, inside)
         good = error_of(fit) <= accuracy and acceptable(fit)
         passed = passed + 1 if good and inside <= goal else 0
-        if passed >= IN_A_ROW and growth.n_runs >= least_runs(len(axes)):
+        if passed >= IN_A_ROW and build.n_runs >= least_runs(len(axes)):
             return fit
-        count = min(max(at_once, int(BATCH * growth.n_runs)), budget - growth.n_runs)
+        count = min(max(at_once, int(BATCH * build.n_runs)), budget - build.n_runs)
         if count <= 0:
             return replace(fit, confirmed=False)
-        growth.run(count)
+        build.run(count)
 
 
 def first_runs(inputs: int) -> int:
