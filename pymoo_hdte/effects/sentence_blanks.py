@@ -43,7 +43,7 @@ def sentence_at(sentence: str, port: str, orders: str, force: str) -> str:
     Parameters
     ----------
     sentence : str
-        Of an effect or of one of its guesses.
+        Sentence of an effect or of one of its guesses.
     port, orders : str
         Where it is, and its orders in words; empty for an effect that has none.
     force : str
@@ -63,7 +63,7 @@ def out_of_tolerance_sentence(parameter: str) -> str:
 
 
 def listed(words: Sequence[str]) -> str:
-    """Return words as a list with commas and a last and; one word as it is."""
+    """Return words as a list with commas and a final "and"; a single word as it is."""
     return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
 
 
@@ -73,7 +73,7 @@ def orders_in_words(orders: Sequence[float]) -> str:
     >>> orders_in_words([200.0]), orders_in_words([200.0, 400.0])
     ('order 200', 'orders 200 and 400')
     """
-    return f"order{'s' if len(orders) > 1 else ''} {listed([f'{one:.5g}' for one in orders])}"
+    return f"order{'s' if len(orders) > 1 else ''} {listed([f'{order:.5g}' for order in orders])}"
 
 
 def in_words(text: str) -> str:
@@ -88,4 +88,4 @@ def _words(label: re.Match[str]) -> str:
     if name == "parameter":
         return f"{port} (out of tolerance)"
     details = [port, form, None if order is None else f"order {order}"]
-    return f"{name.replace('_', ' ')} ({', '.join(one for one in details if one)})"
+    return f"{name.replace('_', ' ')} ({', '.join(detail for detail in details if detail)})"
