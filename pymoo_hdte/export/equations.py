@@ -176,10 +176,14 @@ class _Builder:
             for word, text in (("position", at), ("speed", rate))
         )
         here = {"position": position, "angle": position, "speed": speed}
-        stiffness = self._parameter(f"stiffness of {port.name}", port.stiffness.value)
-        damping = self._parameter(f"damping of {port.name}", port.damping.value)
-        here["stiffness"] = stiffness
-        parts = [f"{stiffness} * {position}", f"{damping} * {speed}"]
+        here["stiffness"] = "0.0"
+        parts = []
+        if port.stiffness.value:
+            here["stiffness"] = self._parameter(f"stiffness of {port.name}", port.stiffness.value)
+            parts.append(f"{here['stiffness']} * {position}")
+        if port.damping.value:
+            damping = self._parameter(f"damping of {port.name}", port.damping.value)
+            parts.append(f"{damping} * {speed}")
         unit = unit_of(self.mechanism, port.name)
         if port.load:
             shares = [(share, self.driving[name]) for name, share in port.load.items() if share]
@@ -194,17 +198,16 @@ class _Builder:
                 else:
                     parts.append(self._law(effect, formula, here))
         force = self.names.of(port.name, "force")
-        return self._line(force, unit, self._text(" + ".join(parts))), missing
+        return self._line(force, unit, self._text(" + ".join(parts) or "0.0")), missing
 
     def _law(self, effect: LawAt, formula: Formula, here: Mapping[str, str]) -> str:
         """Write the lines of a law; return the name of its force."""
-        known, units = dict(here), effect_named(effect.name)
-        # The shortest free name that no other law has, then the same for its numbers.
+        known, registered = dict(here), effect_named(effect.name)
         force = self.names.of(effect.name, effect.port)
         for number in (one.name for one in fields(effect.law)):  # type: ignore[arg-type]
-            if number not in units.quantities:
+            if number not in registered.quantities:
                 continue
-            unit = unit_of_number(self.mechanism, effect.port, number, units.unit(number))
+            unit = unit_of_number(self.mechanism, effect.port, number, registered.unit(number))
             symbol = Symbol(self.names.of(force, number), unit)
             self.built.parameters.append((symbol, getattr(effect.law, number)))
             known[number] = symbol.name

@@ -95,7 +95,7 @@ def _of_port(model: MechanismModel, port: Port) -> tuple[Lumped, list[str]]:
         if (value := getattr(found, name)) < 0.0:
             word = "dry friction" if name == "level" else name
             notes.append(f"{word} of {port.name} is negative ({value:.4g}): left out")
-            found = replace(found, **{name: 0.0})
+            found += Lumped(**{name: -value})
     return found, notes
 
 

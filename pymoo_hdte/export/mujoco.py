@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from xml.etree import ElementTree
 
 from pymoo_hdte.discrepancy import MechanismModel
@@ -59,9 +60,8 @@ def to_mujoco(model: MechanismModel) -> Exported:
     notes = list(lumped.notes)
     root = ElementTree.Element("mujoco", model=" ".join(model.title.split()))
     ElementTree.SubElement(root, "compiler", angle="radian", inertiafromgeom="false")
-    step = _step(
-        mechanism, [*lumped.joints.values(), *(one for _, one in lumped.couplings.values())]
-    )
+    between = [elements for _, elements in lumped.couplings.values()]
+    step = _step(mechanism, [*lumped.joints.values(), *between])
     weighs = any(one.weight for one in lumped.joints.values())
     option = ElementTree.SubElement(root, "option", integrator="implicitfast")
     option.attrib |= {
@@ -133,9 +133,8 @@ def _attributes(elements: Lumped, step: float) -> dict[str, str]:
 def _step(mechanism: Mechanism, elements: list[Lumped]) -> float:
     """Return a time step, s, that resolves the fastest part."""
     lightest = min(one.value for one in mechanism.inertias.values())
-    stiffness, damping = (
-        sum(getattr(one, name) for one in elements) for name in ("stiffness", "damping")
-    )
+    stiffness = sum(one.stiffness for one in elements)
+    damping = sum(one.damping for one in elements)
     fastest = max(damping / lightest, math.sqrt(stiffness / lightest), 1e-9)
     wanted = min(_LONGEST_STEP, 1.0 / (_STEPS_IN_DECAY * fastest))
     return float(f"{wanted:.1g}")
@@ -144,7 +143,7 @@ def _step(mechanism: Mechanism, elements: list[Lumped]) -> float:
 def _tendons(
     root: ElementTree.Element,
     mechanism: Mechanism,
-    couplings: dict[str, tuple[dict[str, float], Lumped]],
+    couplings: Mapping[str, tuple[Mapping[str, float], Lumped]],
     step: float,
 ) -> None:
     """Write springs between coordinates, and what inputs act on if that is several."""
@@ -185,8 +184,8 @@ def _actuators(root: ElementTree.Element, mechanism: Mechanism, lumped: LumpedMo
     constant = {name: one.force for name, one in lumped.joints.items() if one.force}
     for one in mechanism.inputs:
         where, gear = _acts_on(one)
-        actuator = ElementTree.SubElement(actuators, "motor", name=one.name, **where)
-        actuator.set("gear", _number(gear))
+        named = {"name": one.name, **where, "gear": _number(gear)}
+        actuator = ElementTree.SubElement(actuators, "motor", named)
         force = constant.pop(where.get("joint", ""), 0.0) if gear else 0.0
         if force:
             actuator.tag = "general"
@@ -195,15 +194,14 @@ def _actuators(root: ElementTree.Element, mechanism: Mechanism, lumped: LumpedMo
                 f"the constant force at {where['joint']} is what actuator {one.name} adds to its "
                 "control"
             )
-    for name, force in constant.items():
-        own = ElementTree.SubElement(actuators, "general", name=f"{name}_constant", joint=name)
+    left = [({"joint": name}, force) for name, force in constant.items()]
+    between = lumped.couplings.items()
+    left += [({"tendon": name}, coupled.force) for name, (_, coupled) in between if coupled.force]
+    for where, force in left:
+        (name,) = where.values()
+        own = ElementTree.SubElement(actuators, "general", {"name": f"{name}_constant", **where})
         own.attrib |= {"gear": "1", **_biased(-force, "0")}
         notes.append(f"the constant force at {name} is an actuator that ignores its control")
-    for name, (_, one) in lumped.couplings.items():
-        if one.force:
-            own = ElementTree.SubElement(actuators, "general", name=f"{name}_constant", tendon=name)
-            own.attrib |= {"gear": "1", **_biased(-one.force, "0")}
-            notes.append(f"the constant force at {name} is an actuator that ignores its control")
     return notes
 
 

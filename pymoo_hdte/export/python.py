@@ -15,6 +15,7 @@ _OWN = (
     *("STATES", "force", "acceleration", "residual", "rates"),
 )
 _FUNCTIONS = '''
+
 def force(position, speed, inputs, states=None):
     """Return the force on each coordinate, without inertia.
 

@@ -63,10 +63,8 @@ def to_urdf(model: MechanismModel) -> Exported:
         friction = {"damping": f"{elements.damping:.12g}", "friction": f"{elements.level:.12g}"}
         ElementTree.SubElement(joint, "dynamics", friction)
         if kind == "prismatic":
-            ends = {"lower": f"-{_NOWHERE}", "upper": _NOWHERE}
-            ElementTree.SubElement(
-                joint, "limit", ends | {"effort": _NOWHERE, "velocity": _NOWHERE}
-            )
+            most = dict.fromkeys(("upper", "effort", "velocity"), _NOWHERE)
+            ElementTree.SubElement(joint, "limit", {"lower": f"-{_NOWHERE}", **most})
             notes.append(f"limits of {coordinate} are not known: {_NOWHERE} stands for none")
     return Exported(xml_text(root, head_lines(model, tuple(notes))), tuple(notes))
 
