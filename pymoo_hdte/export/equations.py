@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import keyword
 import re
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, fields
@@ -60,7 +61,8 @@ class _Names:
     """Identifiers, each of them once."""
 
     def __init__(self, reserved: Collection[str]) -> None:
-        self.taken = set(reserved)
+        # Expressions are in the grammar of Python, whatever they are written in afterwards.
+        self.taken = {*keyword.kwlist, *reserved}
 
     def of(self, *words: str) -> str:
         name = "_".join(re.sub(r"[^A-Za-z0-9_]", "_", word) for word in words).strip("_")

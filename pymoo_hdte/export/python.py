@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import keyword
 import textwrap
 
 from pymoo_hdte.discrepancy import MechanismModel
@@ -73,7 +72,7 @@ def to_python(model: MechanismModel) -> Exported:
     >>> print(space["acceleration"]([0.0], [0.0], [2.0]))
     [4.]
     """
-    found = equations(model, PYTHON, (*keyword.kwlist, *_OWN))
+    found = equations(model, PYTHON, _OWN)
     head = "\n".join(head_lines(model, found.notes)).replace("\\", "/").replace('"', "'")
     parts = [f'"""{head}\n"""\n\nimport numpy as np\n']
     for title, symbols in (
