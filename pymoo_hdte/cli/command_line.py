@@ -13,12 +13,13 @@ from pymoo_hdte._interrupts import INTERRUPTED
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.cli.command import MISTAKE, OneLineParser
 from pymoo_hdte.cli.discrepancy import DISCREPANCY
+from pymoo_hdte.cli.export import EXPORT
 from pymoo_hdte.cli.identify import IDENTIFY
 from pymoo_hdte.cli.optimise import OPTIMISE
 from pymoo_hdte.cli.plan import PLAN
 from pymoo_hdte.cli.simulate import SIMULATE
 
-COMMANDS = (OPTIMISE, SIMULATE, IDENTIFY, PLAN, DISCREPANCY)
+COMMANDS = (OPTIMISE, SIMULATE, IDENTIFY, PLAN, DISCREPANCY, EXPORT)
 """In the order of the help."""
 
 
@@ -65,9 +66,8 @@ def _parser() -> argparse.ArgumentParser:
         )
         one.set_defaults(command=command)
         command.add_arguments(one)
-        one.add_argument(
-            "--out", type=Path, required=True, metavar="DIR", help="folder for the report"
-        )
+        metavar, words = command.out
+        one.add_argument("--out", type=Path, required=True, metavar=metavar, help=words)
         output = one.add_mutually_exclusive_group()
         output.add_argument("--json", action="store_true", help="print the result as JSON")
         output.add_argument("--quiet", action="store_true", help="print nothing but errors")
