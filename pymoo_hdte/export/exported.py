@@ -29,8 +29,11 @@ class Exported:
 
     Examples
     --------
-    >>> exported = to_urdf(read_mechanism_model("report/revised_model.toml"))  # doctest: +SKIP
-    >>> exported.notes  # doctest: +SKIP
+    >>> from pymoo_hdte.discrepancy import MechanismModel
+    >>> from pymoo_hdte.mechanism import BelievedValue, Mechanism
+    >>> arm = Mechanism({"q": BelievedValue(0.5)}, angles=["q"])
+    >>> to_urdf(MechanismModel("An arm", arm)).notes
+    ('the mass of q is not known: 1 kg on its axis stands for it',)
     """
 
     text: str

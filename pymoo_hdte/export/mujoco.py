@@ -28,7 +28,7 @@ def to_mujoco(model: MechanismModel) -> Exported:
     Each coordinate is a joint with the name, its inertia as ``armature``; springs, dampers and dry
     friction are its ``stiffness``, ``damping`` and ``frictionloss``, between coordinates those of a
     fixed tendon; gravity is a mass; each input is an actuator whose ``gear`` is its gain, so that
-    its control is the measured signal. Sensors ``NAME_pos`` and ``NAME_vel`` read each joint.
+    its control is the measured signal. A sensor ``NAME_pos`` reads each joint.
 
     Parameters
     ----------
@@ -99,7 +99,6 @@ def to_mujoco(model: MechanismModel) -> Exported:
     sensors = ElementTree.SubElement(root, "sensor")
     for name in mechanism.coordinates:
         ElementTree.SubElement(sensors, "jointpos", name=f"{name}_pos", joint=name)
-        ElementTree.SubElement(sensors, "jointvel", name=f"{name}_vel", joint=name)
     return Exported(xml_text(root, head_lines(model, tuple(notes))), tuple(notes))
 
 
