@@ -165,10 +165,12 @@ class _Builder:
             for names in (self.of, self.speed_of)
         )
         for line in port.error:
-            angle = f"{line.order!r} * {self.of[line.coordinate]} + {line.phase!r}"
-            at += f" + {line.amplitude!r} * sin({angle})"
+            # Numbers of NumPy are written with their type.
+            order, amplitude, phase = map(float, (line.order, line.amplitude, line.phase))
+            angle = f"{order!r} * {self.of[line.coordinate]} + {phase!r}"
+            at += f" + {amplitude!r} * sin({angle})"
             moved = self.speed_of[line.coordinate]
-            rate += f" + {line.amplitude * line.order!r} * cos({angle}) * {moved}"
+            rate += f" + {amplitude * order!r} * cos({angle}) * {moved}"
         position, speed = (
             self._line(
                 self.names.of(port.name, word),
@@ -225,7 +227,7 @@ class _Builder:
 def _sum(shares: list[tuple[float, str]]) -> str:
     """Return a sum of names or products, each times a number."""
     parts = [
-        text if share == 1.0 else f"-({text})" if share == -1.0 else f"{share!r} * ({text})"
+        text if share == 1.0 else f"-({text})" if share == -1.0 else f"{float(share)!r} * ({text})"
         for share, text in shares
     ]
     return " + ".join(parts) or "0.0"

@@ -4,6 +4,7 @@ import json
 from xml.etree import ElementTree
 
 import pytest
+from places import DOCS
 
 from pymoo_hdte.cli.command_line import main
 
@@ -68,6 +69,15 @@ def test_anything_but_an_export_is_never_replaced(model, kind, tmp_path, capsys)
     assert "--out" in capsys.readouterr().err
     assert (tmp_path / "model.toml").read_text(encoding="utf-8") == MODEL
     assert not (tmp_path / "elsewhere").exists()
+
+
+def test_an_effect_of_ones_own_that_states_no_equations_is_told(model, tmp_path, capsys):
+    own = 'name = "eyring_drag"\nport = "bearing"\nlevel = 1.0\nknee = 0.1\n'
+    text = MODEL.partition("[[effects]]")[0] + f"[[effects]]\n{own}"
+    (tmp_path / "model.toml").write_text(text, encoding="utf-8")
+    arguments = ["--to", "modelica", "--effects", str(DOCS / "examples" / "eyring_drag.py")]
+    assert main(["export", model, *arguments, "--out", str(tmp_path / "out")]) == 0
+    assert "eyring_drag at bearing" in capsys.readouterr().out
 
 
 def test_a_mistake_in_the_model_is_one_line_and_writes_nothing(model, tmp_path, capsys):

@@ -420,15 +420,16 @@ def test_a_table_slides_in_mujoco_as_ours():
 
 
 def test_errors_of_a_gear_are_in_the_equations(rng):
-    error = (ErrorLine("joint", 5.0, 0.02, 0.4),)
-    port = Port("mesh", {"joint": 1.0}, BelievedValue(40.0), BelievedValue(0.3), error=error)
+    error = (ErrorLine("joint", *np.array([5.0, 0.02, 0.4])),)
+    believed = BelievedValue(np.float64(40.0)), BelievedValue(0.3)
+    port = Port("mesh", {"joint": np.float64(0.5)}, *believed, error=error)
     mechanism = Mechanism({"joint": BelievedValue(0.5)}, [port], angles=["joint"])
     model = MechanismModel("m", mechanism)
     _, position, speed, *_ = moving(20, rng)
-    d = position + 0.02 * np.sin(5.0 * position + 0.4)
-    rate = speed * (1.0 + 0.1 * np.cos(5.0 * position + 0.4))
+    d = 0.5 * position + 0.02 * np.sin(5.0 * position + 0.4)
+    rate = speed * (0.5 + 0.1 * np.cos(5.0 * position + 0.4))
     found = python_of(model)["force"]([position], [speed], [])[0]
-    assert found == pytest.approx(-40.0 * d - 0.3 * rate)
+    assert found == pytest.approx(0.5 * (-40.0 * d - 0.3 * rate))
     known = modelica_of(model)(joint=position[3], joint_speed=speed[3])
-    assert known["mesh_force"] == pytest.approx(-found[3])
+    assert 0.5 * known["mesh_force"] == pytest.approx(-found[3])
     assert any("kinematic error" in one for one in to_mujoco(model).notes)
