@@ -11,7 +11,7 @@ from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy import MechanismModel
 from pymoo_hdte.effects.effect import effect_named
 from pymoo_hdte.effects.portable import Formula
-from pymoo_hdte.export.exported import acting, common_notes, stated
+from pymoo_hdte.export.exported import acting, common_notes, left_out, stated
 from pymoo_hdte.export.expressions import Dialect, written
 from pymoo_hdte.mechanism import LawAt, Port
 from pymoo_hdte.mechanism.quantity_units import base_unit, unit_of, unit_of_number
@@ -198,7 +198,7 @@ class _Builder:
             if effect.port == port.name:
                 formula = stated(effect.law, "formula")
                 if formula is None:
-                    missing.append(f"{effect.name} at {port.name} states no equations: left out")
+                    missing.append(left_out(effect))
                 else:
                     parts.append(self._law(effect, formula, here))
         force = self.names.of(port.name, "force")

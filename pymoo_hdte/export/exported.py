@@ -9,6 +9,7 @@ from typing import Any
 
 from pymoo_hdte import __version__
 from pymoo_hdte.discrepancy import MechanismModel
+from pymoo_hdte.effects.effect import effect_named
 from pymoo_hdte.effects.law import Law
 from pymoo_hdte.mechanism import LawAt, Mechanism
 
@@ -64,6 +65,14 @@ def stated(law: Law, name: str) -> Any:
 def acting(model: MechanismModel) -> list[LawAt]:
     """Return the effects that act on coordinates: those at force sensors show in readings only."""
     return [one for one in model.effects if not model.mechanism.port(one.port).read]
+
+
+def left_out(effect: LawAt) -> str:
+    """Return the note on an effect of which a target holds nothing, with its size."""
+    numbers = [
+        f"{name} {getattr(effect.law, name):.4g}" for name in effect_named(effect.name).quantities
+    ]
+    return f"{effect.name} at {effect.port}: left out ({', '.join(numbers)} SI)"
 
 
 def common_notes(model: MechanismModel) -> Iterator[str]:

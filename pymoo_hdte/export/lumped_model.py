@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy import MechanismModel
 from pymoo_hdte.effects.portable import Lumped
-from pymoo_hdte.export.exported import acting, common_notes, stated, turns
+from pymoo_hdte.export.exported import acting, common_notes, left_out, stated, turns
 from pymoo_hdte.mechanism import Port
 
 GRAVITY = 9.81
@@ -86,7 +86,7 @@ def _of_port(model: MechanismModel, port: Port) -> tuple[Lumped, list[str]]:
             continue
         elements = stated(effect.law, "lumped")
         if elements is None:
-            notes.append(f"{effect.name} at {port.name}: left out")
+            notes.append(left_out(effect))
             continue
         if elements.missing:
             notes.append(f"{effect.name} at {port.name}: {elements.missing}")
