@@ -78,7 +78,7 @@ def one_parameter_at_a_time(patch):
 def rows_are_believed(patch):
     """Rows and stated noise are taken on faith."""
     patch.setattr(
-        analysis, "examined_rows", lambda campaign, expected, rules: (campaign, RowFindings())
+        analysis, "cleaned_rows", lambda campaign, expected, rules: (campaign, RowFindings())
     )
 
 

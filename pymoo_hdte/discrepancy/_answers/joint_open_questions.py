@@ -67,7 +67,7 @@ def _in_both(finding: JointFinding) -> list[str]:
     both = [
         one.order
         for one, _ in errors_of(finding.torsion.ripples)
-        if any(abs(one.order - r.order) <= r.resolution for r in finding.torque.ripples.found)
+        if any(abs(one.order - r.order) <= r.resolution for r in finding.torque.ripples.lines)
     ]
     if not both:
         return []

@@ -42,7 +42,7 @@ def effects(finding: MechanismFinding) -> list[dict[str, Any]]:
 
 def ripples(finding: MechanismFinding) -> list[dict[str, Any]]:
     """Return the ripples beyond the band as effects, with values and 95 % intervals."""
-    found = [effect for one in finding.ripples.found for effect in one.as_dicts()]
+    found = [effect for one in finding.ripples.lines for effect in one.as_dicts()]
     for effect in found:
         of_shaft = effect_named(effect["name"]).unit
         for name, one in effect["parameters"].items():

@@ -16,9 +16,9 @@ from pymoo_hdte.discrepancy._evidence.order_lines.candidates import (
     drive_candidates,
     out_of_tolerance,
 )
-from pymoo_hdte.discrepancy._evidence.order_lines.parameters import MECHANICAL
 from pymoo_hdte.discrepancy._evidence.order_lines.prediction import coefficients_of
 from pymoo_hdte.discrepancy._evidence.order_lines.sizes import port_sizes
+from pymoo_hdte.discrepancy._records.believed import MECHANICAL
 from pymoo_hdte.drive import LawAtPort, preset
 from pymoo_hdte.drive._effects import PreslidingFriction, effect_from_fields
 from pymoo_hdte.drive.toml_text import model_toml
