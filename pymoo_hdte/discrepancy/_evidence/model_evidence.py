@@ -64,8 +64,8 @@ class ModelEvidence(ABC):
         Returns
         -------
         sequence of mapping of str to array_like, shape (n,)
-            For each record its channels, in standard deviations of their noise. Names and lengths
-            are the same in every call.
+            For each record its channels, dimensionless: in standard deviations of their noise.
+            Names and lengths are the same in every call.
         """
 
     @abstractmethod
