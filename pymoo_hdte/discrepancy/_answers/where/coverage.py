@@ -26,7 +26,7 @@ def campaign_limits(finding: DriveFinding) -> list[str]:
     finding : DriveFinding
         Of `analysis.examine_drive`.
     """
-    of_records = _zeroed(finding) + _standing_out(finding) + _unproven(finding)
+    of_records = _zeroed(finding) + _standing_out(finding) + _not_validated(finding)
     of_conditions = _unvaried(finding) + _unseen(finding)
     of_values = _far_sensors(finding) + _too_high(finding)
     return of_records + of_conditions + _like_a_gain(finding) + of_values
@@ -63,7 +63,7 @@ def _standing_out(finding: DriveFinding) -> list[str]:
     ]
 
 
-def _unproven(finding: DriveFinding) -> list[str]:
+def _not_validated(finding: DriveFinding) -> list[str]:
     sentences = []
     if not finding.campaign.held_out:
         sentences.append("No record was held out: nothing is proven about conditions not fitted.")
