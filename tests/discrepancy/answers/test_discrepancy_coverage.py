@@ -29,10 +29,11 @@ def campaign():
     return replace(clean, running=(replace(turned, **angles), *clean.running[1:]))
 
 
-def said(campaign, fitted=None, orders=ORDERS, chosen=None, status="named", **of_data):
+def said(campaign, fitted=None, orders=ORDERS, chosen=None, status=None, **of_data):
     """Return all limits of a campaign of which some records, by default all, were fitted."""
     features = measure(campaign, fitted or campaign.train, orders)
     data = Data(campaign, features, (), campaign.torsion, **of_data)
+    status = status or ("adequate" if chosen is None else "named")
     return campaign_limits(
         DriveFinding(campaign, data, made_verdict(status, UNFITTED, chosen, freedom=FREEDOM), ())
     )
@@ -43,7 +44,7 @@ def periodic(misfit, *orders):
     fit = SimpleNamespace(**{**vars(UNFITTED), "chi_square": misfit * FREEDOM})
     ripple = effect_named("torque_ripple")
     candidates = [SimpleNamespace(effect=ripple, name=ripple.name, order=one) for one in orders]
-    return SimpleNamespace(fit=fit, candidates=candidates)
+    return SimpleNamespace(fit=fit, candidates=candidates, listed=True)
 
 
 def trained(campaign, keep):
