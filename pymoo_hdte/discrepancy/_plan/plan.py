@@ -243,16 +243,17 @@ def chance_words(chance: float) -> str:
 
 
 def _missed(ones: Sequence[Chance], wanted: float) -> str:
-    """Say what tests do not tell of one effect, of which all ``ones`` are."""
+    """Return what the tests leave open about one effect, of which all ``ones`` are."""
     effect = ones[0].effect
     rivals = ", nor from ".join(one.rival for one in ones)
     if max(one.possible for one in ones) < wanted:
-        asked = f"tells {effect} from {rivals}" if rivals else f"shows {effect}"
+        asked = f"separates {effect} from {rivals}" if rivals else f"shows {effect}"
         best = max(one.possible for one in ones)
         most = f"the chance is {chance_words(best)} at best"
         return f"No test within the limits {asked} at this size: {most}."
     least = min(one.power for one in ones)
-    asked = f"tell {effect} from {rivals.replace(', nor', ' and')}" if rivals else f"show {effect}"
+    shown = f"separate {effect} from {rivals.replace(', nor', ' and')}"
+    asked = shown if rivals else f"show {effect}"
     return (
         f"To {asked} at this size takes more records than the limits allow: these give a chance "
         f"of {chance_words(least)}."

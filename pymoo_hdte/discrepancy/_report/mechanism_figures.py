@@ -137,7 +137,7 @@ def gaps(found: Sequence[MeasuredGap]) -> Figure:
         range(len(found)), [f"{gap.record}: {gap.quantity}, {gap.kind}" for gap in found]
     )
     axis.invert_yaxis()
-    axis.set(xlabel="gap over the gap before")
+    axis.set(xlabel="prediction error / error before")
     axis.legend(frameon=False, fontsize=8, ncols=3, loc="lower left", bbox_to_anchor=(0.0, 1.0))
     _plain(axis)
     return figure

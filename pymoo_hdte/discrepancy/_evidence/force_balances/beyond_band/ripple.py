@@ -266,13 +266,13 @@ def _limits(
         limits.append(_one_way(name, terms))
     if lost:
         limits.append(
-            f"{ripple([one.order for one in lost])} is seen, but to take it away makes the "
-            f"{terms.of_records} of the held-out records no smaller: it is not named."
+            f"{ripple([one.order for one in lost])} is seen, but removing it does not reduce the "
+            f"{terms.of_records} of the held-out records: it is not named."
         )
     if search.undecided:
         limits.append(
-            f"{ripple(search.undecided)} is seen at one speed or is weak, so that "
-            "these records do not tell it from a frequency: it is not named."
+            f"{ripple(search.undecided)} is seen at one speed only or is weak, so "
+            "it may be a fixed frequency: it is not named."
         )
     if search.fixed:
         lines = ", ".join(f"{one:.3g}" for one in search.fixed)
@@ -290,8 +290,8 @@ def _per_input_turn(order: float, ratio: float) -> str:
 
 def _one_way(port: str, terms: Terms = OF_FORCES) -> str:
     return (
-        f"The {port} shows its {terms.lines} in one direction only: {terms.cause} cannot be told "
-        "from friction that varies with the position."
+        f"The {port} shows its {terms.lines} in one direction only, where {terms.cause} looks "
+        "like friction that varies with the position."
     )
 
 
