@@ -224,9 +224,8 @@ axes_of_drive = {"K": "K [N.m/rad]", "J_in": "J_in [kg.m2]"}
 result = pictures(joint, drive, "dte", nominal, axes_of_drive)
 
 # %%
-# The band is wide beside the front: designs along it cannot be told apart with certainty at this
-# accuracy. Is it an honest one? The drive model itself is asked 2,000 times around each of 20
-# designs.
+# The band is wide compared with the front: at this accuracy designs along it are indistinguishable.
+# Is the band right? The drive model itself is run 2,000 times around each of 20 designs.
 
 rng = np.random.default_rng(1)
 scatter = np.column_stack([one.sample(rng, 2_000) for one in paper.inputs])

@@ -12,7 +12,7 @@ DRIVE = {
     "harmonic balance": "a steady motion found as a sum of sines, without stepping through time.",
     "locked stiffness": "the stiffness seen in a torsion sweep, over the mean stiffness in motion. "
     "With the input locked, the teeth stand in one place; in motion all places are averaged.",
-    "nominal": "as you state it, in your model or data sheet, before parts vary or values are fitted.",
+    "nominal": "as stated in your model or data sheet, before parts vary or values are fitted.",
     "order": "how often per turn of the input something repeats: order 2 comes twice a turn.",
     "order line": "the part of a channel that repeats at one order, with its amplitude and phase.",
     "port": "a place where a force acts: input, output, mesh (between the two) and sensor of a "

@@ -218,7 +218,7 @@ def _agreement(study: DesignStudy) -> str:
             f"{100.0 * study.quadrature:.1f} %, two standard errors included."
         )
     parts.append(
-        f"Percentages are of the front's width: {mean} arcsec in the mean and {std} in the standard "
+        f"Percentages are of the front's width: {mean} arcsec in the mean, {std} in the standard "
         f"deviation, or {100.0 * HARDLY_WORTH:g} % of the least value if that is more."
     )
     return " ".join(parts)

@@ -107,7 +107,10 @@ class Ripple:
     @property
     def words(self) -> str:
         """Its order, how often that is in a turn of the input, and what the gear says of it."""
-        told = "; ".join(filter(None, (_per_input_turn(self.order, self.ratio), self.meaning)))
+        turns = _per_input_turn(self.order, self.ratio)
+        if turns and turns in self.meaning:
+            turns = ""
+        told = "; ".join(filter(None, (turns, self.meaning)))
         return f"{self.order:.5g} ({told})" if told else f"{self.order:.5g}"
 
     @property
