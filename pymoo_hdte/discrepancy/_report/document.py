@@ -138,11 +138,10 @@ def _or_else(sets: Sequence[Hypothesis], error_orders: Sequence[float]) -> str:
     """
     labels = labels_apart([one.candidates for one in sets])
     first, *others = (labels_by_order(one, error_orders) for one in labels)
-    place = "" if labels[0] == sets[0].label else f", in place of {first}"
     whole = label_of(sets[0].candidates)
     alone = [" alone, with caveats" * (label_of(one.candidates) < whole) for one in sets[1:]]
-    listed = "; or ".join(one + how for one, how in zip(others, alone, strict=True))
-    return f"These data cannot distinguish it from an alternative{place}: {listed}."
+    listed = " or from ".join(one + how for one, how in zip(others, alone, strict=True))
+    return f"These data cannot distinguish {first} from {listed}."
 
 
 def residual_of_parts(finding: DriveFinding) -> dict[str, dict[str, float]]:

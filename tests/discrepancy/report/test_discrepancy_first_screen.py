@@ -246,20 +246,20 @@ def test_an_effect_that_explains_less_than_half_is_not_called_near(share, told):
     [
         (
             (("soft_windup", "stiffness"), ("backlash", "stiffness"), ("play", "stiffness")),
-            ", in place of soft windup (mesh): backlash (mesh); or play (mesh).",
+            "distinguish soft windup (mesh) from backlash (mesh) or from play (mesh).",
         ),
         # A set may have one effect twice.
         (
             (("soft_windup", "soft_windup", "stiffness"), ("soft_windup", "play", "stiffness")),
-            ", in place of soft windup (mesh): play (mesh).",
+            "distinguish soft windup (mesh) from play (mesh).",
         ),
         # Where nothing is shared all is said.
         (
             (("soft_windup",), ("backlash", "stiffness")),
-            ": backlash (mesh) and stiffness (out of tolerance).",
+            "from backlash (mesh) and stiffness (out of tolerance).",
         ),
         # What is a part of the first alone is in the class for its doubts.
-        ((("play", "windup"), ("windup",)), ": windup (mesh) alone, with caveats."),
+        ((("play", "windup"), ("windup",)), "from windup (mesh) alone, with caveats."),
     ],
 )
 def test_what_all_members_of_a_class_share_is_said_once(sets, words):
