@@ -66,9 +66,10 @@ def in_short() -> tuple[str, ...]:
     return (
         f"The paper contradicts itself: by its validation figures, prototype {ranking.HIGHEST} "
         f"must be predicted {significant(ranking.bounds().least_lead, 3)} arcsec above prototype "
-        f"{ranking.LOWEST}, whose static error is {significant(ranking.excess(), 2)} arcsec larger.",
+        f"{ranking.LOWEST}, whose static error is {significant(ranking.excess(), 2)} arcsec "
+        "larger.",
         f"Its equations as printed give a transmission error of {low:.0f} or {high:.0f} arcsec, "
-        f"depending on how the static error is read; the paper states "
+        "depending on how the static error is read; the paper states "
         f"{TABLE_8['initial'].mean_arcsec:.0f}.",
         f"A rigid drive that reads {significant(100.0 * drive.torsion_share, 1)} % of the torsion "
         f"as error has {N_PARAMETERS} parameters and as good a BIC as our model with "

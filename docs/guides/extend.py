@@ -293,8 +293,8 @@ for rule in (ConstantWeight(), LinearDecrease(), EntropyWeight()):
 #    ),
 #
 # after which ``python -m experiments stiffer`` runs it, stores its tables as CSV and its figures as
-# PNG, and gives it a page and a card on ``index.html``. The folder is part of the repository, not of
-# the installed package.
+# PNG, and gives it a page and a card on ``index.html``. The folder is part of the repository, but
+# not of the installed package.
 #
 # Long work is cut into *jobs*. A job holds all its settings, its seed included, and names itself by
 # them. The campaign runs jobs on as many processes or machines as the user allows, keeps every

@@ -5,8 +5,8 @@ Make your simulator robust
 Built parts differ from their drawings, and loads from their forecasts. A robust design is good on
 average and scatters little. ``robust_problem`` takes a simulator, what is designed and what
 scatters, and returns a problem of pymoo whose objectives are mean, standard deviation, quantiles
-or other statistics. It builds a polynomial surrogate of the simulator with exact moments, so it needs some
-hundred runs in all instead of thousands for each design.
+or other statistics. It builds a polynomial surrogate of the simulator, whose moments are exact, so
+it needs some hundred runs in all instead of thousands for each design.
 """
 
 import tempfile

@@ -36,8 +36,9 @@ from pymoo_hdte.mechanism import BelievedValue, Input, Mechanism, Port, Record
 #
 #    \chi^2 = \sum_n r_n^2 .
 #
-# Base parameters are fitted first, within their stated tolerances. A right model then leaves :math:`\chi^2` near its degrees of freedom :math:`\nu`
-# (residuals less fitted parameters), with standard deviation :math:`\sqrt{2 \nu}`.
+# Base parameters are fitted first, within their stated tolerances. A right model then leaves
+# :math:`\chi^2` near its degrees of freedom :math:`\nu` (residuals less fitted parameters), with
+# standard deviation :math:`\sqrt{2 \nu}`.
 #
 # Is anything missing?
 # --------------------
