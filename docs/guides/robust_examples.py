@@ -194,7 +194,7 @@ folder.cleanup()
 # ---------
 #
 # The drive is a simulator like any other. `RobustDTE` fits a tensor polynomial to it, of order 3 to
-# 1024 runs, and tells nothing of its error; here an error is asked for, and the runs follow.
+# 1024 runs, without an error estimate; here the wanted accuracy decides the number of runs.
 
 model = preset("calibrated")
 paper = RobustDTE()

@@ -60,8 +60,8 @@ designs = {
 noise = {"mass": chaospy.Uniform(18.0, 22.0), "speed": norm(80.0, 2.0)}
 
 # %%
-# Objectives and constraints are statistics of a response. Runs and memory are told before the first
-# run, with the region in which the simulator will be called (``progress=False`` keeps it quiet).
+# Objectives and constraints are statistics of a response. Runs and memory are estimated before the
+# first run, with the region in which the simulator will be called (``progress=False`` hides this).
 
 problem = robust_problem(
     mount,
@@ -152,8 +152,8 @@ plt.show()
 # When it refuses
 # ---------------
 #
-# A surrogate that is not as accurate as asked for when the budget is spent is not returned, nor is
-# one that makes a positive response negative. The error says how bad it is, and where.
+# A surrogate that misses the accuracy asked for within the budget is refused, as is one that makes a
+# positive response negative. The error says how bad it is, and where.
 
 try:
     robust_problem(

@@ -177,7 +177,7 @@ def headline(found: Identification) -> str:
 
 
 def limits(found: Identification, sheet: DataSheet | None) -> list[str]:
-    """Say what these records do not tell."""
+    """Return what these records leave open."""
     said = [
         f"{one.name} came out at {number(one.value, 3)}: damping and stiffness are positive, so "
         "noise or a zero error outweighs it, and the data sheet keeps its value."
