@@ -195,10 +195,12 @@ def gap_sentence(finding: DriveFinding, proof: Proof | None) -> str:
     gap = proof.channels[proof.leading]
     records = f"{len(proof.records)} held-out record{'s' if len(proof.records) > 1 else ''}"
     where = f"{records}, {proof.leading.replace('_', ' ')}"
-    noise = f"{number(gap.noise_floor)} {gap.unit} from noise alone"
+    noise = f"(noise alone: {number(gap.noise_floor)})"
     if not finding.verdict.accepted.candidates:
-        return f"Nothing was added. On {where}: error {number(gap.before)} {gap.unit}, {noise}."
-    words = f"On {where}: error {number(gap.before)} before, {number(gap.after)} after, {noise}"
+        error = f"prediction error {number(gap.before)} {gap.unit} {noise}"
+        return f"Nothing was added. On {where}: {error}."
+    words = f"On {where}: prediction error {number(gap.before)} {gap.unit} before, "
+    words += f"{number(gap.after)} after {noise}"
     if proof.condemns:
         where = "there" if gap.worse else "in all channels together"
         return f"{words}. The revised model is worse {where}: do not use it.{_worse(proof)}"
@@ -207,9 +209,9 @@ def gap_sentence(finding: DriveFinding, proof: Proof | None) -> str:
     error = proof.channels["transmission_error"]
     if error is not gap:
         words += (
-            f". Transmission error: {number(error.before)} before, {number(error.after)} after, "
+            f". Transmission error: {number(error.before)} {error.unit} before, "
+            f"{number(error.after)} after (noise alone: {number(error.noise_floor)})"
         )
-        words += f"{number(error.noise_floor)} {error.unit} from noise alone"
     return f"{words}.{_worse(proof)}"
 
 

@@ -50,7 +50,7 @@ def proof(overall=(4.7, 1.02), records=(1.0, 1.0), **after):
 
 def test_a_gap_that_shrinks_everywhere_is_not_called_worse():
     said = gap_sentence(NAMED, proof())
-    assert "8.2 before, 0.43 after" in said
+    assert "8.2 arcsec before, 0.43 after" in said
     assert "the correction removes" in said
     assert "orse" not in said
     assert proof().worse == ()
@@ -81,7 +81,7 @@ def test_a_gap_of_thousands_has_no_exponent():
     """It was off by 4.46e+03 mN.m."""
     large = proof()
     large.channels["transmission_error"] = Gap(4460.0, 1230.0, 0.42, "arcsec")
-    assert "4460 before, 1230 after" in gap_sentence(NAMED, large)
+    assert "4460 arcsec before, 1230 after" in gap_sentence(NAMED, large)
 
 
 @pytest.mark.parametrize(
