@@ -152,7 +152,7 @@ plt.show()
 # When it refuses
 # ---------------
 #
-# A surrogate that misses the accuracy asked for within the budget is refused, as is one that makes a
+# A surrogate that misses the wanted accuracy within the budget is refused, as is one that makes a
 # positive response negative. The error says how bad it is, and where.
 
 try:

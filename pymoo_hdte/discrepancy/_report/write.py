@@ -201,9 +201,6 @@ def gap_sentence(finding: DriveFinding, proof: Proof | None) -> str:
         return f"Nothing was added. On {where}: {error}."
     words = f"On {where}: prediction error {number(gap.before)} {gap.unit} before, "
     words += f"{number(gap.after)} after {noise}"
-    if proof.condemns:
-        where = "there" if gap.worse else "in all channels together"
-        return f"{words}. The revised model is worse {where}: do not use it.{_worse(proof)}"
     if gap.shrinkage is not None:
         words += f"; the correction removes {percent(min(gap.shrinkage, 1.0))} of the excess"
     error = proof.channels["transmission_error"]

@@ -59,8 +59,7 @@ def test_a_gap_that_shrinks_everywhere_is_not_called_worse():
 @pytest.mark.parametrize(
     ("changes", "words", "names"),
     [
-        ({"transmission_error": 9.0}, "worse there: do not use it", ("transmission_error",)),
-        ({"overall": (4.7, 4.9)}, "worse in all channels together: do not use it", ("overall",)),
+        ({"overall": (4.7, 4.9)}, "Worse than before: all channels together", ("overall",)),
         ({"output_torque": 23.0}, "Worse than before: output torque 19.4 before, 23 after",
          ("output_torque",)),
         ({"input_torque": 0.23}, "Worse than before: input torque 0.21 before, 0.23 after",
@@ -73,8 +72,6 @@ def test_what_gets_worse_is_said(changes, words, names):
     found = proof(**changes)
     assert words in gap_sentence(NAMED, found)
     assert found.worse == names
-    # One channel that is worse does not condemn a model that is better.
-    assert ("do not use it" in gap_sentence(NAMED, found)) == ("do not use it" in words)
 
 
 def test_a_gap_of_thousands_has_no_exponent():
