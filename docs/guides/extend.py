@@ -226,7 +226,7 @@ print(f"belt: expected {frequency:.1f} Hz, {crossings / 2 / 0.5:.0f} Hz counted 
 #    :language: python
 #
 # Turning points of an oscillator with viscous and dry friction are known in closed form
-# (Den Hartog, Transactions of the ASME 53, 1931). Nothing is told of the dry friction.
+# (Den Hartog, Transactions of the ASME 53, 1931). The model lacks the dry friction.
 
 stiffness, frequency, damping, friction, noise = 4e3, 63.0, 0.8, 0.03, 2e-6
 shrink = np.exp(-0.5 * np.pi * damping * frequency / stiffness)
@@ -240,7 +240,9 @@ for name, deflection in (("wide", 4e-3), ("less", 3e-3), ("narrow", 1.5e-3), ("h
 analysis = analyse(Oscillator(stiffness, frequency, 0.85, 0.2, noise, tests))
 print(f"{analysis.verdict.status}: {analysis.revised_model().effects[0]}, {friction} N is hidden")
 print(analysis.locate().sentence)
-print(f"error of prediction, in deviations of the noise: {analysis.prove().overall.after:.2f}")
+print(
+    f"prediction error, in standard deviations of the noise: {analysis.prove().overall.after:.2f}"
+)
 
 # %%
 # A part of an algorithm
