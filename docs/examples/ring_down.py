@@ -68,7 +68,7 @@ class RingDownEvidence(ModelEvidence):
 
     def __init__(self, machine, records):
         self.machine, self.records, self.known = machine, records, machine.known
-        self.units = {"damping": "N.s/m"}
+        self.units, self.along = {"damping": "N.s/m"}, ("spring",)
         width = machine.tolerance * machine.damping
         self.base = (
             unknown("damping", machine.damping - width, machine.damping + width, machine.damping),

@@ -83,6 +83,7 @@ def test_report_and_location_say_the_same(analysis, report):
     document = json.loads((report / "verdict.json").read_text())
     assert document["status"] == "named"
     level = document["effects"][0]["parameters"]["level"]
+    assert level["unit"] == "N"
     assert level["interval95"][0] < FRICTION < level["interval95"][1]
     assert document["location"]["sentence"] == analysis.locate().sentence
     assert document["next_experiment"]["record"] in STARTS

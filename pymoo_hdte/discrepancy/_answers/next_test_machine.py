@@ -71,11 +71,9 @@ def next_repetition(finding: MachineFinding) -> Repetition:
 
 
 def _nearest(finding: MachineFinding) -> Hypothesis | None:
-    """Return the hypothesis nearest to the chosen one that says something else."""
+    """Return the hypothesis that competes most closely with the chosen one, if any does."""
     verdict = finding.verdict
-    candidates = [
-        hypothesis
-        for hypothesis in (*verdict.equivalent, *verdict.alternatives)
-        if verdict.chosen is not None and not verdict.chosen.names <= hypothesis.names
-    ]
-    return min(candidates, key=lambda hypothesis: hypothesis.bic, default=None)
+    competing = verdict.equivalent
+    if verdict.status == "unlisted":
+        competing = verdict.alternatives
+    return min(competing, key=lambda hypothesis: hypothesis.bic, default=None)

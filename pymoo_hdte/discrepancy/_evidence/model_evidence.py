@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -19,6 +21,7 @@ from pymoo_hdte.effects.guess import Sizes
 from pymoo_hdte.effects.unknowns import Parameter
 from pymoo_hdte.mechanism import LawAt
 from pymoo_hdte.mechanism.effects import law_effects
+from pymoo_hdte.mechanism.quantity_units import unit_at_length
 
 _LOST = 1e3
 """Whitened residual where a model has no finite prediction, which a fit leaves again."""
@@ -39,6 +42,9 @@ class ModelEvidence(ABC):
         Effects that the model has already; they are not searched for.
     units : mapping of str to str
         SI unit of an unknown of the base; those that are missing are dimensionless.
+    along : collection of str
+        Ports that move along a line: numbers of effects are in N and m there, elsewhere in N.m and
+        rad.
     rules : Rules
         Thresholds of the verdict; `analyse` sets them.
 
@@ -49,7 +55,8 @@ class ModelEvidence(ABC):
 
     base: tuple[Parameter, ...]
     known: tuple[LawAt, ...] = ()
-    units: Mapping[str, str] = {}
+    units: Mapping[str, str] = MappingProxyType({})
+    along: Collection[str] = ()
     rules: Rules = RULES
     held_out: ModelEvidence | None = None
     evident: frozenset[str] = frozenset()
@@ -93,13 +100,19 @@ class ModelEvidence(ABC):
         """Return every effect that a port may have; override it to search for less, or more."""
         known = {place_of(effect) for effect in self.known}
         found = [
-            candidate_of(effect, guess, port, "force", LawAt)
+            self._in_units(candidate_of(effect, guess, port, "force", LawAt))
             for port, sizes in self.sizes(fitted).items()
             for effect in law_effects()
             if effect.of_reading == sizes.read
             for guess in effect.guesses(sizes)
         ]
         return [candidate for candidate in found if not candidate.places & known]
+
+    def _in_units(self, candidate: Candidate) -> Candidate:
+        unit = candidate.unit
+        if unit is None or candidate.port not in self.along:
+            return candidate
+        return replace(candidate, unit=lambda name: unit_at_length(unit(name)))
 
     def objective(self, candidates: Sequence[Candidate]) -> ModelObjective:
         """Return the whitened residuals with candidates, and their derivatives."""

@@ -338,7 +338,6 @@ def test_words_of_a_user_s_effect_are_no_lines_of_the_static_error(ripple, locat
         ripple.verdict,
         chosen=replace(chosen, fit=alone),
         reasons=(Reason.of(AT_BOUND, own.label, {unknown.name: unknown.upper}),),
-        status="partial",
     )
     document = write_report(
         replace(ripple, verdict=verdict), location, None, PROPOSAL, not_tried, tmp_path / "own"
