@@ -113,11 +113,7 @@ def error_sentence(finding: MachineFinding, errors: HeldOutErrors | None) -> str
         return f"Nothing was added. Prediction error on held-out records: {before}."
     words = f"Prediction error on held-out records: {before} before, {after} after."
     if gap.shrinkage is not None:
-<<<<<<< HEAD
-        words += f" The correction removes {percent(gap.shrinkage)} of the excess."
-=======
-        words += f" {percent(min(gap.shrinkage, 1.0))} of what noise does not explain is gone."
->>>>>>> main
+        words += f" The correction removes {percent(min(gap.shrinkage, 1.0))} of the excess."
     if errors.growths:
         words += f" Worse than before: {', '.join(errors.growths)}."
     return words
