@@ -191,15 +191,15 @@ def limits(found: Identification, sheet: DataSheet | None) -> list[str]:
         error = max(fit.slope_error for fit in one.fits.values())
         if one.series is not None and one.series.between.std < _TOO_EQUAL * error:
             said.append(
-                f"The prototypes agree on {one.name} far better than a single record determines it: "
-                "are they copies of one another?"
+                f"The prototypes agree on {one.name} far better than one record determines it: are "
+                "they copies of one another?"
             )
     if found.errors is not None:
         said += found.errors.advice()
         if sheet is not None:
             said.append(
-                "The errors are listed in the data sheet, but do not change its theta_s or DTE; the "
-                "Python function sample_static_error computes what theta_s would be."
+                "The errors are listed in the data sheet, but do not change its theta_s or DTE. The "
+                "Python function sample_static_error computes theta_s from them."
             )
         samples = zip(found.errors.symbols, found.errors.samples, strict=True)
         negative = [symbol for symbol, sample in samples if sample.mean < 0.0]
