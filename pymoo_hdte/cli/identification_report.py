@@ -198,7 +198,7 @@ def limits(found: Identification, sheet: DataSheet | None) -> list[str]:
         said += found.errors.advice()
         if sheet is not None:
             said.append(
-                "The errors are listed in the data sheet, but do not change its theta_s or DTE. The "
+                "The errors are listed in the data sheet, but change neither its theta_s nor DTE. The "
                 "Python function sample_static_error computes theta_s from them."
             )
         samples = zip(found.errors.symbols, found.errors.samples, strict=True)
