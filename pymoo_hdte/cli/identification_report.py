@@ -198,7 +198,7 @@ def limits(found: Identification, sheet: DataSheet | None) -> list[str]:
         said += found.errors.advice()
         if sheet is not None:
             said.append(
-                "The errors are listed in the data sheet, but change neither its theta_s nor DTE. The "
+                "The errors are listed in the data sheet; its theta_s and DTE stay the same. The "
                 "Python function sample_static_error computes theta_s from them."
             )
         samples = zip(found.errors.symbols, found.errors.samples, strict=True)
