@@ -231,8 +231,8 @@ def _parameters(
     The phase is that of amplitude cos(order theta_in + phase), in the direction of the part fitted.
     """
     found: dict[str, Any] = {}
-    if candidate.frees is not None:
-        rows = [[one.name for one in fitted.parameters].index(candidate.frees)]
+    if candidate.releases is not None:
+        rows = [[one.name for one in fitted.parameters].index(candidate.releases)]
     values, scale = expected_values(fitted, rules), scale_error(fitted, rules)
     for row in rows:
         one = fitted.parameters[row]
