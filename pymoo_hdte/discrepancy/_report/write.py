@@ -197,8 +197,8 @@ def gap_sentence(finding: DriveFinding, proof: Proof | None) -> str:
     where = f"{records}, {proof.leading.replace('_', ' ')}"
     noise = f"(noise alone: {number(gap.noise_floor)})"
     if not finding.verdict.accepted.candidates:
-        error = f"prediction error {number(gap.before)} {gap.unit} {noise}"
-        return f"Nothing was added. On {where}: {error}."
+        size = f"{number(gap.before)} {gap.unit} {noise}"
+        return f"Nothing was added. On {where}: prediction error {size}."
     words = f"On {where}: prediction error {number(gap.before)} {gap.unit} before, "
     words += f"{number(gap.after)} after {noise}"
     if gap.shrinkage is not None:
