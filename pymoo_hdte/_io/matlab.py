@@ -40,7 +40,7 @@ def read_vectors(path: Path, names: Sequence[str]) -> dict[str, NDArray[np.float
     budget = Budget.now()
     budget.check("bytes", regular_file(path), path.name)
     data, at = path.read_bytes(), 128
-    found, columns = dict[str, str](), dict[str, NDArray[np.float64]]()
+    descriptions, columns = dict[str, str](), dict[str, NDArray[np.float64]]()
     expanded = 0
     try:
         order = {b"\0\1IM": "<", b"\1\0MI": ">"}[data[124:128]]
@@ -54,7 +54,7 @@ def read_vectors(path: Path, names: Sequence[str]) -> dict[str, NDArray[np.float
             _, shape, start = _element(head, 16, order)
             _, title, start = _element(head, start, order)
             name, lengths = title.decode("latin-1"), np.frombuffer(shape, f"{order}i4").tolist()
-            found[name] = f"MATLAB class {flags & 0xFFF:#x} of shape {lengths}"
+            descriptions[name] = f"MATLAB class {flags & 0xFFF:#x} of shape {lengths}"
             if name in names and flags & 0xFF in _NUMERIC and not flags & _COMPLEX:
                 if math.prod(lengths) != max(lengths):
                     continue
@@ -74,8 +74,8 @@ def read_vectors(path: Path, names: Sequence[str]) -> dict[str, NDArray[np.float
         raise InvalidInput(path.name, repr(error)[:200], allowed) from None
     for name in names:
         if name not in columns or columns[name].size != columns[names[0]].size:
-            allowed = f"a vector of real numbers, all of one length; there are {found}"
-            raise InvalidInput(f"{path.name}: {name}", found.get(name), allowed[:500])
+            allowed = f"a vector of real numbers, all of one length; there are {descriptions}"
+            raise InvalidInput(f"{path.name}: {name}", descriptions.get(name), allowed[:500])
     return columns
 
 
