@@ -51,7 +51,8 @@ from pymoo_hdte.problems import RobustDTE
 # derivatives, which Newton's method needs. Laws that depend on no angle inherit ``Aperiodic``;
 # those that vary with one inherit ``Periodic`` and name their order, so that solvers keep its
 # harmonics. What else solvers ask of a law (inner states, clearance, breakaway) has a default in
-# ``pymoo_hdte.effects.law.Behaviour``.
+# ``pymoo_hdte.effects.law.Behaviour``. There ``formula`` and ``lumped`` tell exports to other
+# tools what the law is.
 #
 # The ``Effect`` names the ports of a drive where the law makes sense, its numbers with their units,
 # its sentence in a report, what it holds as a special case, and a *guess*: from the sizes of a port

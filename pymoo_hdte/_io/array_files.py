@@ -1,7 +1,7 @@
 """Formats that hold columns as arrays by name: one reader for each, found by the file's ending.
 
 MATLAB up to v7, NumPy's npz and JSON lines need nothing else; xlsx needs openpyxl, and HDF5, which
-MATLAB v7.3 is, needs h5py. The extra `EXTRA` brings both.
+MATLAB v7.3 is, needs h5py. The extra `EXTRA` brings both, and `ROS_EXTRA` what logs of ROS need.
 """
 
 from __future__ import annotations
@@ -15,13 +15,14 @@ import zlib
 from array import array
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pymoo_hdte._io import matlab
+from pymoo_hdte._io import matlab, ros_logs
 from pymoo_hdte._io.budget import Budget, regular_file
 from pymoo_hdte._io.text_header import MOST_LINES_ABOVE
 from pymoo_hdte._io.text_lines import line_blocks
@@ -29,6 +30,8 @@ from pymoo_hdte.checks import InvalidInput
 
 EXTRA = "pymoo-hdte[formats]"
 """What to install for xlsx, HDF5 and MATLAB v7.3."""
+ROS_EXTRA = "pymoo-hdte[ros]"
+"""What to install for rosbag2 and MCAP."""
 
 _HDF5 = b"\x89HDF\r\n\x1a\n"
 _USER_BLOCK = 512
@@ -75,11 +78,11 @@ def format_of(path: Path, form: str) -> str:
     return form
 
 
-def _library(name: str, path: Path) -> Any:
+def _library(name: str, path: Path, extra: str = EXTRA) -> Any:
     try:
         return importlib.import_module(name)
     except ImportError:
-        allowed = f'a file that needs {name}, after: pip install "{EXTRA}"'
+        allowed = f'a file that needs {name}, after: pip install "{extra}"'
         if path.suffix == ".mat":
             allowed += "; or save it as v5 or v7"
         raise InvalidInput(
@@ -286,11 +289,18 @@ def _read_xlsx(path: Path, names: Sequence[str]) -> Arrays:
     return Arrays(_checked(path, names, arrays, titles), above)
 
 
+def _read_ros(path: Path, names: Sequence[str]) -> Arrays:
+    library = partial(_library, path=path, extra=ROS_EXTRA)
+    columns, there = ros_logs.joint_columns(path, names, library)
+    return Arrays(_checked(path, names, columns, there))
+
+
 READERS: dict[str, tuple[tuple[str, ...], Callable[[Path, Sequence[str]], Arrays]]] = {
     "matlab": ((".mat",), _read_matlab),
     "json_lines": ((".jsonl", ".ndjson", ".jsonl.gz", ".ndjson.gz"), _read_json_lines),
     "npz": ((".npz",), _read_npz),
     "xlsx": ((".xlsx",), _read_xlsx),
     "hdf5": ((".h5", ".hdf5"), _read_hdf5),
+    **{form: (endings, _read_ros) for form, endings in ros_logs.ENDINGS.items()},
 }
 """The endings of file names and the reader of each format."""

@@ -20,7 +20,7 @@ from pymoo_hdte.units import ORIGINS, UNITS, suggestion, usual_spelling
 
 TEXTS = ("csv", "plain")
 """Formats of text."""
-FORMATS = ("matlab", *TEXTS, "json_lines", "npz", "xlsx", "hdf5")
+FORMATS = ("matlab", *TEXTS, "json_lines", "npz", "xlsx", "hdf5", "rosbag2", "mcap")
 MEASURED = (
     *("time", "angle", "length", "speed", "linear speed", "acceleration", "linear acceleration"),
     *("force", "torque", "current", "voltage", "temperature", "ratio"),

@@ -13,13 +13,14 @@ from pymoo_hdte._interrupts import INTERRUPTED
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.cli.command import MISTAKE, OneLineParser
 from pymoo_hdte.cli.discrepancy import DISCREPANCY
+from pymoo_hdte.cli.export import EXPORT
 from pymoo_hdte.cli.identify import IDENTIFY
 from pymoo_hdte.cli.optimise import OPTIMISE
 from pymoo_hdte.cli.plan import PLAN
 from pymoo_hdte.cli.simulate import SIMULATE
 
-COMMANDS = (OPTIMISE, SIMULATE, IDENTIFY, PLAN, DISCREPANCY)
-"""Commands in the order of the help."""
+COMMANDS = (OPTIMISE, SIMULATE, IDENTIFY, PLAN, DISCREPANCY, EXPORT)
+"""In the order of the help."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -65,9 +66,8 @@ def _parser() -> argparse.ArgumentParser:
         )
         subparser.set_defaults(command=command)
         command.add_arguments(subparser)
-        subparser.add_argument(
-            "--out", type=Path, required=True, metavar="DIR", help="folder for the report"
-        )
+        metavar, words = command.out
+        subparser.add_argument("--out", type=Path, required=True, metavar=metavar, help=words)
         output = subparser.add_mutually_exclusive_group()
         output.add_argument("--json", action="store_true", help="print the result as JSON")
         output.add_argument("--quiet", action="store_true", help="print nothing but errors")

@@ -14,6 +14,7 @@ from pymoo_hdte.checks import real_number
 from pymoo_hdte.effects.effect import Effect, register
 from pymoo_hdte.effects.guess import Guess
 from pymoo_hdte.effects.law import Aperiodic, PortState, Response, Values
+from pymoo_hdte.effects.portable import PRESLIDING, Formula, Lumped
 from pymoo_hdte.effects.smooth_loop import Rise, follow, rise_of, slope_of, state_at, way_to
 from pymoo_hdte.effects.unknowns import Parameter, unknown
 
@@ -123,6 +124,18 @@ class BoucWen(Aperiodic):
     def shortest(self) -> float:
         """The torsion of yield, rad."""
         return self.torsion
+
+    @property
+    def formula(self) -> Formula:
+        """Its equations, with z as a torsion."""
+        size = "min(abs(wound) / torsion, 1) ** exponent"
+        rate = f"speed * (1 - {size} * (share * sign(wound * speed) + 1 - share))"
+        return Formula("force / torsion * wound", {"wound": rate})
+
+    @property
+    def lumped(self) -> Lumped:
+        """Dry friction of the largest force."""
+        return Lumped(level=self.force, missing=PRESLIDING.format(self.torsion))
 
 
 def bouc_wen(force: Parameter, torsion: Parameter, starts: Sequence[tuple[float, ...]]) -> Guess:

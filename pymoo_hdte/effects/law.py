@@ -15,8 +15,10 @@ from typing import ClassVar, Protocol, cast
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import nnls
 
 from pymoo_hdte.checks import real_number
+from pymoo_hdte.effects.portable import Formula, Lumped
 
 Values = NDArray[np.float64]
 
@@ -146,6 +148,16 @@ class Law(Protocol):
         """See `Behaviour`."""
         ...
 
+    @property
+    def formula(self) -> Formula | None:
+        """See `Behaviour`."""
+        ...
+
+    @property
+    def lumped(self) -> Lumped | None:
+        """See `Behaviour`."""
+        ...
+
 
 class Memory(Law, Protocol):
     """A law whose force depends on the previous motion, by inner states that solvers keep.
@@ -231,6 +243,16 @@ class Behaviour:
         """
         return None
 
+    @property
+    def formula(self) -> Formula | None:
+        """Its equations for other tools; None if they are not stated."""
+        return None
+
+    @property
+    def lumped(self) -> Lumped | None:
+        """What a rigid-body engine can hold of it; None for nothing."""
+        return None
+
 
 @dataclass(frozen=True)
 class Aperiodic(Behaviour):
@@ -272,6 +294,25 @@ class Periodic(Behaviour):
     def cosine(self, state: PortState) -> Values:
         """Return the cosine at the port."""
         return np.cos(state.phase(self.order) + self.phase)
+
+
+def closest_line(law: Law, fastest: float) -> Lumped:
+    """Return damper and dry friction whose force is closest to that of a law over speed.
+
+    Parameters
+    ----------
+    law : Law
+        Of the speed alone.
+    fastest : float
+        m/s or rad/s. From rest up to it squares of differences are least; neither part is negative.
+    """
+    speed = np.linspace(0.0, 1.0, 201)[1:]
+    zero = np.zeros_like(speed)
+    state = PortState(zero, fastest * speed, periodic_phase(zero), zero)
+    force = np.broadcast_to(law.respond(state).torque, speed.shape)
+    (level, slope), _ = nnls(np.column_stack([np.ones_like(speed), speed]), force)
+    missing = f"a straight line over speed in its place, the closest one up to {fastest:.4g} SI"
+    return Lumped(damping=slope / fastest, level=level, missing=missing)
 
 
 def periodic_phase(angle: Values | float) -> Callable[[float], Values]:

@@ -9,9 +9,10 @@ import numpy as np
 
 from pymoo_hdte.checks import real_number
 from pymoo_hdte.effects.effect import Effect, register
-from pymoo_hdte.effects.friction import smoothed_sign
+from pymoo_hdte.effects.friction import SIGN, smoothed_sign
 from pymoo_hdte.effects.guess import Guess, Sizes
 from pymoo_hdte.effects.law import Aperiodic, Law, PortState, Response
+from pymoo_hdte.effects.portable import Formula, Lumped
 from pymoo_hdte.effects.unknowns import starts_along_each, unknown
 
 FURTHEST = 20.0
@@ -30,6 +31,16 @@ class ConstantForce(Aperiodic):
     def respond(self, state: PortState) -> Response:
         """Return force and tangents."""
         return Response(np.full_like(state.position, self.force))
+
+    @property
+    def formula(self) -> Formula:
+        """Its equations."""
+        return Formula("force")
+
+    @property
+    def lumped(self) -> Lumped:
+        """The force."""
+        return Lumped(force=self.force)
 
 
 def _offset(sizes: Sizes) -> list[Guess]:
@@ -75,6 +86,11 @@ class DirectionalFriction(Aperiodic):
         force = self.level + self.viscous * size
         return Response(force * moving, damping=force * slope + self.viscous * sign * moving)
 
+    @property
+    def formula(self) -> Formula:
+        """Its equations."""
+        return Formula(f"(level + viscous * abs(speed)) * {SIGN} ** 2")
+
 
 def _one_sided(sizes: Sizes) -> list[Guess]:
     """Guess friction that differs between the directions, if the port moves in both."""
@@ -114,6 +130,16 @@ class LinearSpring(Aperiodic):
     def respond(self, state: PortState) -> Response:
         """Return force and tangents."""
         return Response(self.coefficient * state.position, self.coefficient)
+
+    @property
+    def formula(self) -> Formula:
+        """Its equations."""
+        return Formula("coefficient * position")
+
+    @property
+    def lumped(self) -> Lumped:
+        """The spring."""
+        return Lumped(stiffness=self.coefficient)
 
 
 def _spring(sizes: Sizes) -> list[Guess]:
@@ -175,6 +201,16 @@ class LinearDamper(Aperiodic):
     def respond(self, state: PortState) -> Response:
         """Return force and tangents."""
         return Response(self.coefficient * state.speed, damping=self.coefficient)
+
+    @property
+    def formula(self) -> Formula:
+        """Its equations."""
+        return Formula("coefficient * speed")
+
+    @property
+    def lumped(self) -> Lumped:
+        """The damper."""
+        return Lumped(damping=self.coefficient)
 
 
 def _damper(sizes: Sizes) -> list[Guess]:

@@ -10,7 +10,8 @@ import numpy as np
 from pymoo_hdte.checks import real_number
 from pymoo_hdte.effects.effect import Effect, register
 from pymoo_hdte.effects.guess import Guess
-from pymoo_hdte.effects.law import Aperiodic, Law, PortState, Response
+from pymoo_hdte.effects.law import Aperiodic, Law, PortState, Response, closest_line
+from pymoo_hdte.effects.portable import Formula, Lumped
 from pymoo_hdte.effects.unknowns import Parameter, unknown
 
 
@@ -50,6 +51,16 @@ class ShearThinningDrag(Aperiodic):
         size = self.level / np.arcsinh(self.reference / self.thinning)
         slope = size / self.thinning / np.hypot(1.0, share)
         return Response(size * np.arcsinh(share), damping=slope)
+
+    @property
+    def formula(self) -> Formula:
+        """Its equations."""
+        return Formula("level * asinh(speed / thinning) / asinh(reference / thinning)")
+
+    @property
+    def lumped(self) -> Lumped:
+        """A straight line up to the reference."""
+        return closest_line(self, self.reference)
 
 
 register(

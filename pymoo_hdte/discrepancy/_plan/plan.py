@@ -62,7 +62,7 @@ class Plan:
     separated : tuple of Chance
         Chance to separate each detected effect from each rival.
     wanted : float
-        Wanted power.
+        Probability that was requested as power.
 
     Examples
     --------

@@ -55,7 +55,7 @@ def write_machine_report(
         If it cannot be written.
     """
     FOLDER.check(Path(out))
-    verdict, unit_of = finding.verdict, lambda name: finding.data.units.get(name, "1")
+    verdict, unit_of = finding.verdict, lambda name: finding.data.model.units.get(name, "1")
     document = {
         "schema_version": SCHEMA_VERSION,
         "campaign": finding.title,
@@ -71,7 +71,7 @@ def write_machine_report(
             "degrees_of_freedom": verdict.degrees_of_freedom,
             "parameters": base_parameters(verdict.accepted, verdict.rules, unit_of),
         },
-        **with_believed_effects([table_of(effect) for effect in finding.data.known]),
+        **with_believed_effects([table_of(effect) for effect in finding.data.model.known]),
         "location": location.summary(),
         "held_out": {"reason": "no record was held out"} if errors is None else errors.as_dict(),
         "gap_sentence": error_sentence(finding, errors),
