@@ -80,7 +80,7 @@ def test_a_full_campaign_has_no_limits(campaign):
 
 
 CASES = {
-    "held out": (lambda c: said(replace(c, running=c.train)), "nothing is proven"),
+    "held out": (lambda c: said(replace(c, running=c.train)), "not validated"),
     "speed": (lambda c: said(c, trained(c, lambda r: r.input_speed > 200.0)), "one speed"),
     "load": (lambda c: said(c, trained(c, lambda r: r.load_torque == 40.0)), "one load"),
     "no load": (lambda c: said(c, trained(c, lambda r: r.load_torque == 0.0)), "one load"),
@@ -209,4 +209,4 @@ def test_a_line_above_all_that_is_looked_at_is_not_called_unresolved(campaign):
     lines = {"error_orders": (1.0, 2.0, 14.5), "error_amplitudes": (1e-5, 1e-5, 1e-5)}
     believed = replace(campaign.believed, **lines)
     (sentence,) = said(replace(campaign, believed=believed))
-    assert sentence.startswith("The believed static error of order 14.5 is not looked at")
+    assert sentence.startswith("The nominal static error of order 14.5 is not compared")
