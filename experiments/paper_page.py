@@ -57,29 +57,29 @@ def page() -> str:
     return environment.get_template("paper.md").render(values())
 
 
-def in_three_sentences() -> tuple[str, str, str]:
-    """Return what README and ``paper.md`` say about the paper."""
+def in_short() -> tuple[str, ...]:
+    """Return the sentences of README and ``paper.md`` about the paper."""
     printed, drive = published.printed_equations(), simplest()
     low, high = (printed[reading].dte for reading in published.READINGS)
     scores, best = committed_scores(), _best_of_the_ladder()
     law, free = (totals_of(scores, velocity) for velocity in (AS_PRINTED, FIRST_STEP))
     return (
-        f"The paper contradicts itself where no model is needed: by its own validation figures, "
-        f"prototype {ranking.HIGHEST} must be predicted "
-        f"{significant(ranking.bounds().least_lead, 3)} arcsec above prototype {ranking.LOWEST}, "
-        f"whose static error is {significant(ranking.excess(), 2)} arcsec larger.",
+        f"The paper contradicts itself: by its validation figures, prototype {ranking.HIGHEST} "
+        f"must be predicted {significant(ranking.bounds().least_lead, 3)} arcsec above prototype "
+        f"{ranking.LOWEST}, whose static error is {significant(ranking.excess(), 2)} arcsec "
+        "larger.",
         f"Its equations as printed give a transmission error of {low:.0f} or {high:.0f} arcsec, "
-        f"depending on how the static error is read, where it has "
-        f"{TABLE_8['initial'].mean_arcsec:.0f}; a rigid drive of which "
-        f"{significant(100.0 * drive.torsion_share, 1)} % of the torsion is read as error, with "
-        f"{N_PARAMETERS} parameters, has as good a BIC as our model with {best.n_parameters}, "
-        f"though a coarser fit.",
+        "depending on how the static error is read; the paper states "
+        f"{TABLE_8['initial'].mean_arcsec:.0f}.",
+        f"A rigid drive that reads {significant(100.0 * drive.torsion_share, 1)} % of the torsion "
+        f"as error has {N_PARAMETERS} parameters and as good a BIC as our model with "
+        f"{best.n_parameters}, though it fits less closely.",
         f"At the stated budget, with the paper's samples, "
-        f"{who_finds(scores, Contested(MODEL, COMMON, AS_PRINTED))}, so that the advantage over "
-        f"NSGA-II does not come out; below 100 particles AMP-MOPSO is ahead of MOPSO in "
-        f"{law.ahead['MOPSO']} of {law.cells} settings and of NSGA-II in {law.ahead['NSGA-II']}, "
-        f"but in {free.ahead['MOPSO']} and {free.ahead['NSGA-II']} under another law of first "
-        f"velocities.",
+        f"{who_finds(scores, Contested(MODEL, COMMON, AS_PRINTED))}.",
+        "AMP-MOPSO therefore shows no advantage over NSGA-II there.",
+        f"Below 100 particles it is ahead of MOPSO in {law.ahead['MOPSO']} of {law.cells} settings "
+        f"and of NSGA-II in {law.ahead['NSGA-II']}; under another law of first velocities in "
+        f"{free.ahead['MOPSO']} and {free.ahead['NSGA-II']}.",
     )
 
 

@@ -21,9 +21,9 @@ _DETAILS = """example:
   pymoo-hdte discrepancy campaigns/rig-01 --believed reports/rig-01/revised_model.toml --out again
   pymoo-hdte discrepancy campaigns/rig-01 --effects my_effects.py --out reports/mine
 
-The campaign is a folder with campaign.toml and its records, of a harmonic drive, or with rig.toml
-and its records, of any other mechanism. DIR gets verdict.json, revised_model.toml and report.html;
-an earlier report there is replaced, anything else refused.
+CAMPAIGN holds records and campaign.toml (a harmonic drive) or rig.toml (any other mechanism).
+DIR gets verdict.json, revised_model.toml and report.html; an earlier report there is replaced,
+anything else refused.
 Exit codes: 0 a verdict was reached, whatever it is; 2 the input is at fault."""
 
 
@@ -38,7 +38,7 @@ def _add_arguments(parser: argparse.ArgumentParser) -> None:
         "--believed",
         type=Path,
         metavar="MODEL.toml",
-        help="model to be questioned instead of what the campaign believes: a revised_model.toml",
+        help="nominal model in place of the campaign's own, such as a revised_model.toml",
     )
     parser.add_argument(
         "--sheet",
@@ -50,7 +50,7 @@ def _add_arguments(parser: argparse.ArgumentParser) -> None:
         OPTION,
         type=Path,
         metavar="FILE.py",
-        help="Python file with effects of your own, which may be missing, too; the file is run",
+        help="Python file with effects of your own to look for as well; the file is run",
     )
 
 
@@ -81,7 +81,7 @@ def _analysed(options: argparse.Namespace, believed: ModelFiles, say: Say) -> di
         analysis = analyse(measured, progress=simulated)
     say("locating the misfit")
     analysis.locate()
-    say("proving it on the records that were held out")
+    say("validating it on the held-out records")
     analysis.validate()
     say("choosing the next test and writing the report")
     document = analysis.report(options.out)
@@ -132,7 +132,7 @@ def _summary(document: dict[str, Any], out: Path) -> str:
         document["sentence"],
         *([relevance["sentence"]] if (relevance := document.get("relevance")) else []),
         document["location"]["sentence"],
-        f"On records kept out: {document['gap_sentence']}",
+        f"Validation: {document['gap_sentence']}",
         *document["limits"],
         *_remarks(document.get("record_remarks", [])),
         *torsion["limits"],
@@ -159,7 +159,7 @@ def _name(effect: dict[str, Any]) -> str:
 
 DISCREPANCY = Command(
     "discrepancy",
-    "find where model and measurement disagree, name the effect and prove it",
+    "find what a model lacks, and validate the corrected model",
     _DETAILS,
     _add_arguments,
     _run,

@@ -191,7 +191,7 @@ def headline(identification: Identification) -> str:
 
 
 def limits(identification: Identification, sheet: DataSheet | None) -> list[str]:
-    """Say what these records do not determine."""
+    """Return what these records leave open, in sentences."""
     said = [
         f"{parameter.name} came out at {number(parameter.value, 3)}: damping and stiffness are "
         "positive, so noise or a zero error outweighs it, and the data sheet keeps its value."
@@ -205,16 +205,15 @@ def limits(identification: Identification, sheet: DataSheet | None) -> list[str]
         error = max(fit.slope_error for fit in parameter.fits.values())
         if parameter.series is not None and parameter.series.between.std < _TOO_EQUAL * error:
             said.append(
-                f"The prototypes agree on {parameter.name} far better than one record can tell "
+                f"The prototypes agree on {parameter.name} far better than one record determines "
                 "it: are they copies of one another?"
             )
     if identification.errors is not None:
         said += identification.errors.advice()
         if sheet is not None:
             said.append(
-                "The errors go into the list of the data sheet. Its theta_s, and the DTE with it, "
-                "stay as they were; the Python function sample_static_error tells what theta_s "
-                "would be."
+                "The errors are listed in the data sheet; its theta_s and DTE stay the same. The "
+                "Python function sample_static_error computes theta_s from them."
             )
         samples = zip(identification.errors.symbols, identification.errors.samples, strict=True)
         negative = [symbol for symbol, sample in samples if sample.mean < 0.0]

@@ -147,14 +147,14 @@ def sentences(study: DesignStudy) -> list[str]:
         return [
             f"No design is recommended: front and drive model {_apart(study)}, "
             f"{100.0 * AGREEMENT:g} % are allowed.",
-            f"What is said of designs below is not to be built upon{_way_out(study)}.",
+            f"Do not build the designs below{_way_out(study)}.",
             _agreement(study),
         ]
     return [
         f"Take {_design_in_words(study)}.",
         _worth(study),
         f"Front and drive model agree to {100.0 * study.disagreement:.1f} % of the front's width "
-        f"({100.0 * AGREEMENT:g} % are allowed). {_agreement(study)}",
+        f"({100.0 * AGREEMENT:g} % allowed). {_agreement(study)}",
     ]
 
 
@@ -209,17 +209,17 @@ def _agreement(study: DesignStudy) -> str:
     ]
     if np.isfinite(search.difference):
         parts.append(
-            f"The last of {study.evaluated} designs came out within "
-            f"{100.0 * search.difference:.1f} % of what had been interpolated for it."
+            f"The last of {study.evaluated} designs is within {100.0 * search.difference:.1f} % of "
+            "its interpolated value."
         )
     if np.isfinite(study.quadrature):
         parts.append(
-            f"Computed again on {SETS * DRIVES} other drives each, {len(study.checks)} designs "
-            f"differ by at most {100.0 * study.quadrature:.1f} %, two standard errors included."
+            f"On {SETS * DRIVES} other drives {len(study.checks)} designs differ by at most "
+            f"{100.0 * study.quadrature:.1f} %, two standard errors included."
         )
     parts.append(
-        f"Percentages are of the front's width, {mean} arcsec in the mean and {std} in the "
-        f"deviation, taken as {100.0 * HARDLY_WORTH:g} % of the least value where it is less."
+        f"Percentages are of the front's width: {mean} arcsec in the mean, {std} in the standard "
+        f"deviation, or {100.0 * HARDLY_WORTH:g} % of the least value if that is more."
     )
     return " ".join(parts)
 
@@ -242,16 +242,17 @@ def limits(study: DesignStudy, notes: Sequence[str]) -> list[str]:
             f"{study.problem.without_steady_state(lost[0])}."
         )
     if study.uninfluential:
+        names = " and ".join(study.uninfluential)
         remarks.append(
-            f"No value of {' or '.join(study.uninfluential)} within the box moves mean or standard "
-            f"deviation by {100.0 * LITTLE:g} %: what is said of it carries no information."
+            f"{names} {'have' if len(study.uninfluential) > 1 else 'has'} no influence "
+            f"(below {100.0 * LITTLE:g} %)."
         )
     shares = {what: gain.share for what, gain in study.gains.items()}
     if max(shares.values()) < HARDLY_WORTH:
         changes = ", ".join(f"{what} {change(-100.0 * share)}" for what, share in shares.items())
         remarks.append(
             f"Neither falls by {100.0 * HARDLY_WORTH:g} % ({changes}): this model has next to "
-            "nothing to gain by these design variables."
+            "nothing to gain from these design variables."
         )
     return remarks
 

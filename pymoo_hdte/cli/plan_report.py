@@ -31,7 +31,7 @@ def write_plan(plan: Plan, model: str, out: Path) -> dict[str, Any]:
     separated = _share(apart, len(content["pair"]), "pair of effects", "pairs of effects")
     sentences = [
         f"{fitted} tests to fit and {held_out} to hold out: each with a chance of at least "
-        f"{100.0 * plan.wanted:g} %, they show {shown} and tell {separated} apart."
+        f"{100.0 * plan.wanted:g} %, they show {shown} and separate {separated}."
     ]
     document = heading("plan", sentences, plan.missed) | {"model": model} | content
     del document["not_reached"]

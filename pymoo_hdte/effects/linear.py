@@ -181,7 +181,7 @@ register(
         LinearSpring,
         (),
         {"coefficient": "stiffness"},
-        "There is a spring at the {port} where none is believed.",
+        "There is a spring at the {port} that the nominal model lacks.",
         _spring,
         of_fit={"force": "torque"},
         behind_gear=True,
@@ -224,7 +224,7 @@ register(
         LinearDamper,
         (),
         {"coefficient": "damping"},
-        "There is a friction that grows with speed at the {port} where none is believed.",
+        "There is viscous friction at the {port} that the nominal model lacks.",
         _damper,
         slows=True,
     )

@@ -101,13 +101,13 @@ def _delay(finding: JointFinding) -> list[str]:
     whole = fitted_values(finding.torque.mechanism, finding.torque.accepted)
     damping = sum(value for name, value in whole.items() if name.startswith("damping of "))
     text = (
-        f"A torsion in proportion to the speed may be friction ahead of the gear, "
+        f"A torsion proportional to the speed may be friction ahead of the gear, "
         f"{levels[0]:.3g} N.m.s/rad, or the load's encoder is read {late:.2g} ms after the "
-        "motor's: the angles do not tell."
+        "motor's: the angles cannot separate these."
     )
     if 0.0 < damping < levels[0]:
         text += (
-            f" The viscous friction of the whole joint is {damping:.3g} only, so that it cannot "
+            f" The viscous friction of the whole joint is only {damping:.3g}, so it cannot "
             "all be friction."
         )
     return [text]
@@ -202,7 +202,7 @@ def wiring_caveats(finding: JointFinding) -> list[str]:
     (drag, spring, *_), share = _explained(torque, [speed], [twist, acceleration, ones])
     if drag < 0.0 < spring and share >= rules.explained_share:
         return [
-            "What is left is in proportion to the speed, and drives, as no friction does: the "
+            "The residual is proportional to the speed and drives, as no friction does: the "
             f"encoder of {motor} may be read {-1e3 * drag / spring:.2g} ms after that of {load}."
         ]
     return []

@@ -257,14 +257,13 @@ def _missed(chances: Sequence[Chance], wanted: float) -> str:
     effect = chances[0].effect
     rivals = ", nor from ".join(chance.rival for chance in chances)
     if max(chance.possible for chance in chances) < wanted:
-        outcome = f"tells {effect} from {rivals}" if rivals else f"shows {effect}"
+        outcome = f"separates {effect} from {rivals}" if rivals else f"shows {effect}"
         best = max(chance.possible for chance in chances)
         most = f"the chance is {chance_words(best)} at best"
         return f"No test within the limits {outcome} at this size: {most}."
     least = min(chance.power for chance in chances)
-    outcome = (
-        f"tell {effect} from {rivals.replace(', nor', ' and')}" if rivals else f"show {effect}"
-    )
+    separate = f"separate {effect} from {rivals.replace(', nor', ' and')}"
+    outcome = separate if rivals else f"show {effect}"
     return (
         f"To {outcome} at this size takes more records than the limits allow: these give a chance "
         f"of {chance_words(least)}."

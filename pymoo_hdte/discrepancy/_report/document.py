@@ -58,7 +58,7 @@ def verdict_document(
     """
     verdict = finding.verdict
     matters, orders = relevance(finding, location), finding.campaign.believed.error_orders
-    absent = {"reason": "no held-out record can be predicted, so that nothing can be proved"}
+    absent = {"reason": "no held-out record can be predicted, so the correction is not validated"}
     return {
         "schema_version": SCHEMA_VERSION,
         "campaign": finding.campaign.title,
@@ -113,14 +113,14 @@ def sentence(verdict: Verdict, error_orders: Sequence[float] = ()) -> str:
     """Return the verdict in words; lines of the static error of a drive by their orders."""
     chosen = verdict.chosen
     if verdict.status == "adequate":
-        return "Nothing is missing: the believed drive explains the records within its tolerances."
+        return "Nothing is missing: the nominal drive explains the records within its tolerances."
     if chosen is None:
-        return "Something is missing that no known effect explains."
+        return "Something is missing that no effect in the library explains."
     what = what_is_missing(chosen.candidates)
     if not chosen.listed:
-        return f"Something is missing that is none of the known effects. {what}"
+        return f"What is missing is outside the library. {what}"
     if verdict.status == "unlisted":
-        missing = "Something is missing that no known effect explains"
+        missing = "Something is missing that no effect in the library explains"
         if not verdict.comes_near:
             return f"{missing}, not even half of it."
         return f"{missing}. The nearest is {labels_by_order(chosen.label, error_orders)}."
@@ -128,7 +128,7 @@ def sentence(verdict: Verdict, error_orders: Sequence[float] = ()) -> str:
         what = f"{what} {_or_else([chosen, *verdict.equivalent], error_orders)}"
     if verdict.reasons:
         against = "; ".join(caveats(verdict, error_orders))
-        return f"{what} That is not all, or not quite right: {against}."
+        return f"{what} With caveats: {against}."
     return what
 
 
@@ -139,14 +139,13 @@ def _or_else(sets: Sequence[Hypothesis], error_orders: Sequence[float]) -> str:
     """
     labels = labels_apart([hypothesis.candidates for hypothesis in sets])
     chosen, *others = (labels_by_order(label, error_orders) for label in labels)
-    place = "" if labels[0] == sets[0].label else f", in place of {chosen}"
     whole = label_of(sets[0].candidates)
     alone = [
-        " alone, which leaves doubts" * (label_of(hypothesis.candidates) < whole)
+        " alone, with caveats" * (label_of(hypothesis.candidates) < whole)
         for hypothesis in sets[1:]
     ]
-    listed = "; or ".join(label + how for label, how in zip(others, alone, strict=True))
-    return f"Or, which these data cannot tell from it{place}: {listed}."
+    listed = " or from ".join(label + how for label, how in zip(others, alone, strict=True))
+    return f"These data cannot distinguish {chosen} from {listed}."
 
 
 def residual_of_parts(finding: DriveFinding) -> dict[str, dict[str, float]]:

@@ -23,7 +23,6 @@ from pymoo_hdte.discrepancy._report.mechanism_figures import (
     misfit_over_motion,
     overlay,
 )
-from pymoo_hdte.discrepancy._report.tables import STATUSES
 from pymoo_hdte.discrepancy._report.torsion import torsion_document, torsion_picture
 from pymoo_hdte.discrepancy._verdicts.joint import JointFinding, revised_joint
 from pymoo_hdte.discrepancy._verdicts.mechanism_finding import MechanismFinding
@@ -105,7 +104,6 @@ def _page(
         "pymoo_hdte.discrepancy._report",
         "mechanism.html.j2",
         document=document,
-        status=STATUSES[document["status"]],
         torsion=document.get("torsion"),
         torsion_rows=_effect_rows(document["torsion"]["effects"]) if joint else [],
         rows=rows,
@@ -133,14 +131,12 @@ def validation_sentence(
 ) -> str:
     """Return in words the effect of the correction on records that were not fitted."""
     if not errors:
-        return "No record was held out, so that nothing can be proved."
+        return "No record was held out, so the correction is not validated."
     if not finding.accepted.candidates:
         words = [
             f"{error.quantity} by {error.kind}: {error.after:.3g} {error.unit}" for error in errors
         ]
-        return (
-            f"Nothing was added; the model is off by {', '.join(words)}. {extent_sentence(errors)}"
-        )
+        return f"Nothing was added. Errors: {', '.join(words)}. {extent_sentence(errors)}"
     words = []
     for kind in ("simulation", "balance"):
         for quantity in dict.fromkeys(error.quantity for error in errors if error.kind == kind):
@@ -153,9 +149,7 @@ def validation_sentence(
             words.append(
                 f"{quantity} by {kind} {change} from {number(before)} to {number(after)} {unit}"
             )
-    return (
-        f"Root mean square errors, before and after: {'; '.join(words)}. {extent_sentence(errors)}"
-    )
+    return f"Root mean square errors: {'; '.join(words)}. {extent_sentence(errors)}"
 
 
 def extent_sentence(errors: Sequence[MechanismPredictionError]) -> str:

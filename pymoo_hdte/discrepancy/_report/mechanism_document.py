@@ -66,7 +66,7 @@ def mechanism_verdict_document(
         "limits": limits(finding),
         "record_remarks": record_remarks(finding),
         "held_out": [error.as_dict() for error in errors]
-        or {"reason": "no record was held out, so that nothing can be proved"},
+        or {"reason": "no record was held out, so the correction is not validated"},
         "next_experiment": test.as_dict(),
         "versions": {
             "python": platform.python_version(),
@@ -79,7 +79,7 @@ def _sentence(finding: MechanismFinding) -> str:
     verdict, beyond = finding.verdict, finding.ripples.sentence
     if verdict.status == "adequate":
         return (
-            "Nothing is missing: the believed mechanism explains the records within its tolerances."
+            "Nothing is missing: the nominal mechanism explains the records within its tolerances."
         )
     if verdict.status == "named" and verdict.chosen is None:
         return beyond
@@ -110,16 +110,16 @@ def unexplained(finding: MechanismFinding) -> dict[str, Any]:
     after, noise = finding.unexplained, finding.sensor_noise
     size = ", ".join(
         f"{size:.3g} {unit_of(finding.mechanism, name)} in the {finding.data.what(name)} "
-        f"({size / max(floor, 1e-300):.2g} times the sensors' noise)"
+        f"({size / max(floor, 1e-300):.2g} times the sensor noise)"
         for name, size, floor in zip(finding.data.names, after, noise, strict=True)
     )
     named = bool(finding.accepted.candidates)
     removed = finding.share_removed if named else 0.0
-    words = f"The model leaves {size}."
+    words = f"The residual is {size}."
     if named:
-        residual = "What is left is" if np.all(after <= noise) else "What nobody explains is"
+        residual = "The residual is" if np.all(after <= noise) else "The unexplained residual is"
         words = (
-            f"It removes {percent(removed)} of the power of the misfit beyond the sensors' "
+            f"The correction removes {percent(removed)} of the misfit's power beyond sensor "
             f"noise. {residual} {size}."
         )
     return {
@@ -159,8 +159,8 @@ def band(finding: MechanismFinding) -> dict[str, Any]:
         "share_of_motion_beyond": motion,
         "share_of_force_beyond": force,
         "sentence": f"Model and records are compared up to {cutoff:.3g} Hz; beyond lie "
-        f"{power(motion)} of the motion's power and {power(force)} of the forces'"
-        f"{', in which only ripple is looked for' if much else ''}.",
+        f"{power(motion)} of the motion's power and {power(force)} of the forces' power"
+        f"{', where only ripple is looked for' if much else ''}.",
     }
 
 
@@ -174,17 +174,15 @@ def limits(finding: MechanismFinding) -> list[str]:
     ]
     sentences += sentences_on_rest(finding)
     sentences += [
-        f"What force a unit of {actuator.name} makes is not known: masses, springs, dampers and "
-        f"forces are told in units of {actuator.name}. Their ratios and the kind of effect are "
-        "determined, their sizes are not."
+        f"The force per unit of {actuator.name} is not known, so masses, springs, dampers and "
+        f"forces are in units of {actuator.name}: their ratios are determined, their absolute "
+        "sizes are not."
         for actuator in finding.mechanism.inputs
         if not actuator.scaled
     ]
     sentences += _not_validated(finding)
     if not any(record.role == "held_out" for record in finding.records):
-        sentences.append(
-            "No record was held out: the correction is not proved where it was not made."
-        )
+        sentences.append("No record was held out: the correction is not validated.")
     if any(finding.accepted.bound_sides[: len(finding.data.base)]):
         names = [n for n in finding.accepted.at_bounds if n in finding.mechanism.quantities]
         if names:
@@ -202,7 +200,7 @@ def _not_validated(finding: MechanismFinding) -> list[str]:
         before, after, _ = (
             np.mean([record.powers(name) for record in finding.simulated], axis=0) ** 0.5
         )
-        sizes.append(f"{name} by simulation {before:.3g} without it, {after:.3g} with it")
+        sizes.append(f"{name} by simulation, {before:.3g} without it and {after:.3g} with it")
     return [
         f"{in_words(chosen.label)} would explain the records that were fitted, but "
         f"{in_a_sentence(Reason(NOT_VALIDATED))}: {', '.join(sizes)} (root mean square, SI)."

@@ -63,7 +63,7 @@ def misfit_over_motion(finding: MechanismFinding) -> Figure:
 def misfit_over_frequency(finding: MechanismFinding) -> Figure:
     """Draw the amplitude density of the residual, beside that of the sensors' noise."""
     names = finding.data.names
-    figure = Figure(figsize=(4.2 * max(len(names), 1), 2.8), layout="constrained")
+    figure = Figure(figsize=(max(4.2 * len(names), 6.4), 3.0), layout="constrained")
     axes = figure.subplots(1, len(names), squeeze=False)[0]
     for part, name in enumerate(names):
         rows = finding.data.rows_of_parts()[part]
@@ -115,7 +115,8 @@ def overlay(finding: MechanismFinding, error: MechanismPredictionError) -> Figur
     upper.plot(time, error.predicted_before[stride], "--", color=BEFORE, label="before")
     upper.plot(time, error.predicted_after[stride], "-", color=AFTER, lw=1.0, label="after")
     upper.set_ylabel(f"{error.quantity} [{error.unit}]")
-    upper.legend(frameon=False, ncols=3)
+    # Above the axes, where it hides no curve.
+    upper.legend(frameon=False, ncols=3, loc="lower left", bbox_to_anchor=(0.0, 1.0))
     lower.plot(time, (error.measured - error.predicted_before)[stride], "--", color=BEFORE)
     lower.plot(time, (error.measured - error.predicted_after)[stride], "-", color=AFTER)
     lower.set(xlabel="time [s]", ylabel="difference")
@@ -141,7 +142,7 @@ def errors_figure(errors: Sequence[MechanismPredictionError]) -> Figure:
         range(len(errors)), [f"{error.record}: {error.quantity}, {error.kind}" for error in errors]
     )
     axis.invert_yaxis()
-    axis.set(xlabel="gap over the gap before")
+    axis.set(xlabel="prediction error / error before")
     axis.legend(frameon=False, fontsize=8, ncols=3, loc="lower left", bbox_to_anchor=(0.0, 1.0))
     _plain(axis)
     return figure

@@ -32,7 +32,6 @@ from pymoo_hdte.discrepancy._report.figures import (
 from pymoo_hdte.discrepancy._report.folder import FOLDER
 from pymoo_hdte.discrepancy._report.optimum import OptimumShift
 from pymoo_hdte.discrepancy._report.tables import (
-    STATUSES,
     effect_rows,
     fault_rows,
     hypothesis_rows,
@@ -166,7 +165,6 @@ def _page(
         document=document,
         location=location,
         validation=validation,
-        status=STATUSES[finding.verdict.status],
         effects=effect_rows(document["effects"], orders),
         certainty=how_sure(finding),
         next_test=document["next_experiment"]["description"],
@@ -191,30 +189,27 @@ _SHOWN = 3
 
 
 def validation_sentence(finding: DriveFinding, validation: Validation | None) -> str:
-    """Return how much the prediction error shrank on held-out records, in words."""
+    """Return how much the prediction error on held-out records shrank, in words."""
     if validation is None:
-        return "No record was held out, so nothing can be said about conditions not fitted."
+        return "No record was held out, so the correction is not validated."
     leading = validation.channels[validation.leading]
-    records = (
-        f"{len(validation.records)} held-out record{'s' if len(validation.records) > 1 else ''}"
-    )
+    plural = "s" if len(validation.records) > 1 else ""
+    records = f"{len(validation.records)} held-out record{plural}"
     where = f"{records}, {validation.leading.replace('_', ' ')}"
-    noise = f"noise alone {number(leading.noise_floor)} {leading.unit}"
+    noise = f"(noise alone: {number(leading.noise_floor)})"
     if not finding.verdict.accepted.candidates:
-        size = f"{number(leading.before)} {leading.unit}"
-        return f"Nothing was added. On {where}: off by {size}, {noise}."
-    sizes = f"{number(leading.before)} before, {number(leading.after)} after"
-    words = f"On {where}: off by {sizes}, {noise}"
+        size = f"{number(leading.before)} {leading.unit} {noise}"
+        return f"Nothing was added. On {where}: prediction error {size}."
+    words = f"On {where}: prediction error {number(leading.before)} {leading.unit} before, "
+    words += f"{number(leading.after)} after {noise}"
     if leading.shrinkage is not None:
-        words += (
-            f"; {percent(min(leading.shrinkage, 1.0))} of what the noise does not explain is gone"
-        )
+        words += f"; the correction removes {percent(min(leading.shrinkage, 1.0))} of the excess"
     error = validation.channels["transmission_error"]
     if error is not leading:
         words += (
-            f". Transmission error: {number(error.before)} before, {number(error.after)} after, "
+            f". Transmission error: {number(error.before)} {error.unit} before, "
+            f"{number(error.after)} after (noise alone: {number(error.noise_floor)})"
         )
-        words += f"noise alone {number(error.noise_floor)} {error.unit}"
     return f"{words}.{_worse(validation)}"
 
 

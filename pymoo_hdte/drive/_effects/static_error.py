@@ -148,7 +148,7 @@ register(
         PeriodicTorque,
         ("mesh",),
         {"order": "", "amplitude": "angle", "phase": "angle"},
-        "A line of the static error at order {order} that the model does not hold.",
+        "A line of the static error at order {order} that the model lacks.",
         _lines,
         change=KinematicErrorLine,
         exact=True,
