@@ -13,7 +13,7 @@ from typing import Any
 
 from experiments.runner.provenance import environment, source_fingerprint
 from experiments.runner.registry import Context
-from pymoo_hdte._io.text_table import csv_text, read_text_table
+from pymoo_hdte._io.csv_table import csv_text, read_text_table
 
 DATA = Path(__file__).parents[1] / "data"
 _ORIGIN = "# {"

@@ -21,7 +21,7 @@ from experiments.published_values import TABLE_7
 from experiments.runner.campaign import Campaign
 from experiments.runner.committed import read_rows, rounded, table_with_origin
 from experiments.runner.registry import Context
-from pymoo_hdte._io.text_table import csv_text
+from pymoo_hdte._io.csv_table import csv_text
 
 NAME = "anytime"
 OF_TABLE_7 = tuple(TABLE_7)

@@ -15,7 +15,7 @@ from experiments.studies.blind.cases import Case
 from experiments.studies.blind.codes import ERROR, NAMES, PORTS, STATUSES, word, words_of_set
 from experiments.studies.blind.outcome import Outcome
 from experiments.studies.blind.scoring import NUMBERS, PARTS, PLACES, RIVALS
-from pymoo_hdte._io.text_table import csv_text
+from pymoo_hdte._io.csv_table import csv_text
 
 _CASE = ("kind", "number", "truth", "forms", "stress")
 _WORDS = ("status", "probability", "chosen", "equivalents", "members", "truth_in_class", *RIVALS)

@@ -14,7 +14,7 @@ from pathlib import Path
 from experiments.runner.committed import read_rows
 from experiments.runner.result import Cell, Column, Table
 from experiments.studies.blind.outcome import Outcome
-from pymoo_hdte._io.text_table import csv_text
+from pymoo_hdte._io.csv_table import csv_text
 
 RUNS = "blind_runs.csv"
 SINCE = 2305

@@ -28,7 +28,7 @@ from experiments.studies.cards.tables import (
 )
 from experiments.studies.contest.peers_data import MEASURES
 from experiments.studies.contest.problems import CARDS, problem_of
-from pymoo_hdte._io.text_table import csv_text
+from pymoo_hdte._io.csv_table import csv_text
 from pymoo_hdte.problems import RobustDTEGrades, RobustDTETolerance
 from pymoo_hdte.surrogate import TruncatedNormal
 from pymoo_hdte.units import REVOLUTION_PER_MINUTE

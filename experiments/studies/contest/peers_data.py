@@ -25,7 +25,7 @@ from experiments.studies.contest.benchmark_fronts import front_of
 from experiments.studies.contest.job import ContestRun
 from experiments.studies.contest.problems import BENCHMARKS, EVERY
 from experiments.studies.contest.reduced_swarms import EVERYONE
-from pymoo_hdte._io.text_table import csv_text
+from pymoo_hdte._io.csv_table import csv_text
 from pymoo_hdte.algorithms.crowding import least_crowded
 from pymoo_hdte.algorithms.spread import most_spread
 

@@ -45,7 +45,7 @@ from experiments.studies.measured.real_numbers import (
     torsion_errors,
 )
 from experiments.studies.measured.rigs import MEASURED, Study
-from pymoo_hdte._io.text_table import csv_text
+from pymoo_hdte._io.csv_table import csv_text
 from pymoo_hdte.discrepancy._report.tables import STATUSES
 from pymoo_hdte.discrepancy._verdicts.validation_mechanism import prove_measured
 

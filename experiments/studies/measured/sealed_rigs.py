@@ -24,7 +24,7 @@ from experiments.runner.result import Cell, Column, Result, Table
 from experiments.runner.store import TIMES, write_atomically
 from experiments.runner.texts import paragraphs
 from experiments.studies.measured.rigs import MEASURED
-from pymoo_hdte._io.text_table import csv_text
+from pymoo_hdte._io.csv_table import csv_text
 from pymoo_hdte.discrepancy import DriveAnalysis, analyse, read_campaign
 from pymoo_hdte.discrepancy._report.tables import STATUSES as SHOWN
 from pymoo_hdte.discrepancy._report.words import in_a_sentence

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from pymoo_hdte._io import text_table
-from pymoo_hdte._io.text_table import csv_text, read_text_table, write_columns
+from pymoo_hdte._io import csv_table
+from pymoo_hdte._io.csv_table import csv_text, read_text_table, write_columns
 from pymoo_hdte.checks import InvalidInput
 
 FILES = settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=50)
@@ -84,7 +84,7 @@ def test_blocks_of_any_size_give_the_same_rows_and_lines(rows, size, tmp_path):
     path.write_text(csv_text(["one", "two"], rows), encoding="utf-8", newline="")
     whole = read_text_table(path)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(text_table, "BLOCK", size)
+        patch.setattr(csv_table, "BLOCK", size)
         pieces = read_text_table(path)
         assert pieces.texts() == whole.texts()
         assert list(pieces.lines) == list(whole.lines)
@@ -92,7 +92,7 @@ def test_blocks_of_any_size_give_the_same_rows_and_lines(rows, size, tmp_path):
 
 @pytest.mark.parametrize("size", [1, 7, 1000])
 def test_a_fault_has_its_line_in_blocks_of_any_size(size, tmp_path, monkeypatch):
-    monkeypatch.setattr(text_table, "BLOCK", size)
+    monkeypatch.setattr(csv_table, "BLOCK", size)
     path = tmp_path / "record.csv"
     for text, words in {
         b"a,b\n1,2\n3,4\n5,x\n": "line 4: b is 'x', allowed: a finite number",
