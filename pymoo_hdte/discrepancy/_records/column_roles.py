@@ -18,6 +18,7 @@ from scipy.ndimage import uniform_filter1d
 from pymoo_hdte._io.layout import CHANNEL_UNITS, COUNTS
 from pymoo_hdte._io.unstated import UnstatedTable
 from pymoo_hdte.discrepancy._records.column_titles import TitleHint, read_title
+from pymoo_hdte.mechanism.motion import noise_of
 from pymoo_hdte.units import UNITS
 
 Name = str | int
@@ -37,8 +38,14 @@ _SURE_DERIVATIVE = 0.999
 """The same, against what titles say."""
 _SAME = 0.9999
 """Share from which two columns are one signal, or two encoders of a drive."""
-_COMPUTED = 1.0 - 1e-9
+_COMPUTED = 1.0 - 1e-10
 """Share from which one column was computed from another: no two sensors agree so well."""
+_ALIKE = 1.0 - 1e-5
+"""The same for forces, which are noisier."""
+_AS_GOOD = 0.02
+"""Share of a force by which balances count as equally good."""
+_CLOSE = 0.4
+"""Of scores, and of shares, up to which two forces may be what was wanted and what was measured."""
 _FINITE = 0.9
 """Least share of numbers in a column."""
 _COUNTED = 1000.0
@@ -222,10 +229,11 @@ class Log:
                 length = len(next(iter(one.values())))
                 if length < _ROWS_PER_WIDTH * width:
                     continue
-                moments = self._moments(index)
+                # Rows may be uneven: the mean of a signal belongs to the mean of its times.
+                moments = _averaged(self._moments(index), width)
                 inside = slice(2 * width, length - 2 * width, max(1, rows // _COMPARED))
                 for name in self.signals:
-                    level = uniform_filter1d(uniform_filter1d(one[name], width), width)
+                    level = _averaged(one[name], width)
                     rate = np.gradient(level, moments)
                     second = np.gradient(rate, moments)
                     parts.setdefault(name, []).append((level[inside], rate[inside], second[inside]))
@@ -236,26 +244,59 @@ class Log:
                 }
         return found
 
+    @cached_property
+    def _shares(self) -> dict[str, tuple[Values, Values]]:
+        """Best share of each column (second index) that each other explains, with the slope.
+
+        By ``level``, or ``rate`` for its derivative.
+        """
+        count = len(self.signals)
+        found = {}
+        for index, kind in enumerate(("level", "rate")):
+            best, slopes = np.zeros((count, count)), np.zeros((count, count))
+            for one in self._smoothed.values():
+                x = np.array([one[name][index] for name in self.signals])
+                y = np.array([one[name][0] for name in self.signals])
+                x, y = x - x.mean(axis=1)[:, None], y - y.mean(axis=1)[:, None]
+                xx, yy, xy = np.sum(x * x, axis=1), np.sum(y * y, axis=1), x @ y.T
+                with np.errstate(divide="ignore", invalid="ignore"):
+                    share = np.nan_to_num(xy**2 / np.outer(xx, yy), posinf=0.0)
+                    slope = np.nan_to_num(xy / xx[:, None], posinf=0.0, neginf=0.0)
+                better = share > best
+                best, slopes = np.where(better, share, best), np.where(better, slope, slopes)
+            found[kind] = best, slopes
+        return found
+
+    def _share(self, kind: str, name: Name, other: Name) -> tuple[float, float]:
+        at, to = self.signals.index(name), self.signals.index(other)
+        share, slope = self._shares[kind]
+        return float(share[at, to]), float(slope[at, to])
+
     def derivative(self, name: Name, other: Name) -> tuple[float, float]:
         """Return which share of another column the derivative of one explains, and their ratio."""
-        pairs = [(one[name][1], one[other][0]) for one in self._smoothed.values()]
-        return max((_line(rate, level) for rate, level in pairs), default=(0.0, 0.0))
-
-    def second_derivative(self, name: Name, other: Name) -> float:
-        """Return which share of another column the second derivative of one explains."""
-        pairs = [(one[name][2], one[other][0]) for one in self._smoothed.values()]
-        return max((_line(second, level)[0] for second, level in pairs), default=0.0)
+        return self._share("rate", name, other)
 
     def same(self, name: Name, other: Name) -> tuple[float, float]:
         """Return which share of another column a column explains, and their ratio."""
-        pairs = [(one[name][0], one[other][0]) for one in self._smoothed.values()]
-        return max((_line(level, further) for level, further in pairs), default=(0.0, 0.0))
+        return self._share("level", name, other)
+
+    def ratio(self, name: Name, other: Name, force: Name | None) -> float:
+        """Return how many times a column another one is, beside what a force twists them apart."""
+        one = self._smoothed[min(self._smoothed)]
+        columns = [one[name][0], np.ones_like(one[name][0])]
+        columns += [one[force][0]] if force is not None else []
+        found, *_ = np.linalg.lstsq(np.column_stack(columns), one[other][0], rcond=None)
+        return float(found[0])
 
     def roughness(self, name: Name) -> float:
         """Return the steps between rows over the variation of a column; 0 for a smooth one."""
         steps = [float(np.std(np.diff(one))) for one in self.values(name)]
         whole = [float(np.std(one)) for one in self.values(name)]
         return max(steps) / (max(whole) or 1.0)
+
+    def noise(self, name: Name) -> float:
+        """Return the white noise of a column over its variation."""
+        return max(noise_of(one, jumps=True) / (float(np.std(one)) or 1.0) for one in self.values(name))
 
     def balance(self, position: Name, force: Name, factor: float = 1.0) -> Balance:
         """Return what motion explains of a force.
@@ -266,9 +307,35 @@ class Log:
         factor : float
             Of the position to SI.
         """
-        found = [self._balance(one, position, force, factor) for one in self._smoothed.values()]
-        nothing = Balance(*[0.0] * 10)
-        return max(found, key=lambda one: one.share, default=nothing)
+        found = [
+            self._balance(one, position, force, factor) for one in self._smoothed.values()
+        ] or [Balance(*[0.0] * 10)]
+        best = max(one.share for one in found)
+        # Noise of an acceleration makes its coefficient too small: the smoothest of the best.
+        return next(one for one in reversed(found) if one.share >= best - _AS_GOOD)
+
+    def explained(self, position: Name) -> dict[Name, tuple[float, float]]:
+        """Return by column which share of it motion explains, and which share friction has.
+
+        The second is the size of friction, over that of the column; 0 where it would push.
+        """
+        found: dict[Name, tuple[float, float]] = dict.fromkeys(self.signals, (0.0, 0.0))
+        for one in self._smoothed.values():
+            basis = _basis(*one[position])
+            signals = np.array([one[name][0] for name in self.signals]).T
+            fitted, *_ = np.linalg.lstsq(basis, signals, rcond=1e-9)
+            power = np.var(signals, axis=0)
+            left = np.mean((signals - basis @ fitted) ** 2, axis=0)
+            friction = basis[:, 1:3] @ fitted[1:3]
+            works = np.mean(friction * basis[:, 1:2], axis=0)
+            for at, name in enumerate(self.signals):
+                if not power[at]:
+                    continue
+                share = 1.0 - float(left[at] / power[at])
+                size = math.sqrt(float(np.mean(friction[:, at] ** 2) / power[at]))
+                if share > found[name][0]:
+                    found[name] = share, size if works[at] > 0.0 else 0.0
+        return found
 
     @staticmethod
     def _balance(
@@ -280,9 +347,7 @@ class Log:
         q, v, a = (factor * one for one in signals[position])
         u = signals[force][0]
         scales = [float(np.std(one)) or 1.0 for one in (a, v, q)]
-        columns = [a / scales[0], v / scales[1], np.sign(v), (q - q.mean()) / scales[2]]
-        columns += [np.sin(q), np.cos(q), np.ones_like(q)]
-        basis = np.column_stack(columns)
+        basis = _basis(q, v, a)
         found, *_ = np.linalg.lstsq(basis, u, rcond=1e-9)
         power = float(np.var(u))
         share = 1.0 - float(np.mean((u - basis @ found) ** 2)) / power if power else 0.0
@@ -359,13 +424,16 @@ class Log:
         return "s", 1.0, "unsure"
 
 
-def _line(x: Values, y: Values) -> tuple[float, float]:
-    """Return which share of y a straight line in x explains, and its slope."""
-    x, y = x - x.mean(), y - y.mean()
-    xx, yy, xy = float(x @ x), float(y @ y), float(x @ y)
-    if xx <= 0.0 or yy <= 0.0:
-        return 0.0, 0.0
-    return xy * xy / (xx * yy), xy / xx
+def _averaged(values: Values, width: int) -> Values:
+    return uniform_filter1d(uniform_filter1d(values, width), width)
+
+
+def _basis(q: Values, v: Values, a: Values) -> Values:
+    """Return what a force may be made of, shape (n, 7): inertia first, the constant last."""
+    scales = [float(np.std(one)) or 1.0 for one in (a, v, q)]
+    columns = [a / scales[0], v / scales[1], np.sign(v), (q - q.mean()) / scales[2]]
+    columns += [np.sin(q), np.cos(q), np.ones_like(q)]
+    return np.column_stack(columns)
 
 
 def _period(columns: Sequence[Values]) -> float | None:
@@ -388,14 +456,14 @@ def _period(columns: Sequence[Values]) -> float | None:
             continue
         usual = np.abs(np.delete(steps, jumps))
         at_ends = np.minimum(finite - lowest, highest - finite) < 0.05 * span
-        reached = np.minimum(finite[jumps] - lowest, highest - finite[jumps]) < 0.1 * span
-        if not usual.size or np.quantile(usual, 0.99) > 0.2 * span:
+        before, after = finite[jumps], finite[jumps + 1]
+        reached = np.abs(after - before) > 0.8 * span
+        if not usual.size or np.quantile(usual, 0.99) > 0.2 * span or not np.median(usual):
             return None
         if jumps.size > 0.05 * len(finite) or at_ends.mean() > 0.5 or not reached.all():
             return None
         # What it moved in the step of the jump is that of the step before.
-        before = steps[np.maximum(jumps - 1, 0)]
-        periods += np.abs(steps[jumps] - before).tolist()
+        periods += np.abs(steps[jumps] - steps[np.maximum(jumps - 1, 0)]).tolist()
     if not periods:
         return None
     period = float(np.median(periods))
@@ -478,7 +546,7 @@ class _Finder:
             name
             for name in names
             for other in names
-            if name != other and self.log.same(name, other)[0] > _COMPUTED
+            if name != other and self.log.same(name, other)[0] > _ALIKE
         }
 
     def roles(self) -> Roles:
@@ -534,7 +602,8 @@ class _Finder:
             return titled
         speeds = [one for one in log.signals if log.hints[one].quantity == "speed"]
         unknown = [one for one in log.signals if not log.hints[one].quantity]
-        return unknown or speeds
+        weak = [one for one in log.signals if log.hints[one].weak]
+        return unknown or speeds or weak
 
     def _force_candidates(self, positions: Sequence[Name]) -> list[Name]:
         log = self.log
@@ -554,29 +623,46 @@ class _Finder:
         """Return the position and the force of which motion explains most; None without one."""
         log, best, most = self.log, None, -math.inf
         forces = self._force_candidates(positions)
+        scores: dict[tuple[Name, Name], float] = {}
         widest = max((self._span(one) for one in positions), default=0.0)
         for position in positions:
             if self._span(position) <= 0.0:
                 continue
             score = 0.5 if any(of == position for of, _, _ in self.is_speed.values()) else 0.0
             score -= 0.5 if log.hints[position].command else 0.0
+            score += 0.3 * self._span(position) / widest if self._alike(positions) else 0.0
             # In the same unit a joint that hardly moves is not the one that was tested.
             score -= 1.0 if self._span(position) < 0.1 * widest and self._alike(positions) else 0.0
             if not forces and score > most:
                 best, most = (position, None), score
+            explained = log.explained(position)
             for force in forces:
                 if force == position or log.same(position, force)[0] > _SAME:
                     continue
-                share = log.balance(position, force).share
+                share, friction = explained[force]
                 fits = log.hints[position].number == log.hints[force].number != ""
-                of_force = share + 0.3 * fits - 0.3 * log.hints[force].command
+                # Another joint's motor feels the motion as well, but not its friction.
+                of_force = share + 0.5 * min(1.0, friction) + 0.3 * fits - 0.3 * log.hints[force].command
                 of_force -= 0.5 * (force in self.computed)
                 of_force += 0.3 * (log.roughness(position) < log.roughness(force))
                 if log.hints[force].quantity in ("torque", "force"):
                     of_force += 0.1
+                scores[position, force] = score + of_force
                 if score + of_force > most:
                     best, most = (position, force), score + of_force
-        return best
+        if best is None or best[1] is None:
+            return best
+        position, chosen = best
+        # What was wanted, or what a model says, lacks the noise of what was measured.
+        like = [
+            force
+            for (of, force), score in scores.items()
+            if of == position
+            and score > most - _CLOSE
+            and log.same(chosen, force)[0] > _CLOSE
+            and bool(log.hints[force].quantity) == bool(log.hints[chosen].quantity)
+        ]
+        return position, max(like, key=log.noise, default=chosen)
 
     def _span(self, name: Name) -> float:
         return max(float(np.ptp(one)) for one in self.log.values(name))
@@ -623,7 +709,7 @@ class _Finder:
                 exact = share > _COMPUTED
                 if share < _SAME or exact or self._counted(first) != self._counted(second):
                     continue
-                ratio *= self._size(first) / self._size(second)
+                ratio = log.ratio(second, first, force) * self._size(first) / self._size(second)
                 if not (_RATIOS[0] <= abs(ratio) <= _RATIOS[1]) and not all(sides):
                     continue
                 if abs(ratio) < 1.0 and not all(sides):
