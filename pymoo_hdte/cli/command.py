@@ -66,6 +66,8 @@ class Command:
         Takes the parsed options and `Say`. Heavy modules are imported there, not before, so that
         ``--help`` need not wait for them. It raises `InvalidInput`, `ArithmeticError` (such as
         `UnstableDrive`) or OSError for what a user can mend, and then leaves nothing half-written.
+    reports : bool
+        Whether it writes a report, into the folder ``--out``.
     """
 
     name: str
@@ -73,3 +75,4 @@ class Command:
     details: str
     add_arguments: Callable[[argparse.ArgumentParser], None]
     run: Callable[[argparse.Namespace, Say], Outcome]
+    reports: bool = True

@@ -14,11 +14,12 @@ from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.cli.command import MISTAKE, OneLineParser
 from pymoo_hdte.cli.discrepancy import DISCREPANCY
 from pymoo_hdte.cli.identify import IDENTIFY
+from pymoo_hdte.cli.init import INIT
 from pymoo_hdte.cli.optimise import OPTIMISE
 from pymoo_hdte.cli.plan import PLAN
 from pymoo_hdte.cli.simulate import SIMULATE
 
-COMMANDS = (OPTIMISE, SIMULATE, IDENTIFY, PLAN, DISCREPANCY)
+COMMANDS = (OPTIMISE, SIMULATE, IDENTIFY, PLAN, INIT, DISCREPANCY)
 """In the order of the help."""
 
 
@@ -65,9 +66,10 @@ def _parser() -> argparse.ArgumentParser:
         )
         one.set_defaults(command=command)
         command.add_arguments(one)
-        one.add_argument(
-            "--out", type=Path, required=True, metavar="DIR", help="folder for the report"
-        )
+        if command.reports:
+            one.add_argument(
+                "--out", type=Path, required=True, metavar="DIR", help="folder for the report"
+            )
         output = one.add_mutually_exclusive_group()
         output.add_argument("--json", action="store_true", help="print the result as JSON")
         output.add_argument("--quiet", action="store_true", help="print nothing but errors")

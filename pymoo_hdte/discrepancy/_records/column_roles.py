@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -45,7 +45,9 @@ _ALIKE = 1.0 - 1e-5
 _AS_GOOD = 0.02
 """Share of a force by which balances count as equally good."""
 _CLOSE = 0.4
-"""Of scores, and of shares, up to which two forces may be what was wanted and what was measured."""
+"""Of scores, up to which two forces may be what was wanted and what was measured."""
+_LIKE = 0.9
+"""Share of one of them that the other explains, at least."""
 _FINITE = 0.9
 """Least share of numbers in a column."""
 _COUNTED = 1000.0
@@ -133,6 +135,16 @@ class Balance:
     acceleration: float
     speed: float
     position: float
+
+    def at_rate(self, rate: float) -> Balance:
+        """Return a balance whose time is in rows as one in seconds, at a sampling rate in Hz."""
+        return replace(
+            self,
+            inertia=self.inertia / rate**2,
+            damping=self.damping / rate,
+            acceleration=self.acceleration * rate**2,
+            speed=self.speed * rate,
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -567,11 +579,9 @@ class _Finder:
         forces = () if force is None else (self._force(force, coordinates[-1]),)
         balance = None
         if force is not None:
-            balance = log.balance(
-                coordinates[-1].column, force, abs(coordinates[-1].factor) * (rate or 1.0) ** 0
-            )
+            balance = log.balance(coordinates[-1].column, force, abs(coordinates[-1].factor))
             if rate:
-                balance = _faster(balance, rate)
+                balance = balance.at_rate(rate)
         if encoders is not None and (pair := self._two_forces(force)):
             forces = tuple(self._force(one, coordinates[-1]) for one in pair)
         used = [one.column for one in (*coordinates, *forces)]
@@ -659,7 +669,7 @@ class _Finder:
             for (of, force), score in scores.items()
             if of == position
             and score > most - _CLOSE
-            and log.same(chosen, force)[0] > _CLOSE
+            and log.same(chosen, force)[0] > _LIKE
             and bool(log.hints[force].quantity) == bool(log.hints[chosen].quantity)
         ]
         return position, max(like, key=log.noise, default=chosen)
@@ -729,19 +739,19 @@ class _Finder:
             motor = self._coordinate(first, None, load)
         else:
             motor = self._coordinate(first, None)
-            motor = _with(motor, unit=load.unit if not motor.unit_sure else motor.unit)
+            motor = replace(motor, unit=load.unit if not motor.unit_sure else motor.unit)
         whole = round(ratio) if abs(ratio - round(ratio)) < 2e-3 * abs(ratio) else ratio
         said = (
             f"its readings are {ratio:.6g} times those of {log.label(second)}, whose drive they "
             "share"
         )
-        motor = _with(
+        motor = replace(
             motor,
             options={**motor.options, "divided_by": float(whole)},
             why=(*motor.why, said),
         )
         why = (*load.why, f"{log.label(first)} follows it with a ratio of {ratio:.6g}")
-        return motor, _with(load, why=why)
+        return motor, replace(load, why=why)
 
     def _two_forces(self, force: Name | None) -> tuple[Name, Name] | None:
         """Return torques of input and output, where titles tell both."""
@@ -793,7 +803,7 @@ class _Finder:
         )
 
     def _slope_said(self, position: Name, speed: Name, ratio: float) -> str:
-        if self.log.time is None:
+        if self.log.time is None or self._counted(position):
             return ""
         ratio *= self._size(speed) / self._size(position)
         for said, known in (("", 1.0), (", in deg/s of rad", 57.29578), (", in rpm of rad", 9.549297)):
@@ -829,13 +839,9 @@ class _Finder:
         if of_length or words in ("x", "y", "s") or "weg" in words or "displacement" in words:
             return "m", False, options, said
         span = self._span(name)
-        if 30.0 < span < 800.0 and not self._turns(name):
+        if period is None and 30.0 < span < 800.0 and hint.side != "input":
             return "deg", False, options, (*said, f"it spans {span:.3g}, too far for a joint in rad")
         return "rad", False, options, said
-
-    def _turns(self, name: Name) -> bool:
-        """Tell whether a title speaks of a motor, which turns on and on."""
-        return self.log.hints[name].side == "input"
 
     def _counts(
         self, name: Name, like: ColumnGuess | None
@@ -921,22 +927,3 @@ class _Finder:
                 what = ("wanted " if hint.command else "") + (hint.quantity or "unknown")
                 said.append(f"{log.label(name)}: {what}, not used")
         return said
-
-
-def _with(guess: ColumnGuess, **changes: object) -> ColumnGuess:
-    from dataclasses import replace
-
-    return replace(guess, **changes)  # type: ignore[arg-type]
-
-
-def _faster(balance: Balance, rate: float) -> Balance:
-    """Return a balance over rows as one over time, at a sampling rate in Hz."""
-    from dataclasses import replace
-
-    return replace(
-        balance,
-        inertia=balance.inertia / rate**2,
-        damping=balance.damping / rate,
-        acceleration=balance.acceleration * rate**2,
-        speed=balance.speed * rate,
-    )
