@@ -210,9 +210,7 @@ def _cut_as(file: str, lines: Sequence[str], delimiter: str, decimal: str) -> _S
     return None
 
 
-def _titles(
-    file: str, lines: Sequence[str], shape: _Shape
-) -> tuple[list[str], list[str], bool]:
+def _titles(file: str, lines: Sequence[str], shape: _Shape) -> tuple[list[str], list[str], bool]:
     """Return titles and units of all columns, and whether a reader finds the titles as they are."""
     blank = [""] * shape.cells
     above = [

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pymoo_hdte._io.unstated import UnstatedTable
-from pymoo_hdte.checks import InvalidInput
+from pymoo_hdte.checks import InvalidInput, complaints_of
 from pymoo_hdte.discrepancy._records.campaign import RATED_STIFFNESS, RATED_TORQUE
 from pymoo_hdte.discrepancy._records.campaign_files import read_campaign
 from pymoo_hdte.discrepancy._records.campaign_keys import CAMPAIGN_FILE
@@ -174,7 +174,8 @@ def _refusal(folder: Path, text: str) -> str | None:
         try:
             read_campaign(place)
         except InvalidInput as error:
-            return str(error)
+            first, *further = complaints_of(error)
+            return f"{first}" + (f" (and {len(further)} more)" if further else "")
     return None
 
 
@@ -186,9 +187,9 @@ def _text(logs: LogFolder, roles: Roles, refusal: str) -> str:
     stiffness, stiffness_said = _stiffness(tests, abs(ratio), size)
     lines = [
         *remark(
-            "Drafted by pymoo-hdte init from the data files here. Correct what is wrong, at least "
-            f"every line that says {EDIT}, then run: pymoo-hdte discrepancy FOLDER --out "
-            "FOLDER/report. After a verdict a second init proposes what to add."
+            "Drafted by pymoo-hdte init from the data files here: correct what is wrong, at least "
+            f"what is marked {EDIT}. Then: pymoo-hdte discrepancy FOLDER --out FOLDER/report. After "
+            "a verdict a second init proposes what to add."
         ),
         *remark(f"{EDIT}: read as it stands, it is refused: {refusal}" if refusal else ""),
         f"title = {toml_value(logs.folder.resolve().name or 'A drive')}",
@@ -204,9 +205,7 @@ def _text(logs: LogFolder, roles: Roles, refusal: str) -> str:
             f"{RATED_TORQUE:g} N.m, in proportion to the largest torque, {load:.3g} N.m; put those "
             f"of the data sheet. Without, all may be off by {100.0 * _WIDE:g} %."
         ),
-        *(
-            f"{key} = {size * value:.3g}  # {said}" for key, (value, said) in _LIKE_RATED.items()
-        ),
+        *(f"{key} = {size * value:.3g}  # {said}" for key, (value, said) in _LIKE_RATED.items()),
         *_static_error(tests, abs(ratio)),
         f"tolerance = {_WIDE:g}  # relative, of all values above; narrower as you know them better",
         f"static_error_tolerance = {_WIDE:g}",
@@ -218,7 +217,7 @@ def _text(logs: LogFolder, roles: Roles, refusal: str) -> str:
         *_noises(tests, abs(ratio)),
         *remark(f"{EDIT}: of the transmission error from record to record, not known."),
         "repeatability_arcsec = 0.3",
-        f'# output_torque_at = "brake"  # if its sensor sits behind the load; by default "drive"',
+        '# output_torque_at = "brake"  # if its sensor sits behind the load; by default "drive"',
         "",
         *_table(logs, roles),
         *_records(logs, roles, tests),
@@ -243,7 +242,9 @@ def _stiffness(tests: list[_Test], ratio: float, size: float) -> tuple[float, st
     )
     if len(running) > 2 and np.ptp(loads) > 0.0:
         slope, _ = np.polyfit(loads, errors, 1)
-        rest = float(np.std(errors - np.polyval([slope, errors.mean() - slope * loads.mean()], loads)))
+        rest = float(
+            np.std(errors - np.polyval([slope, errors.mean() - slope * loads.mean()], loads))
+        )
         if slope > 0.0 and rest < 0.5 * float(np.std(errors)):
             return 1.0 / float(slope), "likely: slope of the mean transmission error over the load"
     usual = RATED_STIFFNESS * size
@@ -316,6 +317,7 @@ def _table(logs: LogFolder, roles: Roles) -> list[str]:
 def _records(logs: LogFolder, roles: Roles, tests: list[_Test]) -> list[str]:
     running = tuple(one.table for one in tests if one.running)
     parts = roles_of(running, logs)
+    largest = max(abs(one.load) for one in tests if one.running)
     lines: list[str] = []
     for said in logs.left_out([one.table for one in tests]):
         lines += remark(said)
@@ -334,10 +336,10 @@ def _records(logs: LogFolder, roles: Roles, tests: list[_Test]) -> list[str]:
             'test = "running"',
             f"role = {toml_value(parts[test.table.path.name])}",
             f"input_speed_rpm = {_set(speed)}  # mean {speed:.6g}",
-            f"load_torque_Nm = {_set(load)}  # mean {load:.4g}",
+            f"load_torque_Nm = {_set(load) if abs(load) > _CLOSE * largest else 0}  # mean {load:.4g}",
             f"sample_rate_Hz = {test.rate:.6g}",
             "samples_averaged = 1",
-            "# elapsed_s = 0.0  # from the start of the session, if drift is to be sought",
+            "elapsed_s = 0  # from the start of the session, not known: no drift is sought",
             "",
         ]
     return lines[:-1]
@@ -349,4 +351,4 @@ def _set(mean: float) -> str:
         rounded = float(f"{mean:.{digits}g}")
         if abs(rounded - mean) < _CLOSE * abs(mean):
             return f"{rounded:g}"
-    return f"{mean:.3g}" if abs(mean) > 0.5 else "0"
+    return f"{mean:.3g}"

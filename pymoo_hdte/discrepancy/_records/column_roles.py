@@ -308,7 +308,9 @@ class Log:
 
     def noise(self, name: Name) -> float:
         """Return the white noise of a column over its variation."""
-        return max(noise_of(one, jumps=True) / (float(np.std(one)) or 1.0) for one in self.values(name))
+        return max(
+            noise_of(one, jumps=True) / (float(np.std(one)) or 1.0) for one in self.values(name)
+        )
 
     def balance(self, position: Name, force: Name, factor: float = 1.0) -> Balance:
         """Return what motion explains of a force.
@@ -652,7 +654,9 @@ class _Finder:
                 share, friction = explained[force]
                 fits = log.hints[position].number == log.hints[force].number != ""
                 # Another joint's motor feels the motion as well, but not its friction.
-                of_force = share + 0.5 * min(1.0, friction) + 0.3 * fits - 0.3 * log.hints[force].command
+                of_force = (
+                    share + 0.5 * min(1.0, friction) + 0.3 * fits - 0.3 * log.hints[force].command
+                )
                 of_force -= 0.5 * (force in self.computed)
                 of_force += 0.3 * (log.roughness(position) < log.roughness(force))
                 if log.hints[force].quantity in ("torque", "force"):
@@ -806,7 +810,11 @@ class _Finder:
         if self.log.time is None or self._counted(position):
             return ""
         ratio *= self._size(speed) / self._size(position)
-        for said, known in (("", 1.0), (", in deg/s of rad", 57.29578), (", in rpm of rad", 9.549297)):
+        for said, known in (
+            ("", 1.0),
+            (", in deg/s of rad", 57.29578),
+            (", in rpm of rad", 9.549297),
+        ):
             if abs(ratio / known - 1.0) < _NEAR:
                 return said
         return f", {ratio:.4g} times"
@@ -840,7 +848,12 @@ class _Finder:
             return "m", False, options, said
         span = self._span(name)
         if period is None and 30.0 < span < 800.0 and hint.side != "input":
-            return "deg", False, options, (*said, f"it spans {span:.3g}, too far for a joint in rad")
+            return (
+                "deg",
+                False,
+                options,
+                (*said, f"it spans {span:.3g}, too far for a joint in rad"),
+            )
         return "rad", False, options, said
 
     def _counts(

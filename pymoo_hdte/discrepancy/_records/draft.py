@@ -6,6 +6,7 @@ import os
 import secrets
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from pymoo_hdte._io.whole_file import write_whole
 from pymoo_hdte.checks import InvalidInput
@@ -37,9 +38,43 @@ class Draft:
     roles: Roles
 
     @property
-    def edits(self) -> int:
-        """Number of places that its reader is asked to correct or confirm."""
-        return sum(EDIT in paragraph for paragraph in self.text.split("\n")) - 1
+    def document(self) -> dict[str, Any]:
+        """What was guessed, for a terminal and for scripts."""
+        roles = self.roles
+        guesses = [*([roles.time] if roles.time else []), *roles.coordinates, *roles.forces]
+        path = self.logs.folder / self.file
+        edits = [
+            number
+            for number, line in enumerate(self.text.splitlines(), 1)
+            if EDIT in line and number > 2
+        ]
+        sentences = [
+            f"Wrote {path} from {len(self.logs.tables)} file"
+            f"{'s' if len(self.logs.tables) > 1 or self.logs.sources else ''} of the folder."
+        ]
+        sentences += [
+            f"{one.sure}: {one.column!r} is the {one.quantity}, in {one.unit}"
+            f"{'' if one.unit_sure else ' (assumed)'}"
+            for one in guesses
+        ]
+        if edits:
+            lines = ", ".join(map(str, edits))
+            sentences.append(f"Correct or confirm what is marked {EDIT}, in lines {lines}.")
+        sentences.append(
+            f"Then: pymoo-hdte discrepancy {self.logs.folder} --out {self.logs.folder / 'report'}"
+        )
+        columns = [
+            {
+                "column": one.column,
+                "quantity": one.quantity,
+                "unit": one.unit,
+                "sure": one.sure,
+                "unit_known": one.unit_sure,
+                "why": list(one.why),
+            }
+            for one in guesses
+        ]
+        return {"file": str(path), "columns": columns, "edits": edits, "sentences": sentences}
 
 
 def draft_of(folder: Path) -> Draft:

@@ -11,7 +11,7 @@ import numpy as np
 
 from pymoo_hdte._io.toml import toml_text
 from pymoo_hdte._io.unstated import UnstatedTable
-from pymoo_hdte.checks import InvalidInput
+from pymoo_hdte.checks import InvalidInput, complaints_of
 from pymoo_hdte.discrepancy._records.column_roles import Balance, ColumnGuess, Name, Roles
 from pymoo_hdte.discrepancy._records.column_titles import read_title
 from pymoo_hdte.discrepancy._records.log_folder import LogFolder
@@ -62,7 +62,8 @@ def _refusal(folder: Path, text: str) -> str | None:
         try:
             read_rig(path, folder)
         except InvalidInput as error:
-            return str(error)
+            first, *further = complaints_of(error)
+            return f"{first}" + (f" (and {len(further)} more)" if further else "")
     return None
 
 
@@ -70,10 +71,10 @@ def _text(logs: LogFolder, roles: Roles, refusal: str) -> str:
     turning = _turns(roles.coordinates[-1])
     lines = [
         *remark(
-            "Drafted by pymoo-hdte init from the data files here. Correct what is wrong, at least "
-            f"every line that says {EDIT}, then run: pymoo-hdte discrepancy FOLDER --out "
-            "FOLDER/report. After a verdict a second init proposes what to add. All values are in "
-            "SI; the columns have units of their own."
+            "Drafted by pymoo-hdte init from the data files here: correct what is wrong, at least "
+            f"what is marked {EDIT}. Then: pymoo-hdte discrepancy FOLDER --out FOLDER/report. After "
+            "a verdict a second init proposes what to add. Values are in SI; columns have units of "
+            "their own."
         ),
         *remark(f"{EDIT}: read as it stands, it is refused: {refusal}" if refusal else ""),
         f"title = {toml_value(logs.folder.resolve().name or 'A mechanism')}",
@@ -293,8 +294,10 @@ def guess_text(guess: ColumnGuess, name: str) -> str:
         text += f" {EDIT} its unit if it is not deg."
     elif not guess.unit_sure and guess.quantity != "time" and _told(guess):
         text += f" That its unit is {guess.unit} is assumed."
-    if guess.quantity == "position" and read_title(guess.title).side == "input" and "divided_by" not in (
-        *guess.options,
+    if (
+        guess.quantity == "position"
+        and read_title(guess.title).side == "input"
+        and "divided_by" not in (*guess.options,)
     ):
         text += (
             f" {EDIT}: it seems to be of a motor. For values of the joint add divided_by = 101.0 "
