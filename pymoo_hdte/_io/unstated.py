@@ -64,7 +64,7 @@ class UnstatedTable:
     units : dict of str or int to str
         From a row of units; empty without one.
     delimiter, decimal : str or None
-        Among `DELIMITERS` and `DECIMALS`; None for a file without text, or where it does not matter.
+        Among `DELIMITERS` and `DECIMALS`; None without text, or where it does not matter.
     skip_rows : int
         Lines above the first row that a text without titles has.
     """

@@ -188,8 +188,8 @@ def _text(logs: LogFolder, roles: Roles, refusal: str) -> str:
     lines = [
         *remark(
             "Drafted by pymoo-hdte init from the data files here: correct what is wrong, at least "
-            f"what is marked {EDIT}. Then: pymoo-hdte discrepancy FOLDER --out FOLDER/report. After "
-            "a verdict a second init proposes what to add."
+            f"what is marked {EDIT}. Then: pymoo-hdte discrepancy FOLDER --out FOLDER/report. "
+            "After a verdict a second init proposes what to add."
         ),
         *remark(f"{EDIT}: read as it stands, it is refused: {refusal}" if refusal else ""),
         f"title = {toml_value(logs.folder.resolve().name or 'A drive')}",
@@ -283,8 +283,8 @@ def _noises(tests: list[_Test], ratio: float) -> list[str]:
     torques = [of("input_torque"), of("output_torque")]
     return [
         *remark(
-            "likely: from third differences of the records, one sample each; raise samples_averaged "
-            "and these where rows are means of several samples"
+            "likely: from third differences of the records, one sample each; raise "
+            "samples_averaged and these where rows are means of several samples"
         ),
         f"angle_noise_arcsec = {max(angle, 1e-3):.3g}",
         f"input_torque_noise_Nm = {max(torques[0], 1e-6):.3g}",
@@ -322,6 +322,7 @@ def _records(logs: LogFolder, roles: Roles, tests: list[_Test]) -> list[str]:
     for said in logs.left_out([one.table for one in tests]):
         lines += remark(said)
     for test in tests:
+        load = 0.0 if abs(test.load) < _CLOSE * largest else test.load
         lines += ["[[record]]", f"file = {toml_value(test.table.path.name)}"]
         if not test.running:
             lines += [
@@ -331,12 +332,12 @@ def _records(logs: LogFolder, roles: Roles, tests: list[_Test]) -> list[str]:
                 "",
             ]
             continue
-        speed, load = test.speed / REVOLUTION_PER_MINUTE, test.load
+        speed = test.speed / REVOLUTION_PER_MINUTE
         lines += [
             'test = "running"',
             f"role = {toml_value(parts[test.table.path.name])}",
             f"input_speed_rpm = {_set(speed)}  # mean {speed:.6g}",
-            f"load_torque_Nm = {_set(load) if abs(load) > _CLOSE * largest else 0}  # mean {load:.4g}",
+            f"load_torque_Nm = {_set(load)}  # mean {test.load:.4g}",
             f"sample_rate_Hz = {test.rate:.6g}",
             "samples_averaged = 1",
             "elapsed_s = 0  # from the start of the session, not known: no drift is sought",

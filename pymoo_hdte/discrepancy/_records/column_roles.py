@@ -17,7 +17,7 @@ from scipy.ndimage import uniform_filter1d
 
 from pymoo_hdte._io.layout import CHANNEL_UNITS, COUNTS
 from pymoo_hdte._io.unstated import UnstatedTable
-from pymoo_hdte.discrepancy._records.column_titles import TitleHint, read_title
+from pymoo_hdte.discrepancy._records.column_titles import read_title
 from pymoo_hdte.mechanism.motion import noise_of
 from pymoo_hdte.units import UNITS
 
@@ -61,6 +61,18 @@ _NEAR = 0.02
 """Relative, of a period from a known one."""
 _RATIOS = (1.5, 1000.0)
 """Of drives; nearer to 1 a second column is a set value of the first."""
+_EVEN = 0.3
+"""Median deviation of the steps of a column of time without a title from their median, relative."""
+_RISES = 0.99
+"""Share of the steps of a column of time that are above zero; others may be zero."""
+_DIFFERENTIATED, _MOVES, _STANDS, _STILL = 0.5, 0.3, 1.0, 0.1
+"""Scores of a position that has a speed, of its travel over the widest, and of one that stands
+still, with the share of the widest travel up to which it does."""
+_RUBS, _NUMBERED, _ROUGHER, _IS_FORCE = 0.5, 0.3, 0.3, 0.1
+"""Scores of a force beside the share of it that motion explains: of its friction, of the number of
+the joint in its title, of being rougher than the position, of being no current or voltage."""
+_WANTED, _MULTIPLE = 0.5, 0.5
+"""Scores taken from what was wanted, by its title, and from exact multiples of other columns."""
 FORCES = ("torque", "force", "current", "voltage")
 
 
@@ -113,7 +125,7 @@ class ColumnGuess:
 
 @dataclass(frozen=True)
 class Balance:
-    """Force = inertia a + damping v + dry sign(v) + stiffness q + gravity sin(q + phase) + constant.
+    """Force as inertia a + damping v + dry sign(v) + stiffness q + gravity sin(q + phase) + c.
 
     Attributes
     ----------
@@ -399,21 +411,21 @@ class Log:
 
     def _time(self) -> tuple[ColumnGuess | None, float]:
         """Return the column of time, and its usual step, s; 1 row without one."""
-        candidates: list[tuple[float, float, Name, float]] = []
+        candidates: list[tuple[bool, float, Name, float]] = []
         for name in self.names:
             hint, steps = self.hints[name], np.concatenate([np.diff(v) for v in self.values(name)])
             usual = float(np.median(steps))
-            if usual <= 0.0 or np.mean(steps > 0.0) < 0.99 or np.any(steps < 0.0):
+            if usual <= 0.0 or np.mean(steps > 0.0) < _RISES or np.any(steps < 0.0):
                 continue
             spread = float(np.median(np.abs(steps - usual))) / usual
             if hint.quantity not in ("", "time") and not hint.weak:
                 continue
             titled = hint.quantity == "time"
-            if titled or (spread < 0.3 and not hint.quantity):
-                candidates.append((1.0 if titled else 0.0, -spread, name, usual))
+            if titled or (spread < _EVEN and not hint.quantity):
+                candidates.append((titled, -spread, name, usual))
         if not candidates:
             return None, 1.0
-        titled, spread, name, usual = max(candidates, key=lambda one: (one[0], one[1]))
+        titled, _, name, usual = max(candidates, key=lambda one: one[:2])
         stated = self.hints[name].unit
         unit, scale, sure = self._unit_of_time(stated, usual)
         rate = 1.0 / (usual * CHANNEL_UNITS[unit] * scale)
@@ -564,31 +576,32 @@ class _Finder:
         }
 
     def roles(self) -> Roles:
-        log, remarks = self.log, []
+        log = self.log
         positions = self._positions()
         chosen = self._pair(positions)
         if chosen is None:
-            return Roles(log.time, None, (), (), 0.0, None, tuple(self._others((), remarks)))
+            return Roles(log.time, None, (), (), 0.0, None, tuple(self._others(())))
         position, force = chosen
         rate = self._rate(position)
         encoders = self._encoders(positions, force)
         if encoders is not None:
             first, second, ratio = encoders
-            coordinates = self._two_encoders(first, second, ratio)
+            coordinates: tuple[ColumnGuess, ...] = self._two_encoders(first, second, ratio)
         else:
             ratio = 0.0
             coordinates = (self._coordinate(position, force),)
-        forces = () if force is None else (self._force(force, coordinates[-1]),)
+        forces: tuple[ColumnGuess, ...] = ()
         balance = None
         if force is not None:
+            forces = (self._force(force, coordinates[-1]),)
             balance = log.balance(coordinates[-1].column, force, abs(coordinates[-1].factor))
             if rate:
                 balance = balance.at_rate(rate)
         if encoders is not None and (pair := self._two_forces(force)):
             forces = tuple(self._force(one, coordinates[-1]) for one in pair)
         used = [one.column for one in (*coordinates, *forces)]
-        remarks = self._others(used, remarks)
-        return Roles(log.time, rate, coordinates, forces, ratio, balance, tuple(remarks))
+        remarks = tuple(self._others(used))
+        return Roles(log.time, rate, coordinates, forces, ratio, balance, remarks)
 
     def _positions(self) -> list[Name]:
         """Return columns that may be positions, those that are by titles or data alone."""
@@ -633,18 +646,20 @@ class _Finder:
 
     def _pair(self, positions: Sequence[Name]) -> tuple[Name, Name | None] | None:
         """Return the position and the force of which motion explains most; None without one."""
-        log, best, most = self.log, None, -math.inf
+        log, most = self.log, -math.inf
+        best: tuple[Name, Name | None] | None = None
         forces = self._force_candidates(positions)
         scores: dict[tuple[Name, Name], float] = {}
         widest = max((self._span(one) for one in positions), default=0.0)
         for position in positions:
             if self._span(position) <= 0.0:
                 continue
-            score = 0.5 if any(of == position for of, _, _ in self.is_speed.values()) else 0.0
-            score -= 0.5 if log.hints[position].command else 0.0
-            score += 0.3 * self._span(position) / widest if self._alike(positions) else 0.0
-            # In the same unit a joint that hardly moves is not the one that was tested.
-            score -= 1.0 if self._span(position) < 0.1 * widest and self._alike(positions) else 0.0
+            differentiated = any(of == position for of, _, _ in self.is_speed.values())
+            score = _DIFFERENTIATED * differentiated - _WANTED * log.hints[position].command
+            if self._alike(positions):
+                # In the same unit a joint that hardly moves is not the one that was tested.
+                moves = self._span(position) / widest
+                score += _MOVES * moves - _STANDS * (moves < _STILL)
             if not forces and score > most:
                 best, most = (position, None), score
             explained = log.explained(position)
@@ -654,19 +669,19 @@ class _Finder:
                 share, friction = explained[force]
                 fits = log.hints[position].number == log.hints[force].number != ""
                 # Another joint's motor feels the motion as well, but not its friction.
-                of_force = (
-                    share + 0.5 * min(1.0, friction) + 0.3 * fits - 0.3 * log.hints[force].command
-                )
-                of_force -= 0.5 * (force in self.computed)
-                of_force += 0.3 * (log.roughness(position) < log.roughness(force))
-                if log.hints[force].quantity in ("torque", "force"):
-                    of_force += 0.1
+                of_force = share + _RUBS * min(1.0, friction) + _NUMBERED * fits
+                of_force -= _WANTED * log.hints[force].command
+                of_force -= _MULTIPLE * (force in self.computed)
+                of_force += _ROUGHER * (log.roughness(position) < log.roughness(force))
+                of_force += _IS_FORCE * (log.hints[force].quantity in ("torque", "force"))
                 scores[position, force] = score + of_force
                 if score + of_force > most:
                     best, most = (position, force), score + of_force
-        if best is None or best[1] is None:
-            return best
+        if best is None:
+            return None
         position, chosen = best
+        if chosen is None:
+            return position, None
         # What was wanted, or what a model says, lacks the noise of what was measured.
         like = [
             force
@@ -914,9 +929,10 @@ class _Finder:
             options,
         )
 
-    def _others(self, used: Sequence[Name], remarks: Sequence[str]) -> list[str]:
+    def _others(self, used: Sequence[Name]) -> list[str]:
         """Return a sentence on each column that is not used, as far as something is known of it."""
-        log, said = self.log, list(remarks)
+        log = self.log
+        said: list[str] = []
         for name in log.signals:
             hint = log.hints[name]
             if name in self.is_speed:

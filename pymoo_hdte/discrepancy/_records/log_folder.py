@@ -8,7 +8,7 @@ from pathlib import Path
 
 from pymoo_hdte._io.unstated import ENDINGS, UnstatedTable, read_unstated
 from pymoo_hdte.checks import InvalidInput
-from pymoo_hdte.discrepancy._records.column_roles import Log, Name
+from pymoo_hdte.discrepancy._records.column_roles import Log, Name, Values
 
 _LENGTHS = 0.01
 """By which the rows of files that hold one record may differ, relative."""
@@ -105,8 +105,8 @@ def _shown(table: UnstatedTable) -> str:
 def _alike(tables: Sequence[UnstatedTable]) -> list[UnstatedTable]:
     """Return files that can be read in one way, with the columns that all of them have.
 
-    Of all such choices it is the one with most numbers: a column that a few files have besides goes,
-    and so do files that lack many.
+    Of all such choices it is the one with most numbers: a column that few files have goes, and so
+    do files that lack many.
     """
     best: list[UnstatedTable] = []
     for first in tables:
@@ -134,7 +134,9 @@ def _joined(
     """Return one record of files that have one signal each, as long as each other."""
     first = tables[0]
     signals: dict[Name, tuple[str, Name]] = {}
-    columns, titles, units = {}, {}, {}
+    columns: dict[Name, Values] = {}
+    titles: dict[Name, str] = {}
+    units: dict[Name, str] = {}
     time: Name | None = None
     for table in tables:
         log = Log([table])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -72,9 +73,9 @@ def _text(logs: LogFolder, roles: Roles, refusal: str) -> str:
     lines = [
         *remark(
             "Drafted by pymoo-hdte init from the data files here: correct what is wrong, at least "
-            f"what is marked {EDIT}. Then: pymoo-hdte discrepancy FOLDER --out FOLDER/report. After "
-            "a verdict a second init proposes what to add. Values are in SI; columns have units of "
-            "their own."
+            f"what is marked {EDIT}. Then: pymoo-hdte discrepancy FOLDER --out FOLDER/report. "
+            "After a verdict a second init proposes what to add. Values are in SI; columns have "
+            "units of their own."
         ),
         *remark(f"{EDIT}: read as it stands, it is refused: {refusal}" if refusal else ""),
         f"title = {toml_value(logs.folder.resolve().name or 'A mechanism')}",
@@ -174,18 +175,14 @@ def _in_si(balance: Balance | None, force: ColumnGuess | None) -> Balance | None
     if balance is None or force is None or not balance.force:
         return None
     scale = force.factor
-    return Balance(
-        balance.share,
-        *(
-            scale * one
-            for one in (
-                *(balance.inertia, balance.damping, balance.dry, balance.stiffness),
-                *(balance.gravity, abs(balance.force)),
-            )
-        ),
-        balance.acceleration,
-        balance.speed,
-        balance.position,
+    return replace(
+        balance,
+        inertia=scale * balance.inertia,
+        damping=scale * balance.damping,
+        dry=scale * balance.dry,
+        stiffness=scale * balance.stiffness,
+        gravity=abs(scale) * balance.gravity,
+        force=abs(scale) * balance.force,
     )
 
 
@@ -206,8 +203,7 @@ def _spring(balance: Balance | None, turning: bool) -> list[str]:
 
 
 def _gear(roles: Roles, force: ColumnGuess | None) -> list[str]:
-    motor, load = roles.coordinates
-    ratio = abs(float(motor.options["divided_by"]))
+    ratio = abs(float(roles.coordinates[0].options["divided_by"]))
     lines = [
         "[ports.gear]",
         "motion = { motor = 1.0, load = -1.0 }",

@@ -128,8 +128,8 @@ def _proposed(
         if isinstance(share, int | float) and "name" in one:
             yield (
                 f"{one['name']} at the {one.get('port', 'drive')} would remove {100.0 * share:.0f} "
-                "% of what is left, too little to be named: a test that moves faster or further "
-                "may show it."
+                "% of what is left, but is not sure enough to be named: a further test may "
+                "show it."
             )
     model = found.get("revised_model")
     if effects and isinstance(model, dict) and file == RIG_FILE:
@@ -168,8 +168,9 @@ def _gear(effects: Sequence[Mapping[str, Any]], stated: Mapping[str, Any]) -> It
         order = (one.get("parameters") or {}).get("order", {})
         order = order.get("value") if isinstance(order, dict) else None
         port = str(one.get("port", ""))
-        known = isinstance(order, int | float) and order > 10.0 * _PER_INPUT_TURN
-        if one["name"] == "torque_ripple" and known and port not in geared:
+        if one["name"] != "torque_ripple" or port in geared:
+            continue
+        if isinstance(order, int | float) and order > 10.0 * _PER_INPUT_TURN:
             ratio = order / _PER_INPUT_TURN
             yield (
                 f"The ripple of order {order:.5g} is twice per input turn of a harmonic drive of "
