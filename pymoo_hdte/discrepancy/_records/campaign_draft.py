@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import tempfile
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -105,7 +106,24 @@ def _is_steady(test: _Test) -> bool:
 
 def _channels(roles: Roles) -> dict[str, ColumnGuess]:
     names = ("input_angle", "output_angle", "input_torque", "output_torque")
-    return dict(zip(names, (*roles.coordinates, *roles.forces), strict=True))
+    found = dict(zip(names, (*roles.coordinates, *roles.forces), strict=True))
+    for name in names[2:]:
+        # Signs of a bench are not those of a joint: `_signs` finds them.
+        options = {key: one for key, one in found[name].options.items() if key != "scale"}
+        found[name] = replace(found[name], options=options)
+    return found
+
+
+def _signs(tests: list[_Test]) -> dict[str, float]:
+    """Return the signs of the torques: what drives forward is positive, and so is what opposes it.
+
+    From the records with most torque, in which friction is small beside the load.
+    """
+    running = [one for one in tests if one.running]
+    work = sum(float(np.sign(one.speed) * np.mean(one.signals["input_torque"])) for one in running)
+    load = sum(float(np.mean(one.signals["input_torque"])) * one.load for one in running)
+    first = -1.0 if work < 0.0 else 1.0
+    return {"input_torque": first, "output_torque": -first if load < 0.0 else first}
 
 
 def _tests(logs: LogFolder, roles: Roles) -> list[_Test]:
@@ -180,7 +198,7 @@ def _refusal(folder: Path, text: str) -> str | None:
 
 
 def _text(logs: LogFolder, roles: Roles, refusal: str) -> str:
-    tests = _tests(logs, roles)
+    tests, signs = _signed(_tests(logs, roles))
     ratio = _ratio(roles)
     load = max((abs(one.load) for one in tests if one.running), default=RATED_TORQUE)
     size = load / RATED_TORQUE if load > 0.0 else 1.0
@@ -219,10 +237,23 @@ def _text(logs: LogFolder, roles: Roles, refusal: str) -> str:
         "repeatability_arcsec = 0.3",
         '# output_torque_at = "brake"  # if its sensor sits behind the load; by default "drive"',
         "",
-        *_table(logs, roles),
+        *_table(logs, roles, signs),
         *_records(logs, roles, tests),
     ]
     return "\n".join(lines) + "\n"
+
+
+def _signed(tests: list[_Test]) -> tuple[list[_Test], dict[str, float]]:
+    """Return records whose torques count as a campaign has them, and the signs that do it."""
+    signs = _signs(tests)
+    turned = [
+        replace(
+            test,
+            signals={name: signs.get(name, 1.0) * values for name, values in test.signals.items()},
+        )
+        for test in tests
+    ]
+    return turned, signs
 
 
 def _stiffness(tests: list[_Test], ratio: float, size: float) -> tuple[float, str]:
@@ -276,10 +307,12 @@ def _static_error(tests: list[_Test], ratio: float) -> list[str]:
 def _noises(tests: list[_Test], ratio: float) -> list[str]:
     running = [one for one in tests if one.running]
 
-    def of(name: str, scale: float = 1.0) -> float:
-        return float(np.median([noise_of(one.signals[name]) for one in running])) / scale
+    def of(name: str, scale: float = 1.0, records: list[_Test] = running) -> float:
+        return float(np.median([noise_of(one.signals[name]) for one in records])) / scale
 
+    locked = [one for one in tests if not one.running]
     angle = max(of("output_angle"), of("input_angle", ratio)) / ARCSEC
+    torsion = of("output_angle", records=locked) / ARCSEC if locked else angle
     torques = [of("input_torque"), of("output_torque")]
     return [
         *remark(
@@ -289,11 +322,11 @@ def _noises(tests: list[_Test], ratio: float) -> list[str]:
         f"angle_noise_arcsec = {max(angle, 1e-3):.3g}",
         f"input_torque_noise_Nm = {max(torques[0], 1e-6):.3g}",
         f"output_torque_noise_Nm = {max(torques[1], 1e-6):.3g}",
-        f"torsion_angle_noise_arcsec = {max(angle, 1e-3):.3g}",
+        f"torsion_angle_noise_arcsec = {max(torsion, 1e-3):.3g}",
     ]
 
 
-def _table(logs: LogFolder, roles: Roles) -> list[str]:
+def _table(logs: LogFolder, roles: Roles, signs: Mapping[str, float]) -> list[str]:
     assert roles.time is not None
     first = logs.tables[0]
     lines = ["[table]", f"format = {toml_value(first.format)}"]
@@ -305,7 +338,7 @@ def _table(logs: LogFolder, roles: Roles) -> list[str]:
     for name, guess in _channels(roles).items():
         options = {key: one for key, one in guess.options.items() if key != "divided_by"}
         sign = float(guess.options.get("divided_by", 1.0)) if name == "input_angle" else 1.0
-        if sign < 0.0:
+        if sign * signs.get(name, 1.0) < 0.0:
             options["scale"] = -1.0
         lines += remark(guess_text(guess, name))
         lines += [f"{name} = {channel_text(guess, options)}"]

@@ -42,7 +42,7 @@ _COMPUTED = 1.0 - 1e-10
 """Share from which one column was computed from another: no two sensors agree so well."""
 _ALIKE = 1.0 - 1e-5
 """The same for forces, which are noisier."""
-_AS_GOOD = 0.02
+_AS_GOOD = 0.005
 """Share of a force by which balances count as equally good."""
 _CLOSE = 0.4
 """Of scores, up to which two forces may be what was wanted and what was measured."""
