@@ -59,13 +59,13 @@ _TIME_UNITS = {"s": ("s", 1.0), "ms": ("ms", 1.0), "us": ("ms", 1e-3), "ns": ("m
 _PERIODS = (("rad", 2.0 * math.pi), ("deg", 360.0), ("rev", 1.0))
 _NEAR = 0.02
 """Relative, of a period from a known one."""
-_RATIOS = (1.5, 1000.0)
-"""Of drives; nearer to 1 a second column is a set value of the first."""
+_RATIOS = (10.0, 1000.0)
+"""Of drives: without titles, smaller ones may be those of joints that move together."""
 _EVEN = 0.3
 """Median deviation of the steps of a column of time without a title from their median, relative."""
 _RISES = 0.99
 """Share of the steps of a column of time that are above zero; others may be zero."""
-_DIFFERENTIATED, _MOVES, _STANDS, _STILL = 0.5, 0.3, 1.0, 0.1
+_DIFFERENTIATED, _MOVES, _STANDS, STILL = 0.5, 0.3, 1.0, 0.1
 """Scores of a position that has a speed, of its travel over the widest, and of one that stands
 still, with the share of the widest travel up to which it does."""
 _RUBS, _NUMBERED, _ROUGHER, _IS_FORCE = 0.5, 0.3, 0.3, 0.1
@@ -659,7 +659,7 @@ class _Finder:
             if self._alike(positions):
                 # In the same unit a joint that hardly moves is not the one that was tested.
                 moves = self._span(position) / widest
-                score += _MOVES * moves - _STANDS * (moves < _STILL)
+                score += _MOVES * moves - _STANDS * (moves < STILL)
             if not forces and score > most:
                 best, most = (position, None), score
             explained = log.explained(position)
@@ -691,7 +691,16 @@ class _Finder:
             and log.same(chosen, force)[0] > _LIKE
             and bool(log.hints[force].quantity) == bool(log.hints[chosen].quantity)
         ]
-        return position, max(like, key=log.noise, default=chosen)
+        force = max(like, key=log.noise, default=chosen)
+        twins = [
+            other
+            for other in positions
+            if log.same(position, other)[0] > _SAME
+            and abs(log.same(position, other)[1] - 1) < _NEAR
+        ]
+        if not log.titles.get(position) or not any(log.hints[one].quantity for one in twins):
+            position = max(twins, key=log.noise, default=position)
+        return position, force
 
     def _span(self, name: Name) -> float:
         return max(float(np.ptp(one)) for one in self.log.values(name))
@@ -735,13 +744,11 @@ class _Finder:
                     continue
                 share, ratio = log.same(second, first)
                 sides = log.hints[first].side == "input", log.hints[second].side == "output"
-                exact = share > _COMPUTED
-                if share < _SAME or exact or self._counted(first) != self._counted(second):
+                computed = share > _COMPUTED and not all(sides)
+                if share < _SAME or computed or self._counted(first) != self._counted(second):
                     continue
                 ratio = log.ratio(second, first, force) * self._size(first) / self._size(second)
                 if not (_RATIOS[0] <= abs(ratio) <= _RATIOS[1]) and not all(sides):
-                    continue
-                if abs(ratio) < 1.0 and not all(sides):
                     continue
                 known = sum(sides), share
                 if best is None or known > best[0]:
@@ -857,6 +864,9 @@ class _Finder:
                 said = (f"it begins anew after some {period:.6g}",)
         if unit:
             return unit, unit_sure, options, said
+        if hint.quantity in ("voltage", "current"):
+            # A circuit that acts like a machine.
+            return {"voltage": "V", "current": "A"}[hint.quantity], False, options, said
         words = log.titles.get(name, "").lower()
         of_length = force is not None and log.hints[force].quantity == "force"
         if of_length or words in ("x", "y", "s") or "weg" in words or "displacement" in words:

@@ -48,10 +48,9 @@ class Draft:
             for number, line in enumerate(self.text.splitlines(), 1)
             if EDIT in line and number > 2
         ]
-        sentences = [
-            f"Wrote {path} from {len(self.logs.tables)} file"
-            f"{'s' if len(self.logs.tables) > 1 or self.logs.sources else ''} of the folder."
-        ]
+        records = self.text.count("[[record")
+        said = "1 record" if records == 1 else f"{records} records"
+        sentences = [f"Wrote {path}, with {said} of the files of the folder."]
         sentences += [
             f"{one.sure}: {one.column!r} is the {one.quantity}, in {one.unit}"
             f"{'' if one.unit_sure else ' (assumed)'}"
@@ -101,6 +100,9 @@ def draft_of(folder: Path) -> Draft:
         raise InvalidInput(f"columns of {logs.tables[0].path.name}", titles, allowed)
     if is_bench(logs, roles):
         return Draft(CAMPAIGN_FILE, campaign_text(logs, roles), logs, roles)
+    moving = logs.moving(roles.coordinates[-1].column)
+    if moving is not logs:
+        logs, roles = moving, find_roles(moving.log)
     return Draft(RIG_FILE, rig_text(logs, roles), logs, roles)
 
 

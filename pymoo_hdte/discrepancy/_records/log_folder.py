@@ -6,9 +6,11 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
+
 from pymoo_hdte._io.unstated import ENDINGS, UnstatedTable, read_unstated
 from pymoo_hdte.checks import InvalidInput
-from pymoo_hdte.discrepancy._records.column_roles import Log, Name, Values
+from pymoo_hdte.discrepancy._records.column_roles import STILL, Log, Name, Values
 
 _LENGTHS = 0.01
 """By which the rows of files that hold one record may differ, relative."""
@@ -56,6 +58,37 @@ class LogFolder:
             if one.path not in names
         ]
         return [*others, *self.refused]
+
+    def without(self, tables: Collection[UnstatedTable], why: str) -> LogFolder:
+        """Return the folder without some files, and why they are not used.
+
+        Parameters
+        ----------
+        tables : collection of UnstatedTable
+            Not all of them.
+        why : str
+            The end of a sentence.
+        """
+        names = [one.path for one in tables]
+        kept = tuple(one for one in self.tables if one.path not in names)
+        said = [f"{path.name} is not used: {why}" for path in names]
+        return replace(self, log=Log(kept), tables=kept, refused=(*self.refused, *said))
+
+    def moving(self, column: Name) -> LogFolder:
+        """Return the folder without files in which a column stands still.
+
+        Parameters
+        ----------
+        column : str or int
+        """
+        spans = {
+            one.path: float(np.ptp(one.columns[column][np.isfinite(one.columns[column])]))
+            for one in self.tables
+        }
+        still = [one for one in self.tables if spans[one.path] < STILL * max(spans.values())]
+        return (
+            self.without(still, f"{self.log.label(column)} stands still in it") if still else self
+        )
 
 
 def read_log_folder(folder: Path) -> LogFolder:

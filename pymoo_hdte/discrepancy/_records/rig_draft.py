@@ -13,7 +13,7 @@ import numpy as np
 from pymoo_hdte._io.toml import toml_text
 from pymoo_hdte._io.unstated import UnstatedTable
 from pymoo_hdte.checks import InvalidInput, complaints_of
-from pymoo_hdte.discrepancy._records.column_roles import Balance, ColumnGuess, Name, Roles
+from pymoo_hdte.discrepancy._records.column_roles import Balance, ColumnGuess, Name, Roles, Values
 from pymoo_hdte.discrepancy._records.column_titles import read_title
 from pymoo_hdte.discrepancy._records.log_folder import LogFolder
 from pymoo_hdte.discrepancy._records.rig_files import RIG_FILE, read_rig
@@ -50,9 +50,16 @@ def rig_text(logs: LogFolder, roles: Roles) -> str:
     str
         TOML. Where `read_rig` refuses the records, a comment at the top says what it refused.
     """
-    text = _text(logs, roles, "")
-    refusal = _refusal(logs.folder, text)
-    return text if refusal is None else _text(logs, roles, refusal)
+    while True:
+        text = _text(logs, roles, "")
+        refusal = _refusal(logs.folder, text)
+        if refusal is None:
+            return text
+        # One file that cannot be used must not keep the others from a verdict.
+        faulty = [one for one in logs.tables if refusal.startswith((f"{one.path.name}, ",))]
+        if not faulty or len(logs.tables) == 1 or logs.sources:
+            return _text(logs, roles, refusal)
+        logs = logs.without(faulty, refusal)
 
 
 def _refusal(folder: Path, text: str) -> str | None:
@@ -399,12 +406,16 @@ def roles_of(tables: Sequence[UnstatedTable], logs: LogFolder) -> dict[str, str]
 
 def _activity(table: UnstatedTable, logs: LogFolder) -> float:
     """Return how much all columns of a file move from row to row, relative to the other files."""
+
+    def finite(values: Values) -> Values:
+        return values[np.isfinite(values)]
+
     total = 0.0
     for name in logs.log.signals:
         values = table.columns[name]
-        usual = max(float(np.nanstd(one.columns[name])) for one in logs.tables) or 1.0
-        finite = values[np.isfinite(values)]
-        total += float(np.std(np.diff(finite))) / usual if len(finite) > 1 else 0.0
+        usual = max(float(np.std(finite(one.columns[name]))) for one in logs.tables) or 1.0
+        moved = np.diff(finite(values))
+        total += float(np.std(moved)) / usual if moved.size else 0.0
     return total
 
 

@@ -215,6 +215,39 @@ def test_a_file_of_other_columns_is_named_and_left_out(tmp_path):
     assert [one["file"] for one in tomllib.loads(text)["records"]] == ["log.csv"]
 
 
+def test_a_file_in_which_the_joint_stands_still_is_left_out(tmp_path):
+    signals = joint()
+    columns = [signals[one] for one in ("time", "position", "torque")]
+    write(tmp_path / "moves.csv", columns, ["t", "q", "tau"])
+    columns[1] = 1e-3 * columns[1]
+    write(tmp_path / "rests.csv", columns, ["t", "q", "tau"])
+    text = write_draft(tmp_path).text
+    assert [one["file"] for one in tomllib.loads(text)["records"]] == ["moves.csv"]
+    assert "rests.csv is not used" in text
+
+
+def test_a_file_that_a_rig_cannot_use_does_not_keep_the_others_from_a_verdict(tmp_path):
+    signals = joint()
+    columns = [signals[one] for one in ("time", "position", "torque")]
+    write(tmp_path / "whole.csv", columns, ["t", "q", "tau"])
+    columns[1] = columns[1].copy()
+    columns[1][500:600] = np.nan
+    write(tmp_path / "torn.csv", columns, ["t", "q", "tau"])
+    text = write_draft(tmp_path).text
+    assert [one["file"] for one in tomllib.loads(text)["records"]] == ["whole.csv"]
+    assert "torn.csv is not used" in text
+    assert len(read_rig(tmp_path).records) == 2
+
+
+def test_a_single_file_that_a_rig_cannot_use_is_drafted_with_the_reason(tmp_path):
+    signals = joint()
+    columns = [signals[one] for one in ("time", "position", "torque")]
+    columns[1] = columns[1].copy()
+    columns[1][500:600] = np.nan
+    write(tmp_path / "torn.csv", columns, ["t", "q", "tau"])
+    assert "it is refused" in write_draft(tmp_path).text
+
+
 def test_records_of_a_bench_become_a_campaign(tmp_path):
     folder = tmp_path / "bench"
     campaign = small_campaign()
