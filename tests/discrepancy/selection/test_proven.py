@@ -4,21 +4,21 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from made_verdicts import made_set, made_verdict
 
 from pymoo_hdte.discrepancy._evidence.order_lines.candidates import out_of_tolerance
-from pymoo_hdte.discrepancy._selection.excess import Vote
+from pymoo_hdte.discrepancy._selection.excess import HeldOutTest
 from pymoo_hdte.discrepancy._selection.reason import HELD_OUT_ERROR_GROWS, NOT_VALIDATED, Reason
 from pymoo_hdte.discrepancy._selection.rules import RULES
-from pymoo_hdte.discrepancy._selection.verdict import Verdict
 from pymoo_hdte.discrepancy._verdicts.gap import Gap, grows
 from pymoo_hdte.discrepancy._verdicts.held_out_torsion import without_unproved_lines
 
 FIT = SimpleNamespace(misfit=1.0)
-CHOSEN = SimpleNamespace(fit=FIT)
 
 
 def verdict(status, probability=RULES.named_right):
-    return Verdict(status, FIT, CHOSEN, (), (), 100, probability=probability)
+    chosen = made_set(FIT, *(["parameter"] if status == "parameter" else []))
+    return made_verdict(status, FIT, chosen, freedom=100, probability=probability)
 
 
 @pytest.mark.parametrize("status", ["named", "parameter"])
@@ -47,17 +47,18 @@ def test_noise_alone_seldom_makes_a_true_change_look_denied(rng):
         before = np.sum((noise + direction) ** 2, axis=1)
         after = np.sum(noise**2, axis=1)
         denied = [
-            Vote(*pair, change).denies(RULES, 1.0) for pair in zip(before, after, strict=True)
+            HeldOutTest(*pair, change).denies(RULES, 1.0)
+            for pair in zip(before, after, strict=True)
         ]
         assert np.mean(denied) < 0.03
 
 
 def test_a_small_change_that_makes_it_worse_than_chance_allows_is_denied():
     """Those of two campaigns with an error that grows with load, named a zero and a clearance."""
-    assert Vote(426.1, 451.3, 9.36).denies(RULES, 1.0)
-    assert Vote(417.3, 420.3, 14.08).denies(RULES, 1.0)
-    assert not Vote(586.2, 586.4, 0.02).denies(RULES, 1.0)
-    assert not Vote(500.0, 500.0, 0.0).denies(RULES, 1.0)
+    assert HeldOutTest(426.1, 451.3, 9.36).denies(RULES, 1.0)
+    assert HeldOutTest(417.3, 420.3, 14.08).denies(RULES, 1.0)
+    assert not HeldOutTest(586.2, 586.4, 0.02).denies(RULES, 1.0)
+    assert not HeldOutTest(500.0, 500.0, 0.0).denies(RULES, 1.0)
 
 
 def test_a_growth_within_the_noise_of_the_metric_is_none():
@@ -80,18 +81,18 @@ def test_noise_makes_one_of_several_errors_grow_as_seldom_as_one(rng):
 def test_a_value_out_of_tolerance_and_its_effect_are_one_answer():
     base = [SimpleNamespace(name=name, start=1.0) for name in ("load_inertia", "stiffness")]
     inertia, stiffness = out_of_tolerance(base, ["load_inertia", "stiffness"], (), together=True)
-    assert inertia.says == ("load_inertia", "output")
-    assert stiffness.says == ("parameter", "stiffness")
+    assert inertia.named_effect == ("load_inertia", "output")
+    assert stiffness.named_effect == ("parameter", "stiffness")
 
 
 def line(order, side):
     parameter = SimpleNamespace(name="amplitude", linear=True, lower=-1.0, limited_at=bool)
     label = f"kinematic_error:gear@{order}"
-    law = SimpleNamespace(label=label, order=order, parameters=(parameter,))
+    law = SimpleNamespace(name="kinematic_error", label=label, order=order, parameters=(parameter,))
     fitted = SimpleNamespace(
         places=[(law, slice(0, 1))], bound_sides=np.array([side]), values=np.ones(1)
     )
-    return SimpleNamespace(candidates=(law,), fit=fitted)
+    return SimpleNamespace(candidates=(law,), fit=fitted, listed=True)
 
 
 @pytest.mark.parametrize(
@@ -106,7 +107,7 @@ def line(order, side):
 )
 def test_an_order_at_its_bound_or_without_proof_is_not_named(order, side, after, named):
     chosen, other = line(order, side), line(2.0, 0.0)
-    found = Verdict("partial", FIT, chosen, (other,), (), 100)
+    found = made_verdict("partial", FIT, chosen, (other,), freedom=100)
     gap = SimpleNamespace(before=1.0, after=after)
     found = without_unproved_lines(found, chosen.fit, [gap])
     assert (found.chosen is chosen) == named
