@@ -93,8 +93,8 @@ def is_bench(logs: LogFolder, roles: Roles) -> bool:
     if abs(roles.ratio) < _LEAST_RATIO:
         return False
     tests = _tests(logs, roles)
-    steady = [one for one in tests if not one.running or _is_steady(one)]
-    return len(steady) > _MOST * len(tests) and any(one.running for one in tests)
+    steady = [test for test in tests if not test.running or _is_steady(test)]
+    return len(steady) > _MOST * len(tests) and any(test.running for test in tests)
 
 
 def _is_steady(test: _Test) -> bool:
@@ -107,12 +107,12 @@ def _is_steady(test: _Test) -> bool:
 
 def _channels(roles: Roles) -> dict[str, ColumnGuess]:
     names = ("input_angle", "output_angle", "input_torque", "output_torque")
-    found = dict(zip(names, (*roles.coordinates, *roles.forces), strict=True))
+    channels = dict(zip(names, (*roles.coordinates, *roles.forces), strict=True))
     for name in names[2:]:
         # Signs of a bench are not those of a joint: `_signs` finds them.
-        options = {key: one for key, one in found[name].options.items() if key != "scale"}
-        found[name] = replace(found[name], options=options)
-    return found
+        options = {key: value for key, value in channels[name].options.items() if key != "scale"}
+        channels[name] = replace(channels[name], options=options)
+    return channels
 
 
 def _signs(tests: list[_Test]) -> dict[str, float]:
@@ -120,11 +120,13 @@ def _signs(tests: list[_Test]) -> dict[str, float]:
 
     From the records with most torque, in which friction is small beside the load.
     """
-    running = [one for one in tests if one.running]
-    work = sum(float(np.sign(one.speed) * np.mean(one.signals["input_torque"])) for one in running)
-    load = sum(float(np.mean(one.signals["input_torque"])) * one.load for one in running)
-    first = -1.0 if work < 0.0 else 1.0
-    return {"input_torque": first, "output_torque": -first if load < 0.0 else first}
+    running = [test for test in tests if test.running]
+    work = sum(
+        float(np.sign(test.speed) * np.mean(test.signals["input_torque"])) for test in running
+    )
+    load = sum(float(np.mean(test.signals["input_torque"])) * test.load for test in running)
+    sign = -1.0 if work < 0.0 else 1.0
+    return {"input_torque": sign, "output_torque": -sign if load < 0.0 else sign}
 
 
 def _tests(logs: LogFolder, roles: Roles) -> list[_Test]:
@@ -135,7 +137,7 @@ def _tests(logs: LogFolder, roles: Roles) -> list[_Test]:
     tests = []
     for table in (*logs.tables, *logs.others):
         there = channels if channels["input_angle"].column in table.columns else locked
-        columns = [roles.time.column, *(one.column for one in there.values())]
+        columns = [roles.time.column, *(guess.column for guess in there.values())]
         if any(name not in table.columns for name in columns):
             continue
         rows = np.all([np.isfinite(table.columns[name]) for name in columns], axis=0)
@@ -193,15 +195,15 @@ def _refusal(folder: Path, text: str) -> str | None:
         try:
             read_campaign(place)
         except InvalidInput as error:
-            first, *further = complaints_of(error)
-            return f"{first}" + (f" (and {len(further)} more)" if further else "")
+            complaint, *further = complaints_of(error)
+            return f"{complaint}" + (f" (and {len(further)} more)" if further else "")
     return None
 
 
 def _text(logs: LogFolder, roles: Roles, refusal: str) -> str:
     tests, signs = _signed(_tests(logs, roles))
     ratio = _ratio(roles)
-    load = max((abs(one.load) for one in tests if one.running), default=RATED_TORQUE)
+    load = max((abs(test.load) for test in tests if test.running), default=RATED_TORQUE)
     size = load / RATED_TORQUE if load > 0.0 else 1.0
     stiffness, stiffness_said = _stiffness(tests, abs(ratio), size)
     lines = [
@@ -264,20 +266,20 @@ def _stiffness(tests: list[_Test], ratio: float, size: float) -> tuple[float, st
             torque, angle = test.signals["output_torque"], test.signals["output_angle"]
             slope = abs(float(np.polyfit(angle, torque, 1)[0]))
             return slope, f"likely: slope of torque over angle in {test.table.path.name}"
-    running = [one for one in tests if one.running]
-    loads = np.array([one.load for one in running])
+    running = [test for test in tests if test.running]
+    loads = np.array([test.load for test in running])
     errors = np.array(
         [
-            np.mean(one.signals["input_angle"] / ratio - one.signals["output_angle"])
-            for one in running
+            np.mean(test.signals["input_angle"] / ratio - test.signals["output_angle"])
+            for test in running
         ]
     )
     if len(running) > 2 and np.ptp(loads) > 0.0:
         slope, _ = np.polyfit(loads, errors, 1)
-        rest = float(
+        scatter = float(
             np.std(errors - np.polyval([slope, errors.mean() - slope * loads.mean()], loads))
         )
-        if slope > 0.0 and rest < 0.5 * float(np.std(errors)):
+        if slope > 0.0 and scatter < 0.5 * float(np.std(errors)):
             return 1.0 / float(slope), "likely: slope of the mean transmission error over the load"
     usual = RATED_STIFFNESS * size
     return usual, f"{EDIT}: nothing tells it; in proportion to the largest torque"
@@ -286,32 +288,33 @@ def _stiffness(tests: list[_Test], ratio: float, size: float) -> tuple[float, st
 def _static_error(tests: list[_Test], ratio: float) -> list[str]:
     """Return lines of the static error: orders of every harmonic drive, sizes as measured."""
     orders = [1.0, 2.0, round(2.0 * (ratio + 1.0) / ratio, 4)]
-    running = [one for one in tests if one.running]
-    slowest = min(running, key=lambda one: abs(one.speed))
+    running = [test for test in tests if test.running]
+    slowest = min(running, key=lambda test: abs(test.speed))
     angle = slowest.signals["input_angle"]
     error = angle / ratio - slowest.signals["output_angle"]
     phases = np.outer(angle, orders)
     time = (slowest.time - slowest.time.mean()) / np.ptp(slowest.time)
     basis = np.column_stack([np.cos(phases), np.sin(phases), np.ones_like(time), time])
-    found, *_ = np.linalg.lstsq(basis, error, rcond=None)
-    sizes = np.hypot(found[:3], found[3:6]) / ARCSEC
+    coefficients, *_ = np.linalg.lstsq(basis, error, rcond=None)
+    sizes = np.hypot(coefficients[:3], coefficients[3:6]) / ARCSEC
+    shown = [f"{max(size, 0.1):.3g}" for size in sizes]
     return [
         *remark(
             "likely: orders of a harmonic drive in cycles per input turn, with the sizes that "
             f"{slowest.table.path.name} shows by least squares"
         ),
-        f"static_error_orders = [{', '.join(f'{one:g}' for one in orders)}]",
-        f"static_error_amplitudes_arcsec = [{', '.join(f'{max(one, 0.1):.3g}' for one in sizes)}]",
+        f"static_error_orders = [{', '.join(f'{order:g}' for order in orders)}]",
+        f"static_error_amplitudes_arcsec = [{', '.join(shown)}]",
     ]
 
 
 def _noises(tests: list[_Test], ratio: float) -> list[str]:
-    running = [one for one in tests if one.running]
+    running = [test for test in tests if test.running]
 
     def of(name: str, scale: float = 1.0, records: list[_Test] = running) -> float:
-        return float(np.median([noise_of(one.signals[name]) for one in records])) / scale
+        return float(np.median([noise_of(test.signals[name]) for test in records])) / scale
 
-    locked = [one for one in tests if not one.running]
+    locked = [test for test in tests if not test.running]
     angle = max(of("output_angle"), of("input_angle", ratio)) / ARCSEC
     torsion = of("output_angle", records=locked) / ARCSEC if locked else angle
     torques = [of("input_torque"), of("output_torque")]
@@ -329,15 +332,15 @@ def _noises(tests: list[_Test], ratio: float) -> list[str]:
 
 def _table(logs: LogFolder, roles: Roles, signs: Mapping[str, float]) -> list[str]:
     assert roles.time is not None
-    first = logs.tables[0]
-    lines = ["[table]", f"format = {toml_value(first.format)}"]
+    table = logs.tables[0]
+    lines = ["[table]", f"format = {toml_value(table.format)}"]
     for key in ("delimiter", "decimal"):
-        if (stated := getattr(first, key)) is not None:
+        if (stated := getattr(table, key)) is not None:
             lines += [f"{key} = {toml_value(stated)}"]
     lines += remark(guess_text(roles.time, "time"))
     lines += [f"time = {channel_text(roles.time)}", "[table.channels]"]
     for name, guess in _channels(roles).items():
-        options = {key: one for key, one in guess.options.items() if key != "divided_by"}
+        options = {key: value for key, value in guess.options.items() if key != "divided_by"}
         sign = float(guess.options.get("divided_by", 1.0)) if name == "input_angle" else 1.0
         if sign * signs.get(name, 1.0) < 0.0:
             options["scale"] = -1.0
@@ -349,11 +352,11 @@ def _table(logs: LogFolder, roles: Roles, signs: Mapping[str, float]) -> list[st
 
 
 def _records(logs: LogFolder, roles: Roles, tests: list[_Test]) -> list[str]:
-    running = tuple(one.table for one in tests if one.running)
+    running = tuple(test.table for test in tests if test.running)
     parts = roles_of(running, logs)
-    largest = max(abs(one.load) for one in tests if one.running)
+    largest = max(abs(test.load) for test in tests if test.running)
     lines: list[str] = []
-    for said in logs.left_out([one.table for one in tests]):
+    for said in logs.left_out([test.table for test in tests]):
         lines += remark(said)
     for test in tests:
         load = 0.0 if abs(test.load) < _CLOSE * largest else test.load

@@ -200,15 +200,15 @@ class Log:
 
     def __init__(self, tables: Sequence[UnstatedTable]) -> None:
         self.tables = tables
-        first = tables[0]
+        reference = tables[0]
         self.hints = {
-            name: read_title(first.titles.get(name, ""), first.units.get(name, ""))
-            for name in first.columns
+            name: read_title(reference.titles.get(name, ""), reference.units.get(name, ""))
+            for name in reference.columns
         }
-        self.titles = first.titles
+        self.titles = reference.titles
         self.periods = {
             name: period
-            for name in first.columns
+            for name in reference.columns
             if self.hints[name].quantity in ("", "position")
             and (period := _period([table.columns[name] for table in tables])) is not None
         }
@@ -218,7 +218,7 @@ class Log:
         ]
         self.names = [
             name
-            for name in first.columns
+            for name in reference.columns
             if all(
                 np.isfinite(table.columns[name]).mean() > _FINITE for table in tables[:_MOST_FILES]
             )
@@ -245,28 +245,28 @@ class Log:
     @cached_property
     def _smoothed(self) -> dict[int, dict[Name, tuple[Values, Values, Values]]]:
         """By width: level, derivative and second derivative of each column, rows compared."""
-        rows = sum(len(next(iter(one.values()))) for one in self._values)
-        found: dict[int, dict[Name, tuple[Values, Values, Values]]] = {}
+        rows = sum(len(next(iter(signals.values()))) for signals in self._values)
+        smoothed: dict[int, dict[Name, tuple[Values, Values, Values]]] = {}
         for width in _WIDTHS:
             parts: dict[Name, list[tuple[Values, Values, Values]]] = {}
-            for index, one in enumerate(self._values):
-                length = len(next(iter(one.values())))
+            for index, signals in enumerate(self._values):
+                length = len(next(iter(signals.values())))
                 if length < _ROWS_PER_WIDTH * width:
                     continue
                 # Rows may be uneven: the mean of a signal belongs to the mean of its times.
                 moments = _averaged(self._moments(index), width)
                 inside = slice(2 * width, length - 2 * width, max(1, rows // _COMPARED))
                 for name in self.signals:
-                    level = _averaged(one[name], width)
+                    level = _averaged(signals[name], width)
                     rate = np.gradient(level, moments)
                     second = np.gradient(rate, moments)
                     parts.setdefault(name, []).append((level[inside], rate[inside], second[inside]))
             if parts:
-                found[width] = {
-                    name: tuple(np.concatenate(one) for one in zip(*of_files, strict=True))  # type: ignore[misc]
+                smoothed[width] = {
+                    name: tuple(np.concatenate(arrays) for arrays in zip(*of_files, strict=True))  # type: ignore[misc]
                     for name, of_files in parts.items()
                 }
-        return found
+        return smoothed
 
     @cached_property
     def _shares(self) -> dict[str, tuple[Values, Values]]:
@@ -275,12 +275,12 @@ class Log:
         By ``level``, or ``rate`` for its derivative.
         """
         count = len(self.signals)
-        found = {}
+        shares = {}
         for index, kind in enumerate(("level", "rate")):
             best, slopes = np.zeros((count, count)), np.zeros((count, count))
-            for one in self._smoothed.values():
-                x = np.array([one[name][index] for name in self.signals])
-                y = np.array([one[name][0] for name in self.signals])
+            for signals in self._smoothed.values():
+                x = np.array([signals[name][index] for name in self.signals])
+                y = np.array([signals[name][0] for name in self.signals])
                 x, y = x - x.mean(axis=1)[:, None], y - y.mean(axis=1)[:, None]
                 xx, yy, xy = np.sum(x * x, axis=1), np.sum(y * y, axis=1), x @ y.T
                 with np.errstate(divide="ignore", invalid="ignore"):
@@ -288,8 +288,8 @@ class Log:
                     slope = np.nan_to_num(xy / xx[:, None], posinf=0.0, neginf=0.0)
                 better = share > best
                 best, slopes = np.where(better, share, best), np.where(better, slope, slopes)
-            found[kind] = best, slopes
-        return found
+            shares[kind] = best, slopes
+        return shares
 
     def _share(self, kind: str, name: Name, other: Name) -> tuple[float, float]:
         at, to = self.signals.index(name), self.signals.index(other)
@@ -306,22 +306,23 @@ class Log:
 
     def ratio(self, name: Name, other: Name, force: Name | None) -> float:
         """Return how many times a column another one is, beside what a force twists them apart."""
-        one = self._smoothed[min(self._smoothed)]
-        columns = [one[name][0], np.ones_like(one[name][0])]
-        columns += [one[force][0]] if force is not None else []
-        found, *_ = np.linalg.lstsq(np.column_stack(columns), one[other][0], rcond=None)
-        return float(found[0])
+        signals = self._smoothed[min(self._smoothed)]
+        columns = [signals[name][0], np.ones_like(signals[name][0])]
+        columns += [signals[force][0]] if force is not None else []
+        fitted, *_ = np.linalg.lstsq(np.column_stack(columns), signals[other][0], rcond=None)
+        return float(fitted[0])
 
     def roughness(self, name: Name) -> float:
         """Return the steps between rows over the variation of a column; 0 for a smooth one."""
-        steps = [float(np.std(np.diff(one))) for one in self.values(name)]
-        whole = [float(np.std(one)) for one in self.values(name)]
+        steps = [float(np.std(np.diff(values))) for values in self.values(name)]
+        whole = [float(np.std(values)) for values in self.values(name)]
         return max(steps) / (max(whole) or 1.0)
 
     def noise(self, name: Name) -> float:
         """Return the white noise of a column over its variation."""
         return max(
-            noise_of(one, jumps=True) / (float(np.std(one)) or 1.0) for one in self.values(name)
+            noise_of(values, jumps=True) / (float(np.std(values)) or 1.0)
+            for values in self.values(name)
         )
 
     def balance(self, position: Name, force: Name, factor: float = 1.0) -> Balance:
@@ -333,35 +334,35 @@ class Log:
         factor : float
             Of the position to SI.
         """
-        found = [
-            self._balance(one, position, force, factor) for one in self._smoothed.values()
+        balances = [
+            self._balance(signals, position, force, factor) for signals in self._smoothed.values()
         ] or [Balance(*[0.0] * 10)]
-        best = max(one.share for one in found)
+        best = max(balance.share for balance in balances)
         # Noise of an acceleration makes its coefficient too small: the smoothest of the best.
-        return next(one for one in reversed(found) if one.share >= best - _AS_GOOD)
+        return next(balance for balance in reversed(balances) if balance.share >= best - _AS_GOOD)
 
     def explained(self, position: Name) -> dict[Name, tuple[float, float]]:
         """Return by column which share of it motion explains, and which share friction has.
 
         The second is the size of friction, over that of the column; 0 where it would push.
         """
-        found: dict[Name, tuple[float, float]] = dict.fromkeys(self.signals, (0.0, 0.0))
-        for one in self._smoothed.values():
-            basis = _basis(*one[position])
-            signals = np.array([one[name][0] for name in self.signals]).T
+        explained: dict[Name, tuple[float, float]] = dict.fromkeys(self.signals, (0.0, 0.0))
+        for averaged in self._smoothed.values():
+            basis = _basis(*averaged[position])
+            signals = np.array([averaged[name][0] for name in self.signals]).T
             fitted, *_ = np.linalg.lstsq(basis, signals, rcond=1e-9)
             power = np.var(signals, axis=0)
-            left = np.mean((signals - basis @ fitted) ** 2, axis=0)
+            unexplained = np.mean((signals - basis @ fitted) ** 2, axis=0)
             friction = basis[:, 1:3] @ fitted[1:3]
             works = np.mean(friction * basis[:, 1:2], axis=0)
             for at, name in enumerate(self.signals):
                 if not power[at]:
                     continue
-                share = 1.0 - float(left[at] / power[at])
+                share = 1.0 - float(unexplained[at] / power[at])
                 size = math.sqrt(float(np.mean(friction[:, at] ** 2) / power[at]))
-                if share > found[name][0]:
-                    found[name] = share, size if works[at] > 0.0 else 0.0
-        return found
+                if share > explained[name][0]:
+                    explained[name] = share, size if works[at] > 0.0 else 0.0
+        return explained
 
     @staticmethod
     def _balance(
@@ -370,13 +371,13 @@ class Log:
         force: Name,
         factor: float,
     ) -> Balance:
-        q, v, a = (factor * one for one in signals[position])
+        q, v, a = (factor * part for part in signals[position])
         u = signals[force][0]
-        scales = [float(np.std(one)) or 1.0 for one in (a, v, q)]
+        scales = [float(np.std(part)) or 1.0 for part in (a, v, q)]
         basis = _basis(q, v, a)
-        found, *_ = np.linalg.lstsq(basis, u, rcond=1e-9)
+        coefficients, *_ = np.linalg.lstsq(basis, u, rcond=1e-9)
         power = float(np.var(u))
-        share = 1.0 - float(np.mean((u - basis @ found) ** 2)) / power if power else 0.0
+        share = 1.0 - float(np.mean((u - basis @ coefficients) ** 2)) / power if power else 0.0
         # Of sine and spring over a small travel only the sum is known.
         plain, *_ = np.linalg.lstsq(basis[:, [0, 1, 2, 3, 6]], u, rcond=1e-9)
         return Balance(
@@ -385,9 +386,9 @@ class Log:
             plain[1] / scales[1],
             plain[2],
             plain[3] / scales[2],
-            math.hypot(found[4], found[5]),
+            math.hypot(coefficients[4], coefficients[5]),
             float(np.std(u)),
-            *(float(np.std(one)) for one in (a, v, q)),
+            *(float(np.std(part)) for part in (a, v, q)),
         )
 
     def _cleaned(self, name: Name, values: Values) -> Values:
@@ -425,7 +426,7 @@ class Log:
                 candidates.append((titled, -spread, name, usual))
         if not candidates:
             return None, 1.0
-        titled, _, name, usual = max(candidates, key=lambda one: one[:2])
+        titled, _, name, usual = max(candidates, key=lambda candidate: candidate[:2])
         stated = self.hints[name].unit
         unit, scale, sure = self._unit_of_time(stated, usual)
         rate = 1.0 / (usual * CHANNEL_UNITS[unit] * scale)
@@ -456,7 +457,7 @@ def _averaged(values: Values, width: int) -> Values:
 
 def _basis(q: Values, v: Values, a: Values) -> Values:
     """Return what a force may be made of, shape (n, 7): inertia first, the constant last."""
-    scales = [float(np.std(one)) or 1.0 for one in (a, v, q)]
+    scales = [float(np.std(part)) or 1.0 for part in (a, v, q)]
     columns = [a / scales[0], v / scales[1], np.sign(v), (q - q.mean()) / scales[2]]
     columns += [np.sin(q), np.cos(q), np.ones_like(q)]
     return np.column_stack(columns)
@@ -468,8 +469,12 @@ def _period(columns: Sequence[Values]) -> float | None:
     They jump from one end to the other, and spend no more time at the ends than elsewhere, which a
     force that is switched does.
     """
-    lowest = min(float(np.nanmin(one[np.isfinite(one)], initial=np.inf)) for one in columns)
-    highest = max(float(np.nanmax(one[np.isfinite(one)], initial=-np.inf)) for one in columns)
+    lowest = min(
+        float(np.nanmin(values[np.isfinite(values)], initial=np.inf)) for values in columns
+    )
+    highest = max(
+        float(np.nanmax(values[np.isfinite(values)], initial=-np.inf)) for values in columns
+    )
     span = highest - lowest
     if not (math.isfinite(span) and span > 0.0):
         return None
@@ -528,7 +533,7 @@ class _Finder:
     def speeds(self) -> dict[tuple[Name, Name], tuple[float, float]]:
         """Pairs of a column and another one that is its derivative, with share and ratio."""
         names = self.log.signals
-        found = {}
+        pairs = {}
         for name in names:
             for other in names:
                 hint = self.log.hints[other]
@@ -541,22 +546,22 @@ class _Finder:
                     else _DERIVATIVE
                 )
                 if share >= least and self.log.same(name, other)[0] < share:
-                    found[name, other] = share, ratio
-        return found
+                    pairs[name, other] = share, ratio
+        return pairs
 
     @cached_property
     def is_speed(self) -> dict[Name, tuple[Name, float, float]]:
         """Columns that are derivatives: of which, the share and the ratio."""
-        found: dict[Name, tuple[Name, float, float]] = {}
+        speeds: dict[Name, tuple[Name, float, float]] = {}
         for (name, other), (share, ratio) in self.speeds.items():
             backward = self.speeds.get((other, name), (0.0, 0.0))
             # In steady sines each is the derivative of the other: signs and titles tell.
             wrong = ratio < 0.0 < backward[1] or self._said(name, other) < self._said(other, name)
             if backward[0] and wrong:
                 continue
-            if share > found.get(other, (name, 0.0, 0.0))[1]:
-                found[other] = name, share, ratio
-        return found
+            if share > speeds.get(other, (name, 0.0, 0.0))[1]:
+                speeds[other] = name, share, ratio
+        return speeds
 
     def _said(self, name: Name, other: Name) -> int:
         """Return how far titles support that one column is the derivative of another."""
@@ -598,8 +603,8 @@ class _Finder:
             if rate:
                 balance = balance.at_rate(rate)
         if encoders is not None and (pair := self._two_forces(force)):
-            forces = tuple(self._force(one, coordinates[-1]) for one in pair)
-        used = [one.column for one in (*coordinates, *forces)]
+            forces = tuple(self._force(guess, coordinates[-1]) for guess in pair)
+        used = [guess.column for guess in (*coordinates, *forces)]
         remarks = tuple(self._others(used))
         return Roles(log.time, rate, coordinates, forces, ratio, balance, remarks)
 
@@ -611,7 +616,7 @@ class _Finder:
             for name in log.signals
             if log.hints[name].quantity == "position" and name not in self.is_speed
         ]
-        strong = [one for one in titled if not log.hints[one].weak]
+        strong = [name for name in titled if not log.hints[name].weak]
         moved = [
             name
             for name in log.signals
@@ -620,26 +625,28 @@ class _Finder:
             and (log.hints[name].quantity in ("", "position") or log.hints[name].weak)
         ]
         strong = list(dict.fromkeys([*strong, *moved]))
-        measured = [one for one in strong if not log.hints[one].command]
+        measured = [name for name in strong if not log.hints[name].command]
         if measured or strong:
             return measured or strong
         if titled:
             return titled
-        speeds = [one for one in log.signals if log.hints[one].quantity == "speed"]
-        unknown = [one for one in log.signals if not log.hints[one].quantity]
-        weak = [one for one in log.signals if log.hints[one].weak]
+        speeds = [name for name in log.signals if log.hints[name].quantity == "speed"]
+        unknown = [name for name in log.signals if not log.hints[name].quantity]
+        weak = [name for name in log.signals if log.hints[name].weak]
         return unknown or speeds or weak
 
     def _force_candidates(self, positions: Sequence[Name]) -> list[Name]:
         log = self.log
         others = [
-            one
-            for one in log.signals
-            if one not in self.is_speed
-            and log.hints[one].quantity not in ("speed", "acceleration", "position", "temperature")
+            name
+            for name in log.signals
+            if name not in self.is_speed
+            and log.hints[name].quantity not in ("speed", "acceleration", "position", "temperature")
         ]
-        titled = [one for one in others if log.hints[one].quantity in FORCES]
-        strong = [one for one in titled if not log.hints[one].weak and not log.hints[one].command]
+        titled = [name for name in others if log.hints[name].quantity in FORCES]
+        strong = [
+            name for name in titled if not log.hints[name].weak and not log.hints[name].command
+        ]
         if strong or titled:
             return strong or titled
         return others
@@ -650,7 +657,7 @@ class _Finder:
         best: tuple[Name, Name | None] | None = None
         forces = self._force_candidates(positions)
         scores: dict[tuple[Name, Name], float] = {}
-        widest = max((self._span(one) for one in positions), default=0.0)
+        widest = max((self._span(name) for name in positions), default=0.0)
         for position in positions:
             if self._span(position) <= 0.0:
                 continue
@@ -698,17 +705,17 @@ class _Finder:
             if log.same(position, other)[0] > _SAME
             and abs(log.same(position, other)[1] - 1) < _NEAR
         ]
-        if not log.titles.get(position) or not any(log.hints[one].quantity for one in twins):
+        if not log.titles.get(position) or not any(log.hints[name].quantity for name in twins):
             position = max(twins, key=log.noise, default=position)
         return position, force
 
     def _span(self, name: Name) -> float:
-        return max(float(np.ptp(one)) for one in self.log.values(name))
+        return max(float(np.ptp(values)) for values in self.log.values(name))
 
     def _alike(self, names: Sequence[Name]) -> bool:
         """Tell whether all of these have one unit, or none."""
-        units = {self.log.hints[one].unit for one in names}
-        counted = {self._counted(one) for one in names}
+        units = {self.log.hints[name].unit for name in names}
+        counted = {self._counted(name) for name in names}
         return len(units) == len(counted) == 1
 
     def _counted(self, name: Name) -> bool:
@@ -737,22 +744,33 @@ class _Finder:
     ) -> tuple[Name, Name, float] | None:
         """Return columns of input and output encoder, and the ratio of their readings."""
         log, best = self.log, None
-        measured = [one for one in positions if not log.hints[one].command]
-        for first in measured:
-            for second in measured:
-                if first == second:
+        measured = [name for name in positions if not log.hints[name].command]
+        for input_name in measured:
+            for output_name in measured:
+                if input_name == output_name:
                     continue
-                share, ratio = log.same(second, first)
-                sides = log.hints[first].side == "input", log.hints[second].side == "output"
+                share, ratio = log.same(output_name, input_name)
+                sides = (
+                    log.hints[input_name].side == "input",
+                    log.hints[output_name].side == "output",
+                )
                 computed = share > _COMPUTED and not all(sides)
-                if share < _SAME or computed or self._counted(first) != self._counted(second):
+                if (
+                    share < _SAME
+                    or computed
+                    or self._counted(input_name) != self._counted(output_name)
+                ):
                     continue
-                ratio = log.ratio(second, first, force) * self._size(first) / self._size(second)
+                ratio = (
+                    log.ratio(output_name, input_name, force)
+                    * self._size(input_name)
+                    / self._size(output_name)
+                )
                 if not (_RATIOS[0] <= abs(ratio) <= _RATIOS[1]) and not all(sides):
                     continue
                 known = sum(sides), share
                 if best is None or known > best[0]:
-                    best = known, (first, second, ratio)
+                    best = known, (input_name, output_name, ratio)
         return None if best is None else best[1]
 
     def _two_encoders(
@@ -796,12 +814,14 @@ class _Finder:
         log, hint = self.log, self.log.hints[name]
         why: list[str] = []
         sure = "unsure"
-        speed = [(other, one) for other, one in self.is_speed.items() if one[0] == name]
+        speed = [
+            (other, relation) for other, relation in self.is_speed.items() if relation[0] == name
+        ]
         if hint.quantity == "position":
             why.append("its title says so")
             sure = "likely" if hint.weak else "sure"
         if speed:
-            other, (_, share, ratio) = max(speed, key=lambda one: one[1][1])
+            other, (_, share, ratio) = max(speed, key=lambda relation: relation[1][1])
             why.append(
                 f"its derivative is {log.label(other)} ({100.0 * share:.2f} % of its variance"
                 f"{self._slope_said(name, other, ratio)})"
@@ -893,14 +913,14 @@ class _Finder:
             if share > _SAME and hint.unit in ("", *UNITS["angle"]):
                 turn = abs(ratio) * 2.0 * math.pi / CHANNEL_UNITS.get(hint.unit, 1.0)
                 power = 2.0 ** round(math.log2(turn))
-                near = abs(turn / power - 1.0) < _NEAR
-                if near:
+                is_power = abs(turn / power - 1.0) < _NEAR
+                if is_power:
                     said = f"{log.label(other)}, an angle, shows {turn:.6g} counts a turn"
                     return COUNTS, True, {"counts_per_turn": power}, (said,)
         if like is not None and "counts_per_turn" in like.options:
             count = float(like.options["counts_per_turn"])
             return COUNTS, False, {"counts_per_turn": count}, ("as many counts as the other",)
-        largest = max(float(np.max(np.abs(one))) for one in log.values(name))
+        largest = max(float(np.max(np.abs(values))) for values in log.values(name))
         power = 2.0 ** math.ceil(math.log2(largest))
         said = "whole numbers; the counts per turn are the next power of two, a guess"
         return COUNTS, False, {"counts_per_turn": power}, (said,)
@@ -957,7 +977,7 @@ class _Finder:
                 continue
             if name in used:
                 continue
-            twin = next((one for one in used if log.same(one, name)[0] > _SAME), None)
+            twin = next((column for column in used if log.same(column, name)[0] > _SAME), None)
             if twin is not None:
                 share, ratio = log.same(twin, name)
                 kind = " (a set value?)" if hint.command else ""

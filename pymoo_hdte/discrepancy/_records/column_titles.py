@@ -122,9 +122,9 @@ def read_title(title: str, unit: str = "") -> TitleHint:
         letters = letters[:-1]
     words = [word.lower() for word in letters]
     numbers = re.findall(r"\d+", plain)
-    quantity = next((one for one, known in QUANTITIES.items() if _any(words, known)), "")
+    quantity = next((name for name, known in QUANTITIES.items() if _any(words, known)), "")
     quantity = quantity or quantity_of(unit)
-    letter = next((_LETTERS[one] for one in letters if one in _LETTERS), "")
+    letter = next((_LETTERS[letter] for letter in letters if letter in _LETTERS), "")
     return TitleHint(
         quantity or letter,
         unit,
@@ -139,14 +139,16 @@ def quantity_of(unit: str) -> str:
     """Return which of `QUANTITIES` has a unit, empty where none or several have."""
     if unit == COUNTS:
         return "position"
-    measured = next((one for one in MEASURED if unit in UNITS[one]), "")
+    measured = next((kind for kind in MEASURED if unit in UNITS[kind]), "")
     quantity = _OF_UNITS.get(measured, measured)
     return quantity if quantity in QUANTITIES else ""
 
 
 def _any(words: list[str], known: tuple[str, ...]) -> bool:
     return any(
-        word == one or (len(one) >= _LONG and one in word) for word in words for one in known
+        word == wanted or (len(wanted) >= _LONG and wanted in word)
+        for word in words
+        for wanted in known
     )
 
 

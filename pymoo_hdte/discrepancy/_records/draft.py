@@ -52,9 +52,9 @@ class Draft:
         said = "1 record" if records == 1 else f"{records} records"
         sentences = [f"Wrote {path}, with {said} of the files of the folder."]
         sentences += [
-            f"{one.sure}: {one.column!r} is the {one.quantity}, in {one.unit}"
-            f"{'' if one.unit_sure else ' (assumed)'}"
-            for one in guesses
+            f"{guess.sure}: {guess.column!r} is the {guess.quantity}, in {guess.unit}"
+            f"{'' if guess.unit_sure else ' (assumed)'}"
+            for guess in guesses
         ]
         if edits:
             lines = ", ".join(map(str, edits))
@@ -64,14 +64,14 @@ class Draft:
         )
         columns = [
             {
-                "column": one.column,
-                "quantity": one.quantity,
-                "unit": one.unit,
-                "sure": one.sure,
-                "unit_known": one.unit_sure,
-                "why": list(one.why),
+                "column": guess.column,
+                "quantity": guess.quantity,
+                "unit": guess.unit,
+                "sure": guess.sure,
+                "unit_known": guess.unit_sure,
+                "why": list(guess.why),
             }
-            for one in guesses
+            for guess in guesses
         ]
         return {"file": str(path), "columns": columns, "edits": edits, "sentences": sentences}
 

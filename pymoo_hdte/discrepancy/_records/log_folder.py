@@ -51,11 +51,11 @@ class LogFolder:
         used : collection of UnstatedTable
             Those of the others that are used all the same.
         """
-        names = [one.path for one in used]
+        names = [table.path for table in used]
         others = [
-            f"{one.path.name} is not used: its columns are others ({_shown(one)})"
-            for one in self.others
-            if one.path not in names
+            f"{table.path.name} is not used: its columns are others ({_shown(table)})"
+            for table in self.others
+            if table.path not in names
         ]
         return [*others, *self.refused]
 
@@ -69,10 +69,10 @@ class LogFolder:
         why : str
             The end of a sentence.
         """
-        names = [one.path for one in tables]
-        kept = tuple(one for one in self.tables if one.path not in names)
+        names = [table.path for table in tables]
+        remaining = tuple(table for table in self.tables if table.path not in names)
         said = [f"{path.name} is not used: {why}" for path in names]
-        return replace(self, log=Log(kept), tables=kept, refused=(*self.refused, *said))
+        return replace(self, log=Log(remaining), tables=remaining, refused=(*self.refused, *said))
 
     def moving(self, column: Name) -> LogFolder:
         """Return the folder without files in which a column stands still.
@@ -82,10 +82,10 @@ class LogFolder:
         column : str or int
         """
         spans = {
-            one.path: float(np.ptp(one.columns[column][np.isfinite(one.columns[column])]))
-            for one in self.tables
+            table.path: float(np.ptp(table.columns[column][np.isfinite(table.columns[column])]))
+            for table in self.tables
         }
-        still = [one for one in self.tables if spans[one.path] < STILL * max(spans.values())]
+        still = [table for table in self.tables if spans[table.path] < STILL * max(spans.values())]
         return (
             self.without(still, f"{self.log.label(column)} stands still in it") if still else self
         )
@@ -125,8 +125,8 @@ def read_log_folder(folder: Path) -> LogFolder:
         table, sources = joined
         return LogFolder(folder, Log([table]), (table,), sources, (), tuple(refused))
     chosen = _alike(tables)
-    used = {one.path for one in chosen}
-    others = tuple(one for one in tables if one.path not in used)
+    used = {table.path for table in chosen}
+    others = tuple(table for table in tables if table.path not in used)
     return LogFolder(folder, Log(chosen), tuple(chosen), {}, others, tuple(refused))
 
 
@@ -142,15 +142,15 @@ def _alike(tables: Sequence[UnstatedTable]) -> list[UnstatedTable]:
     do files that lack many.
     """
     best: list[UnstatedTable] = []
-    for first in tables:
-        titled = not any(isinstance(name, int) for name in first.columns)
+    for reference in tables:
+        titled = not any(isinstance(name, int) for name in reference.columns)
         group = [
-            replace(table, columns={name: table.columns[name] for name in first.columns})
+            replace(table, columns={name: table.columns[name] for name in reference.columns})
             for table in tables
-            if (first.format, first.delimiter, first.decimal, first.skip_rows)
+            if (reference.format, reference.delimiter, reference.decimal, reference.skip_rows)
             == (table.format, table.delimiter, table.decimal, table.skip_rows)
-            and set(first.columns) <= set(table.columns)
-            and (titled or len(first.columns) == len(table.columns))
+            and set(reference.columns) <= set(table.columns)
+            and (titled or len(reference.columns) == len(table.columns))
         ]
         if _numbers(group) > _numbers(best):
             best = group
@@ -158,14 +158,14 @@ def _alike(tables: Sequence[UnstatedTable]) -> list[UnstatedTable]:
 
 
 def _numbers(group: Sequence[UnstatedTable]) -> int:
-    return sum(one.rows * len(one.columns) for one in group)
+    return sum(table.rows * len(table.columns) for table in group)
 
 
 def _joined(
     tables: Sequence[UnstatedTable],
 ) -> tuple[UnstatedTable, dict[Name, tuple[str, Name]]] | None:
     """Return one record of files that have one signal each, as long as each other."""
-    first = tables[0]
+    reference = tables[0]
     signals: dict[Name, tuple[str, Name]] = {}
     columns: dict[Name, Values] = {}
     titles: dict[Name, str] = {}
@@ -174,23 +174,28 @@ def _joined(
     for table in tables:
         log = Log([table])
         same = (table.format, table.delimiter, table.decimal) == (
-            *(first.format, first.delimiter, first.decimal),
+            *(reference.format, reference.delimiter, reference.decimal),
         )
         stamps = None if log.time is None else log.time.column
-        near = abs(table.rows - first.rows) <= _LENGTHS * first.rows
-        if len(log.signals) != 1 or not same or not near or (table is not first and stamps != time):
+        as_long = abs(table.rows - reference.rows) <= _LENGTHS * reference.rows
+        if (
+            len(log.signals) != 1
+            or not same
+            or not as_long
+            or (table is not reference and stamps != time)
+        ):
             return None
         time = stamps
         (column,) = log.signals
         stem = table.path.name.split(".")[0]
         signals[stem] = table.path.name, column
-        columns[stem] = table.columns[column][: min(one.rows for one in tables)]
+        columns[stem] = table.columns[column][: min(table.rows for table in tables)]
         title = str(table.titles.get(column, ""))
         titles[stem] = f"{stem} {title}".strip()
         units[stem] = table.units.get(column, "")
     if len(signals) < 2 or len(signals) < len(tables):
         return None
     if time is not None:
-        columns[time] = first.columns[time][: min(one.rows for one in tables)]
-        titles[time] = first.titles.get(time, "")
-    return replace(first, columns=columns, titles=titles, units=units), signals
+        columns[time] = reference.columns[time][: min(table.rows for table in tables)]
+        titles[time] = reference.titles.get(time, "")
+    return replace(reference, columns=columns, titles=titles, units=units), signals

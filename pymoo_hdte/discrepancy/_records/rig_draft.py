@@ -56,7 +56,7 @@ def rig_text(logs: LogFolder, roles: Roles) -> str:
         if refusal is None:
             return text
         # One file that cannot be used must not keep the others from a verdict.
-        faulty = [one for one in logs.tables if refusal.startswith((f"{one.path.name}, ",))]
+        faulty = [table for table in logs.tables if refusal.startswith(f"{table.path.name}, ")]
         if not faulty or len(logs.tables) == 1 or logs.sources:
             return _text(logs, roles, refusal)
         logs = logs.without(faulty, refusal)
@@ -70,8 +70,8 @@ def _refusal(folder: Path, text: str) -> str | None:
         try:
             read_rig(path, folder)
         except InvalidInput as error:
-            first, *further = complaints_of(error)
-            return f"{first}" + (f" (and {len(further)} more)" if further else "")
+            complaint, *further = complaints_of(error)
+            return f"{complaint}" + (f" (and {len(further)} more)" if further else "")
     return None
 
 
@@ -237,7 +237,7 @@ def _scaled(force: ColumnGuess) -> bool:
 
 
 def _told(force: ColumnGuess) -> bool:
-    return force.unit_sure or any("title" in one for one in force.why)
+    return force.unit_sure or any("title" in reason for reason in force.why)
 
 
 def _input(force: ColumnGuess, coordinate: str, turning: bool, scaled: bool) -> list[str]:
@@ -254,13 +254,13 @@ def _input(force: ColumnGuess, coordinate: str, turning: bool, scaled: bool) -> 
 
 
 def _table(logs: LogFolder, roles: Roles) -> list[str]:
-    first = logs.tables[0]
-    lines = ["[table]", f"format = {toml_value(first.format)}"]
+    table = logs.tables[0]
+    lines = ["[table]", f"format = {toml_value(table.format)}"]
     for key in ("delimiter", "decimal"):
-        if (stated := getattr(first, key)) is not None:
+        if (stated := getattr(table, key)) is not None:
             lines += [f"{key} = {toml_value(stated)}"]
-    if first.skip_rows:
-        lines += [f"skip_rows = {first.skip_rows}"]
+    if table.skip_rows:
+        lines += [f"skip_rows = {table.skip_rows}"]
     if roles.time is not None:
         lines += remark(guess_text(roles.time, "time"))
         lines += [f"time = {channel_text(roles.time)}"]
@@ -329,7 +329,7 @@ def channel_text(
     if guess.quantity in ("torque", "force") and not _told(guess):
         unit = "1"
     keys = guess.options if options is None else options
-    further = "".join(f", {name} = {toml_value(one)}" for name, one in keys.items())
+    further = "".join(f", {name} = {toml_value(value)}" for name, value in keys.items())
     name = guess.column if column is None else column
     return f"{{ column = {toml_value(name)}, unit = {toml_value(unit)}{further} }}"
 
@@ -345,8 +345,8 @@ def _records(logs: LogFolder, roles: Roles) -> list[str]:
         lines += remark(said)
     if logs.sources:
         files = ", ".join(
-            f"{name} = {toml_value(logs.sources[one.column][0])}"
-            for name, one in _channel_columns(roles).items()
+            f"{name} = {toml_value(logs.sources[guess.column][0])}"
+            for name, guess in _channel_columns(roles).items()
         )
         lines += ["# One record, whose signals stand in files of their own.", "[[records]]"]
         name = logs.folder.resolve().name or "record"
@@ -395,13 +395,13 @@ def roles_of(tables: Sequence[UnstatedTable], logs: LogFolder) -> dict[str, str]
                 named[table.path.name] = role
     held_out = [name for name, role in named.items() if role == "held_out"]
     if 0 < len(held_out) < len(tables):
-        return {one.path.name: named.get(one.path.name, "train") for one in tables}
+        return {table.path.name: named.get(table.path.name, "train") for table in tables}
     # Held out are tests whose speeds lie between those of others, so that all are covered.
-    ranked = sorted(tables, key=lambda one: (_activity(one, logs), one.path.name))
-    held = {one.path.name for at, one in enumerate(ranked) if at % _HELD_OUT == 1}
+    ranked = sorted(tables, key=lambda table: (_activity(table, logs), table.path.name))
+    held = {table.path.name for at, table in enumerate(ranked) if at % _HELD_OUT == 1}
     if len(tables) == 2:
         held = {ranked[0].path.name}
-    return {one.path.name: "held_out" if one.path.name in held else "train" for one in tables}
+    return {table.path.name: "held_out" if table.path.name in held else "train" for table in tables}
 
 
 def _activity(table: UnstatedTable, logs: LogFolder) -> float:
@@ -413,7 +413,7 @@ def _activity(table: UnstatedTable, logs: LogFolder) -> float:
     total = 0.0
     for name in logs.log.signals:
         values = table.columns[name]
-        usual = max(float(np.std(finite(one.columns[name]))) for one in logs.tables) or 1.0
+        usual = max(float(np.std(finite(table.columns[name]))) for table in logs.tables) or 1.0
         moved = np.diff(finite(values))
         total += float(np.std(moved)) / usual if moved.size else 0.0
     return total
@@ -440,7 +440,7 @@ def toml_value(value: Any) -> str:
 
 def remark(text: str) -> list[str]:
     """Return a comment in lines of at most a hundred characters."""
-    plain = "".join(one if one.isprintable() else "?" for one in text)
+    plain = "".join(character if character.isprintable() else "?" for character in text)
     lines, line = [], ""
     for word in plain.split():
         if line and len(line) + len(word) > 96:

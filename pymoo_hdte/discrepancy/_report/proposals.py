@@ -29,7 +29,7 @@ def described(folder: Path) -> Path | None:
     folder : Path
     """
     return next(
-        (folder / one for one in (RIG_FILE, CAMPAIGN_FILE) if (folder / one).is_file()), None
+        (folder / file for file in (RIG_FILE, CAMPAIGN_FILE) if (folder / file).is_file()), None
     )
 
 
@@ -64,19 +64,21 @@ def proposals(folder: Path) -> dict[str, Any]:
     if edits:
         lines = ", ".join(map(str, edits))
         sentences.append(f"Lines of it that still say {EDIT}: {lines}.")
-    verdict = _newest(folder)
+    source = _newest(folder)
     document: dict[str, Any] = {"file": path.name, "verdict": None, "edits": edits}
-    if verdict is None:
+    if source is None:
         sentences.append(
             f"There is no verdict in a folder below. Run: pymoo-hdte discrepancy {folder} --out "
             f"{folder / 'report'}"
         )
         return document | {"sentences": sentences}
-    found = _read(verdict)
-    report = verdict.parent.relative_to(folder).as_posix()
-    sentences.append(f"Proposed from {report}/{verdict.name}, whose verdict is: {found['status']}.")
-    sentences += [f"- {one}" for one in _proposed(found, stated, report, path.name)]
-    return document | {"verdict": str(verdict), "sentences": sentences}
+    verdict = _read(source)
+    report = source.parent.relative_to(folder).as_posix()
+    sentences.append(
+        f"Proposed from {report}/{source.name}, whose verdict is: {verdict['status']}."
+    )
+    sentences += [f"- {text}" for text in _proposed(verdict, stated, report, path.name)]
+    return document | {"verdict": str(source), "sentences": sentences}
 
 
 def _edits(path: Path) -> list[int]:
@@ -90,27 +92,27 @@ def _edits(path: Path) -> list[int]:
 
 
 def _newest(folder: Path) -> Path | None:
-    found = [one for one in folder.glob(f"*/{FOLDER.document}") if one.is_file()]
-    return max(found, key=lambda one: (one.stat().st_mtime_ns, str(one)), default=None)
+    paths = [path for path in folder.glob(f"*/{FOLDER.document}") if path.is_file()]
+    return max(paths, key=lambda path: (path.stat().st_mtime_ns, str(path)), default=None)
 
 
 def _read(path: Path) -> dict[str, Any]:
     Budget.now().check("bytes", regular_file(path), path.name)
     try:
-        found = json.loads(path.read_bytes())
+        verdict = json.loads(path.read_bytes())
     except (ValueError, RecursionError) as error:
         raise InvalidInput(str(path), str(error), "a verdict of pymoo-hdte discrepancy") from None
-    if not isinstance(found, dict) or not isinstance(found.get("status"), str):
-        raise InvalidInput(str(path), type(found).__name__, "a verdict of pymoo-hdte discrepancy")
-    return found
+    if not isinstance(verdict, dict) or not isinstance(verdict.get("status"), str):
+        raise InvalidInput(str(path), type(verdict).__name__, "a verdict of pymoo-hdte discrepancy")
+    return verdict
 
 
 def _proposed(
-    found: Mapping[str, Any], stated: Mapping[str, Any], report: str, file: str
+    verdict: Mapping[str, Any], stated: Mapping[str, Any], report: str, file: str
 ) -> Iterator[str]:
     """Yield one proposal after another, what to correct first."""
-    effects = [one for one in _tables(found.get("effects")) if "name" in one]
-    yield from _at_bounds(found)
+    effects = [effect for effect in _tables(verdict.get("effects")) if "name" in effect]
+    yield from _at_bounds(verdict)
     yield from _gear(effects, stated)
     for name, table in _named(stated.get("inputs")):
         if "gain" not in table:
@@ -118,22 +120,22 @@ def _proposed(
                 f"Sizes are per unit of {name}. If you know its force or torque per unit, add to "
                 f"[inputs.{name}]: gain = {{ value = ... }}, and give the other values for it."
             )
-    if found["status"] in _UNSURE and not effects:
+    if verdict["status"] in _UNSURE and not effects:
         yield (
             "Nothing of the library explains the misfit: check signs, units and ratios first, and "
             "whether a delay is between the signals."
         )
-    for one in _tables(found.get("offered")):
-        share = one.get("removes")
-        if isinstance(share, int | float) and "name" in one:
+    for effect in _tables(verdict.get("offered")):
+        share = effect.get("removes")
+        if isinstance(share, int | float) and "name" in effect:
             yield (
-                f"{one['name']} at the {one.get('port', 'drive')} would remove {100.0 * share:.0f} "
-                "% of what is left, but is not sure enough to be named: a further test may "
+                f"{effect['name']} at the {effect.get('port', 'drive')} would remove "
+                f"{100.0 * share:.0f} % of what is left, but is not sure enough to be named: a further test may "
                 "show it."
             )
-    model = found.get("revised_model")
+    model = verdict.get("revised_model")
     if effects and isinstance(model, dict) and file == RIG_FILE:
-        names = ", ".join(str(one["name"]) for one in effects)
+        names = ", ".join(str(effect["name"]) for effect in effects)
         yield (
             f"To ask what is missing beside {names}: add --believed {report}/{model.get('file')}, "
             f'or put model = "{report}/{model.get("file")}" into {file} in the place of its '
@@ -141,34 +143,35 @@ def _proposed(
         )
     elif effects and isinstance(model, dict):
         yield f"To ask what else is missing: add --believed {report}/{model.get('file')}."
-    if not found.get("held_out"):
+    if not verdict.get("held_out"):
         yield (
             "No record was held out, so that nothing is validated: record a second test of another "
             'kind and list it with role = "held_out".'
         )
-    following = found.get("next_experiment")
+    following = verdict.get("next_experiment")
     if isinstance(following, dict) and isinstance(following.get("description"), str):
         yield f"Test to make next: {following['description']}"
 
 
-def _at_bounds(found: Mapping[str, Any]) -> Iterator[str]:
-    base = found.get("base")
-    for name, one in base.items() if isinstance(base, dict) else ():
-        if isinstance(one, dict) and one.get("at_bound") and isinstance(one.get("value"), float):
+def _at_bounds(verdict: Mapping[str, Any]) -> Iterator[str]:
+    base = verdict.get("base")
+    for name, value in base.items() if isinstance(base, dict) else ():
+        bound = isinstance(value, dict) and value.get("at_bound")
+        if bound and isinstance(value.get("value"), float):
             yield (
-                f"The {name} is at the bound of what is allowed, {one['value']:.3g} "
-                f"{one.get('unit', '')}".rstrip()
+                f"The {name} is at the bound of what is allowed, {value['value']:.3g} "
+                f"{value.get('unit', '')}".rstrip()
                 + ": allow more by a larger factor, or correct the value, if it is a guess."
             )
 
 
 def _gear(effects: Sequence[Mapping[str, Any]], stated: Mapping[str, Any]) -> Iterator[str]:
     geared = {name for name, table in _named(stated.get("ports")) if "gear" in table}
-    for one in effects:
-        order = (one.get("parameters") or {}).get("order", {})
+    for effect in effects:
+        order = (effect.get("parameters") or {}).get("order", {})
         order = order.get("value") if isinstance(order, dict) else None
-        port = str(one.get("port", ""))
-        if one["name"] != "torque_ripple" or port in geared:
+        port = str(effect.get("port", ""))
+        if effect["name"] != "torque_ripple" or port in geared:
             continue
         if isinstance(order, int | float) and order > 10.0 * _PER_INPUT_TURN:
             ratio = order / _PER_INPUT_TURN
@@ -180,7 +183,7 @@ def _gear(effects: Sequence[Mapping[str, Any]], stated: Mapping[str, Any]) -> It
 
 
 def _tables(value: Any) -> list[Mapping[str, Any]]:
-    return [one for one in value if isinstance(one, dict)] if isinstance(value, list) else []
+    return [table for table in value if isinstance(table, dict)] if isinstance(value, list) else []
 
 
 def _named(value: Any) -> list[tuple[str, Mapping[str, Any]]]:
