@@ -130,8 +130,8 @@ def _proposed(
         if isinstance(share, int | float) and "name" in effect:
             yield (
                 f"{effect['name']} at the {effect.get('port', 'drive')} would remove "
-                f"{100.0 * share:.0f} % of what is left, but is not sure enough to be named: a further test may "
-                "show it."
+                f"{100.0 * share:.0f} % of what is left, but is not sure enough to be named: a "
+                "further test may show it."
             )
     model = verdict.get("revised_model")
     if effects and isinstance(model, dict) and file == RIG_FILE:
