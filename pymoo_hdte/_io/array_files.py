@@ -52,7 +52,7 @@ def read_arrays(path: Path, form: str, names: Sequence[str]) -> Arrays:
     form : str
         One of `READERS`.
     names : sequence of str
-        Of variables, keys, titles, or paths of data sets. A value that is missing is NaN.
+        Names of variables, keys, titles, or paths of data sets. A missing value becomes NaN.
 
     Raises
     ------
@@ -67,11 +67,11 @@ def read_arrays(path: Path, form: str, names: Sequence[str]) -> Arrays:
 
 
 def format_of(path: Path, form: str) -> str:
-    """Return the format of a file: as stated, but where the ending of a text is of another."""
+    """Return the format of a file: as stated, unless its name ends like a file of arrays."""
     if form == "csv":
-        for other, (endings, _) in READERS.items():
+        for actual_form, (endings, _) in READERS.items():
             if path.name.endswith(endings):
-                return other
+                return actual_form
     return form
 
 
@@ -103,7 +103,7 @@ def _checked(
             shape = tuple(values.shape)
             shown = f"{values.dtype} of shape {list(shape)}"
             length = max(shape, default=0)
-            same = all(length == max(one.shape) for one in right.values())
+            same = all(length == max(vector.shape) for vector in right.values())
             if values.dtype.kind in "iuf" and math.prod(shape) == length > 0 and same:
                 right[name] = values
                 budget.check("rows", length, f"{path.name}: {name}")
@@ -148,12 +148,12 @@ _DAMAGED = (
     *(OSError, ValueError, LookupError, TypeError, EOFError, RuntimeError, SyntaxError),
     *(zlib.error, zipfile.BadZipFile, tokenize.TokenError),
 )
-"""What libraries raise where bytes of a packed file were changed."""
+"""Errors that libraries raise for damaged packed files."""
 
 
 @dataclass(frozen=True)
 class _Member:
-    """An array of an npz file that is read when it is asked for, and what its head says of it."""
+    """An array of an npz file, read when its values are taken; type and shape are in its head."""
 
     archive: Any
     name: str
@@ -165,7 +165,7 @@ class _Member:
 
 
 def _member(archive: Any, name: str) -> _Member:
-    """Return an array of an open npz file; `ValueError` if it is none of numbers."""
+    """Return an array of an open npz file; `ValueError` if it does not hold numbers."""
     with archive.zip.open(f"{name}.npy") as file:
         version = np.lib.format.read_magic(file)
         heads = {
@@ -180,9 +180,9 @@ def _check_zip(path: Path, wanted: Callable[[str], bool]) -> list[str]:
     """Return the names in a zip file, whose wanted members together fit into the budget."""
     with zipfile.ZipFile(path) as packed:
         members = packed.infolist()
-    size = sum(one.file_size for one in members if wanted(one.filename))
+    size = sum(member.file_size for member in members if wanted(member.filename))
     Budget.now().check("bytes", size, f"{path.name}, expanded")
-    return [one.filename for one in members]
+    return [member.filename for member in members]
 
 
 def _read_npz(path: Path, names: Sequence[str]) -> Arrays:
@@ -222,7 +222,7 @@ def _read_json_lines(path: Path, names: Sequence[str]) -> Arrays:
                 except OverflowError:
                     raise InvalidInput(f"{place}: {name}", value, "a finite number") from None
     arrays = {name: np.array(column) for name, column in columns.items()}
-    known = {name: one for name, one in arrays.items() if not np.all(np.isnan(one))}
+    known = {name: column for name, column in arrays.items() if not np.all(np.isnan(column))}
     return Arrays(_checked(path, names, known, there))
 
 
@@ -242,7 +242,9 @@ def _read_xlsx(path: Path, names: Sequence[str]) -> Arrays:
             for row in rows:
                 above += 1
                 cells = ["" if cell is None else str(cell).strip() for cell in row]
-                titles = max(titles, cells, key=lambda one: sum(one.count(n) == 1 for n in names))
+                titles = max(
+                    titles, cells, key=lambda candidate: sum(candidate.count(n) == 1 for n in names)
+                )
                 if all(cells.count(name) == 1 for name in names):
                     break
                 if above >= MOST_LINES_ABOVE:
@@ -252,18 +254,18 @@ def _read_xlsx(path: Path, names: Sequence[str]) -> Arrays:
                 raise InvalidInput(f"{path.name}: columns", titles, allowed)
             places = [titles.index(name) for name in names]
             columns = [array("d") for _ in names]
-            row_of_file, first = above, True
+            row_of_file, first_row = above, True
             for row in rows:
                 row_of_file += 1
                 budget.check("rows", row_of_file, f"{path.name}: rows")
-                found = [row[at] if at < len(row) else None for at in places]
+                values = [row[at] if at < len(row) else None for at in places]
                 # Units may stand below the titles.
-                if first and any(isinstance(one, str) for one in found):
-                    first, above = False, above + 1
-                    if not any(isinstance(one, int | float) for one in found):
+                if first_row and any(isinstance(cell, str) for cell in values):
+                    first_row, above = False, above + 1
+                    if not any(isinstance(cell, int | float) for cell in values):
                         continue
-                first = False
-                for name, column, value in zip(names, columns, found, strict=True):
+                first_row = False
+                for name, column, value in zip(names, columns, values, strict=True):
                     if isinstance(value, bool) or not isinstance(value, int | float | None):
                         place = f"{path.name}, row {row_of_file}: {name}"
                         raise InvalidInput(place, value, "a number")
@@ -278,9 +280,9 @@ def _read_xlsx(path: Path, names: Sequence[str]) -> Arrays:
         raise InvalidInput(path.name, str(error)[:200], "an intact xlsx file") from None
     arrays = {name: np.array(column) for name, column in zip(names, columns, strict=True)}
     # Sheets have rows that were formatted and never filled.
-    filled = np.flatnonzero(np.any([~np.isnan(one) for one in arrays.values()], axis=0))
-    last = int(filled[-1]) + 1 if filled.size else 0
-    arrays = {name: one[:last] for name, one in arrays.items()}
+    filled = np.flatnonzero(np.any([~np.isnan(column) for column in arrays.values()], axis=0))
+    n_rows = int(filled[-1]) + 1 if filled.size else 0
+    arrays = {name: column[:n_rows] for name, column in arrays.items()}
     return Arrays(_checked(path, names, arrays, titles), above)
 
 
@@ -291,7 +293,7 @@ READERS: dict[str, tuple[tuple[str, ...], Callable[[Path, Sequence[str]], Arrays
     "xlsx": ((".xlsx",), _read_xlsx),
     "hdf5": ((".h5", ".hdf5"), _read_hdf5),
 }
-"""For each format the endings of its files and its reader."""
+"""The endings of file names and the reader of each format."""
 
 
 def vector_names(path: Path, form: str) -> list[str]:
@@ -337,10 +339,10 @@ def _lengths_of_matlab(path: Path) -> dict[str, int]:
 
 def _lengths_of_npz(path: Path) -> dict[str, int]:
     try:
-        names = [one for one in _check_zip(path, lambda _: False) if one.endswith(".npy")]
+        names = [name for name in _check_zip(path, lambda _: False) if name.endswith(".npy")]
         with np.load(path, allow_pickle=False) as file:
             members = [_member(file, name.removesuffix(".npy")) for name in names]
-            return {one.name: _length(one.shape, one.dtype.kind) for one in members}
+            return {member.name: _length(member.shape, member.dtype.kind) for member in members}
     except _DAMAGED as error:
         if isinstance(error, OSError) and not path.is_file():
             raise
@@ -389,14 +391,14 @@ def _names_of_xlsx(path: Path) -> list[str]:
             sheet.reset_dimensions()
             titles: list[str] = []
             for row in sheet.iter_rows(values_only=True, max_row=MOST_LINES_ABOVE):
-                numbers = [isinstance(one, int | float) and one is not True for one in row]
+                numbers = [isinstance(cell, int | float) and cell is not True for cell in row]
                 if titles and any(numbers):
                     return [
                         title
                         for title, number in zip(titles, numbers, strict=False)
                         if title and number and titles.count(title) == 1
                     ]
-                words = ["" if one is None else str(one).strip() for one in row]
+                words = ["" if cell is None else str(cell).strip() for cell in row]
                 # Units below the titles have no more cells than these.
                 if sum(map(bool, words)) > sum(map(bool, titles)):
                     titles = words

@@ -39,12 +39,12 @@ def read_vectors(path: Path, names: Sequence[str]) -> dict[str, NDArray[np.float
         If it cannot be read.
     """
     budget = Budget.now()
-    found, columns = dict[str, str](), dict[str, NDArray[np.float64]]()
+    descriptions, columns = dict[str, str](), dict[str, NDArray[np.float64]]()
     expanded = 0
     with _refusals(path):
         order, data = _contents(path)
         for name, flags, lengths, start, matrix, packed in _arrays(data, order):
-            found[name] = f"MATLAB class {flags & 0xFFF:#x} of shape {lengths}"
+            descriptions[name] = f"MATLAB class {flags & 0xFFF:#x} of shape {lengths}"
             if name in names and _is_vector(flags, lengths):
                 budget.check("rows", max(lengths), f"{path.name}: {name}")
                 if packed is not None:
@@ -57,8 +57,8 @@ def read_vectors(path: Path, names: Sequence[str]) -> dict[str, NDArray[np.float
                 columns[name] = values.ravel().astype(float)
     for name in names:
         if name not in columns or columns[name].size != columns[names[0]].size:
-            allowed = f"a vector of real numbers, all of one length; there are {found}"
-            raise InvalidInput(f"{path.name}: {name}", found.get(name), allowed[:500])
+            allowed = f"a vector of real numbers, all of one length; there are {descriptions}"
+            raise InvalidInput(f"{path.name}: {name}", descriptions.get(name), allowed[:500])
     return columns
 
 

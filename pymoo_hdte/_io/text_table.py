@@ -32,7 +32,7 @@ from pymoo_hdte._io.text_lines import (
 )
 
 LARGEST = 1e15
-"""In any unit: a double beyond it no longer holds tenths, so it marks a fault; nobody measured it,
+"""Largest value in any unit. A double beyond it no longer holds tenths, so it was not measured,
 and the squares of a fit would overflow."""
 
 
@@ -49,7 +49,7 @@ def read_text_table(
     encoding: str | None = None,
     seen: Seen | None = None,
 ) -> TextTable:
-    """Read the titles of a table of text; its rows are read when they are asked for.
+    """Read the titles of a table of text; its rows are read on demand.
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ def read_text_table(
     encoding : str, optional
         One of `encodings.ENCODINGS`; found out by default.
     seen : callable, optional
-        Is told how many further bytes have been read.
+        Called with the number of further bytes read.
 
     Raises
     ------
@@ -85,24 +85,24 @@ def read_text_table(
     """
     kind = "CSV text" if titled else "text"
 
-    def lines(size: int = FIRST_LINES, told: Seen | None = None) -> Iterator[Lines]:
-        for numbers, block in line_blocks(path, kind, told, size, encoding):
+    def lines(size: int = FIRST_LINES, counter: Seen | None = None) -> Iterator[Lines]:
+        for numbers, block in line_blocks(path, kind, counter, size, encoding):
             if numbers[0] == 1 and origin and block[0].startswith(origin):
                 numbers, block = numbers[1:], block[1:]
             if by_hand:
-                kept = [
-                    at for at, one in enumerate(block) if one.strip() and one.lstrip()[0] != "#"
+                indices = [
+                    at for at, line in enumerate(block) if line.strip() and line.lstrip()[0] != "#"
                 ]
-                numbers, block = [numbers[at] for at in kept], [block[at] for at in kept]
+                numbers, block = [numbers[at] for at in indices], [block[at] for at in indices]
             yield numbers, block
 
     if titled:
         top = next(lines(), (range(0), []))
-        columns = [one for one in wanted if isinstance(one, int)]
+        columns = [column for column in wanted if isinstance(column, int)]
         if columns:
             header = numbered_header(*top, delimiter, skip_rows, columns)
         else:
-            titles = [str(one) for one in wanted]
+            titles = [str(title) for title in wanted]
             header = titled_header(path.name, *top, delimiter, skip_rows, titles)
     else:
         top = next(lines_below(lines(), 0, skip_rows), (range(0), []))

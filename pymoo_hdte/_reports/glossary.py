@@ -85,13 +85,13 @@ GLOSSARY = {
     "Robust designs": DESIGN,
     "Comparing algorithms": COMPARISON,
 }
-"""By chapter, for each term what it means; terms in the order of the alphabet."""
+"""Terms with their meanings, by chapter; terms stand in alphabetical order."""
 
 
 def terms_of(*chapters: str) -> dict[str, str]:
-    """Return the terms of some chapters with their meanings, in the order of the alphabet."""
-    found = {term: said for chapter in chapters for term, said in GLOSSARY[chapter].items()}
-    return dict(sorted(found.items(), key=lambda one: one[0].lower()))
+    """Return the terms of some chapters with their meanings, in alphabetical order."""
+    terms = {term: said for chapter in chapters for term, said in GLOSSARY[chapter].items()}
+    return dict(sorted(terms.items(), key=lambda entry: entry[0].lower()))
 
 
 def terms_in(text: str, *chapters: str) -> dict[str, str]:
@@ -102,17 +102,17 @@ def terms_in(text: str, *chapters: str) -> dict[str, str]:
     >>> [*terms_in("The gap is at the noise floor.", "Verdicts on a model")]
     ['gap', 'noise floor']
     """
-    found, texts = dict[str, str](), [text]
+    needed, texts = dict[str, str](), [text]
     every = terms_of(*chapters)
     while texts:
         new = {
             term: said
             for term, said in every.items()
-            if term not in found and any(_stands(term, said, one) for one in texts)
+            if term not in needed and any(_stands(term, said, passage) for passage in texts)
         }
-        found |= new
+        needed |= new
         texts = [*new.values()]
-    return {term: said for term, said in every.items() if term in found}
+    return {term: said for term, said in every.items() if term in needed}
 
 
 def _stands(term: str, said: str, text: str) -> bool:

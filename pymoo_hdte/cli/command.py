@@ -14,11 +14,11 @@ from pymoo_hdte._reports.folder import PAGE_FILE
 MISTAKE = 2
 """Exit code for input that the user can correct, as argparse has it."""
 Say = Callable[[str], None]
-"""Tells the user what is being done."""
+"""Shows the user what is being done."""
 
 
 class OneLineParser(argparse.ArgumentParser):
-    """Says what is wrong in one line; the usage is for ``--help``."""
+    """Parser whose errors are one line; the usage is for ``--help``."""
 
     def error(self, message: str) -> NoReturn:
         """Print the line and exit with `MISTAKE`."""
@@ -27,7 +27,7 @@ class OneLineParser(argparse.ArgumentParser):
 
 
 class Outcome(NamedTuple):
-    """What a command found: as a JSON-able document, and in a few lines for the terminal."""
+    """The result of a command: a document for JSON, and a few lines for the terminal."""
 
     document: dict[str, Any]
     summary: str

@@ -20,7 +20,7 @@ from pymoo_hdte.cli.plan import PLAN
 from pymoo_hdte.cli.simulate import SIMULATE
 
 COMMANDS = (OPTIMISE, SIMULATE, IDENTIFY, PLAN, INIT, DISCREPANCY)
-"""In the order of the help."""
+"""Commands in the order of the help."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -28,8 +28,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = _parser().parse_args(arguments)
     try:
         # Progress is for a terminal only; a log file gets errors alone.
-        told = sys.stderr.isatty() and not options.quiet
-        outcome = options.command.run(options, _say if told else _silent)
+        shows_progress = sys.stderr.isatty() and not options.quiet
+        outcome = options.command.run(options, _say if shows_progress else _silent)
         if options.json:
             _print(json.dumps(outcome.document, indent=1, ensure_ascii=False))
         elif not options.quiet:
@@ -57,20 +57,20 @@ def _parser() -> argparse.ArgumentParser:
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
     for command in COMMANDS:
         summary = command.summary
-        one = commands.add_parser(
+        subparser = commands.add_parser(
             command.name,
             help=summary,
             description=f"{summary[0].upper()}{summary[1:]}.",
             epilog=command.details,
             formatter_class=argparse.RawDescriptionHelpFormatter,
         )
-        one.set_defaults(command=command)
-        command.add_arguments(one)
+        subparser.set_defaults(command=command)
+        command.add_arguments(subparser)
         if command.reports:
-            one.add_argument(
+            subparser.add_argument(
                 "--out", type=Path, required=True, metavar="DIR", help="folder for the report"
             )
-        output = one.add_mutually_exclusive_group()
+        output = subparser.add_mutually_exclusive_group()
         output.add_argument("--json", action="store_true", help="print the result as JSON")
         output.add_argument("--quiet", action="store_true", help="print nothing but errors")
     return parser

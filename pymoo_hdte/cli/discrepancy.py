@@ -11,7 +11,7 @@ from typing import Any
 from pymoo_hdte._reports.folder import PAGE_FILE
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.cli.command import Command, Outcome, Say
-from pymoo_hdte.cli.own_effects import OPTION, own_effects, told_by_line
+from pymoo_hdte.cli.own_effects import OPTION, errors_by_line, own_effects
 
 ModelFiles = tuple[Path | None, Path | None]
 """Files of a model and its data sheet."""
@@ -63,7 +63,7 @@ def _run(options: argparse.Namespace, say: Say) -> Outcome:
     with FOLDER.held(options.out), registered():
         for effect in () if options.effects is None else own_effects(options.effects):
             register(effect)
-        with told_by_line(options.effects):
+        with errors_by_line(options.effects):
             document = _analysed(options, believed, say)
     return Outcome(document, _summary(document, options.out))
 
@@ -112,7 +112,7 @@ def _measured(folder: Path, data: Path | None, progress: Callable[[int, int], No
 
 
 def _believing(measured: Any, model: Path | None, sheet: Path | None) -> Any:
-    """Return what was measured, with the model of a file as what is believed."""
+    """Return the measurements, with the model of a file as the nominal one."""
     from pymoo_hdte.discrepancy import Campaign, read_drive_model, read_mechanism_model
 
     of_drive = isinstance(measured, Campaign)
@@ -126,7 +126,7 @@ def _believing(measured: Any, model: Path | None, sheet: Path | None) -> Any:
 
 def _summary(document: dict[str, Any], out: Path) -> str:
     torsion: dict[str, Any] = document.get("torsion", {"effects": [], "limits": []})
-    names = " + ".join(_name(one) for one in (*document["effects"], *torsion["effects"]))
+    names = " + ".join(_name(effect) for effect in (*document["effects"], *torsion["effects"]))
     lines = [
         f"{document['status']}{': ' + names if names else ''}",
         document["sentence"],
@@ -144,11 +144,11 @@ def _summary(document: dict[str, Any], out: Path) -> str:
 
 
 def _remarks(remarks: list[str]) -> list[str]:
-    """Return one line on how records were read; the report has them all."""
+    """Return one line on how records were read; the report has all remarks."""
     if len(remarks) < 2:
         return remarks
-    more = len(remarks) - 1
-    return [f"{remarks[0]} The report has {more} more such remark{'s' if more > 1 else ''}."]
+    further = len(remarks) - 1
+    return [f"{remarks[0]} The report has {further} more such remark{'s' if further > 1 else ''}."]
 
 
 def _name(effect: dict[str, Any]) -> str:

@@ -1,4 +1,4 @@
-"""``pymoo-hdte plan``: before anything is measured, the tests that tell the effects apart."""
+"""``pymoo-hdte plan``: tests that tell the effects apart, chosen before anything is measured."""
 
 from __future__ import annotations
 

@@ -23,7 +23,7 @@ sign is undecided only below 1 % of the slowest output speed of interest (10 r/m
 _WHOLE = 20.0
 """Argument beyond which a hyperbolic tangent is 1 to the last digit; it takes long to compute."""
 _NEGLIGIBLE_SPEED = 1e-150
-"""rad/s. Keeps a quotient finite at rest."""
+"""Speed that keeps a quotient finite at rest, rad/s."""
 
 
 def smoothed_sign(speed: Values) -> tuple[Values, Values]:
@@ -160,7 +160,7 @@ class NonlinearDrag(Aperiodic):
     Attributes
     ----------
     coefficient : float
-        Of the quadratic drag with the same torque at the reference speed, N.m.s2/rad2.
+        Coefficient of the quadratic drag with the same torque at the reference speed, N.m.s2/rad2.
     exponent : float
         Power of the speed with which the torque grows.
     reference : float
@@ -246,7 +246,7 @@ class PeriodicFriction(Periodic):
 
 def _varying(sizes: Sizes) -> list[Guess]:
     """Guess friction that varies about a mean, which is Coulomb's."""
-    found = []
+    guesses = []
     for family in sizes.varying:
         mean = unknown("mean", 0.0, sizes.largest, sizes.force, linear=True)
         unknowns = (*family.waves("level", sizes.largest, sizes.residual), mean)
@@ -256,8 +256,8 @@ def _varying(sizes: Sizes) -> list[Guess]:
             varying = [PeriodicFriction(order, phase, level) for order, level, phase in lines]
             return (*varying, CoulombFriction(values[-1]))
 
-        found.append(Guess(unknowns, starts_along_each(unknowns), build, family, family.form))
-    return found
+        guesses.append(Guess(unknowns, starts_along_each(unknowns), build, family, family.form))
+    return guesses
 
 
 register(

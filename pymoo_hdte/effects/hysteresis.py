@@ -102,7 +102,7 @@ def _slipping(sizes: Sizes) -> list[Guess]:
         return []
     unknowns, starts = springs("force", sizes)
     force, torsion, _ = unknowns
-    return [Guess(unknowns, starts), bouc_wen(force, torsion, [one[:2] for one in starts])]
+    return [Guess(unknowns, starts), bouc_wen(force, torsion, [start[:2] for start in starts])]
 
 
 def springs(strength: str, sizes: Sizes) -> tuple[tuple[Parameter, ...], list[tuple[float, ...]]]:

@@ -34,7 +34,7 @@ class PortState:
     Attributes
     ----------
     position, speed : ndarray
-        Of the port, rad and rad/s.
+        Position and speed of the port, rad and rad/s.
     phase : callable
         Gives ``order`` times the angle on which periodic laws depend, rad: of the input at the
         input and at the mesh, of the output at the output.
@@ -49,7 +49,7 @@ class PortState:
         over the ratio, without what accelerates inertias; at a port of another mechanism, what its
         ``load`` says.
     temperature : ndarray or float
-        Of the machine in kelvin; NaN where it is not known.
+        Temperature of the machine in kelvin; NaN where it is not known.
     recurs : bool
         Whether the second half of a ``path`` is the first again, and so on for ever: a law that
         forgets gradually has then come to repeat itself, too.
@@ -89,7 +89,7 @@ class Law(Protocol):
 
     @property
     def states(self) -> int:
-        """See `Behaviour`, which gives a law this and the following."""
+        """See `Behaviour`, which provides this and the following properties."""
         ...
 
     @property
@@ -238,7 +238,7 @@ class Aperiodic(Behaviour):
 
     @property
     def orders(self) -> tuple[float, ...]:
-        """No orders."""
+        """An empty tuple: the law excites no order."""
         return ()
 
     def with_input_locked(self) -> Law | None:
@@ -259,7 +259,7 @@ class Periodic(Behaviour):
 
     @property
     def orders(self) -> tuple[float, ...]:
-        """The one order."""
+        """The order at which the law varies."""
         return (self.order,)
 
     def with_input_locked(self) -> Law | None:

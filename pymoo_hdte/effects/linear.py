@@ -125,14 +125,14 @@ def _spring(sizes: Sizes) -> list[Guess]:
         return []
     typical, largest = sizes.force / sizes.travel, sizes.largest
     most = largest / sizes.travel
-    found = [Guess((unknown("coefficient", 0.0, most, typical),))]
+    guesses = [Guess((unknown("coefficient", 0.0, most, typical),))]
     if sizes.turns:
         # Far from zero a weak spring makes a large force there.
         unknowns = (
             unknown("coefficient", 0.0, most, typical, linear=True),
             unknown("force", -FURTHEST * largest, FURTHEST * largest, sizes.force, linear=True),
         )
-        found.append(
+        guesses.append(
             Guess(
                 unknowns,
                 starts_along_each(unknowns),
@@ -142,7 +142,7 @@ def _spring(sizes: Sizes) -> list[Guess]:
                 instead_of=("gravity",),
             )
         )
-    return found
+    return guesses
 
 
 def _preloaded(values: Sequence[float]) -> tuple[Law, ...]:

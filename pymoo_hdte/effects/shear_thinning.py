@@ -73,9 +73,9 @@ def shear_thinning(level: Parameter, speed: float) -> Guess:
     Parameters
     ----------
     level : Parameter
-        Of the drag at the largest speed.
+        Torque of the drag at the largest speed.
     speed : float
-        That speed, rad/s. Thinning beyond half of it would be the damping of the port, to three
+        Largest speed, rad/s. Thinning beyond half of it would be the damping of the port, to three
         tenths of the torque; within a five-hundredth, the torque at a tenth of the speed is two
         thirds of the whole, as of dry friction beside a drag.
     """

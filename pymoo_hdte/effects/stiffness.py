@@ -73,7 +73,7 @@ def _hardening(sizes: Sizes) -> list[Guess]:
     if not sizes.loaded:
         # Of a motion's misfit the root mean square says little about the force at peak travel.
         most = max(most, _MOST_AT_PEAK * sizes.stiffness / travel**2)
-    found = [Guess((unknown("coefficient", 0.0, most, typical),))]
+    guesses = [Guess((unknown("coefficient", 0.0, most, typical),))]
     if sizes.loaded:
         corner = (
             unknown("stiffening", 0.0, 0.9, 0.2),
@@ -82,8 +82,8 @@ def _hardening(sizes: Sizes) -> list[Guess]:
         )
         starts = [(0.2, share * travel, 3.0) for share in (0.25, 0.5)]
         sentence = "The {port} grows stiffer beyond a {force}."
-        found.append(Guess(corner, starts, form="corner", sentence=sentence))
-    return found
+        guesses.append(Guess(corner, starts, form="corner", sentence=sentence))
+    return guesses
 
 
 register(
@@ -277,7 +277,7 @@ def _uneven(sizes: Sizes) -> list[Guess]:
     """
     if sizes.stiffness == 0.0 or sizes.between:
         return []
-    travel, found = sizes.travel, []
+    travel, guesses = sizes.travel, []
     size, widest = 0.02 * travel, 0.5 * travel
     for order in sizes.expected:
 
@@ -291,9 +291,9 @@ def _uneven(sizes: Sizes) -> list[Guess]:
             unknown("locked", 0.0, 2.0 * widest, size, linear=True),
         )
         shapes = ((1, 0, 1, 1), (0, 1, 1, 1), (0, 0, 1, 1), (0, 0, 1, 2))
-        starts = [[size * one for one in shape] for shape in shapes]
-        found.append(Guess(unknowns, starts, build, Family((order,))))
-    return found
+        starts = [[size * factor for factor in shape] for shape in shapes]
+        guesses.append(Guess(unknowns, starts, build, Family((order,))))
+    return guesses
 
 
 register(

@@ -69,13 +69,13 @@ def load_conditions(path: str | Path) -> tuple[OperatingCondition, ...]:
     Parameters
     ----------
     path : str or Path
-        Of the file, with the columns ``speed_rpm``, ``load_Nm`` and ``weight`` in any order. Speeds
+        The file, with the columns ``speed_rpm``, ``load_Nm`` and ``weight`` in any order. Speeds
         are in r/min, loads in N.m. Blank lines and lines that start with ``#`` are skipped.
 
     Returns
     -------
     tuple of OperatingCondition
-        In the order of the file, SI.
+        The conditions in the order of the file, SI.
 
     Raises
     ------

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from pymoo_hdte._io.fields import Fields
 from pymoo_hdte._io.layout import COUNTS, layout_from_fields
-from pymoo_hdte._io.text_lines import Progress, told
+from pymoo_hdte._io.text_lines import Progress, byte_counter
 from pymoo_hdte._io.toml import toml_with_lines
 from pymoo_hdte.checks import InvalidInput, one_of
 from pymoo_hdte.discrepancy._records.rig_model import (
@@ -128,7 +128,7 @@ def read_rig(
         ]
         _check_names(listed)
         # Each part is read on its own, so that a fault outside of it does no harm.
-        seen = told(
+        seen = byte_counter(
             progress, [file for listing in listed for _ in listing.parts for file in listing.paths]
         )
         coordinates = model.mechanism.coordinates

@@ -46,6 +46,8 @@ class Candidate:
         attributed to another effect.
     releases : str or None
         Base parameter that it releases from its tolerance.
+    released : str
+        That parameter in words; empty for an effect.
     acts_at : str
         Port at which that parameter makes a torque, if it is at a port.
     covered_by, covered_at : str
@@ -74,6 +76,7 @@ class Candidate:
     exact: bool = False
     listed: bool = True
     releases: str | None = None
+    released: str = ""
     acts_at: str = ""
     covered_by: str = ""
     covered_at: str = ""
@@ -255,6 +258,7 @@ def out_of_tolerance(
         out_of_tolerance_sentence(words),
         exact=True,
         releases=name,
+        released=words,
         acts_at=acts_at,
         covered_by=covering.name if covering else "",
         covered_at=covering.sought_at[0] if covering else "",

@@ -17,15 +17,15 @@ Output = dict[str, Any]
 Row = tuple[float, ...]
 
 
-class KeptDesigns:
-    """What was evaluated, by design, in a file that a killed run goes on from.
+class StoredDesigns:
+    """Evaluated designs in a file, from which a killed run goes on.
 
     Parameters
     ----------
     path : str or path-like
-        Of the file.
+        The file.
     problem : object
-        Whose state and source tell it from others.
+        The problem, identified by its state and source.
     n_var : int
         Number of its variables.
     again : callable
@@ -36,7 +36,7 @@ class KeptDesigns:
     Attributes
     ----------
     order : dict
-        Which design was finished when, from 0 on.
+        Position of each design in the order in which they were finished, from 0.
     """
 
     def __init__(
@@ -106,7 +106,7 @@ class KeptDesigns:
         return tuple(names), flat
 
     def _whole(self, flat: list[float]) -> Output:
-        found: dict[str, list[float]] = {}
+        output: dict[str, list[float]] = {}
         for name, number in zip(self._file.responses, flat, strict=True):
-            found.setdefault(name.rpartition("[")[0], []).append(number)
-        return {key: np.array(numbers) for key, numbers in found.items()}
+            output.setdefault(name.rpartition("[")[0], []).append(number)
+        return {key: np.array(numbers) for key, numbers in output.items()}

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.problems._simulator.statistics import RobustConstraint, Statistic
 from pymoo_hdte.surrogate._sparse.moments import SparseMoments
-from pymoo_hdte.surrogate.threads import MANY
+from pymoo_hdte.surrogate.threads import ENOUGH_FOR_THREADS
 
-Asked = tuple[Statistic, float, float, int]
+Requested = tuple[Statistic, float, float, int]
 """Statistic, factor, bound and place of the response."""
 
 
@@ -31,11 +31,11 @@ def place_of(statistic: Statistic, responses: tuple[str, ...]) -> int:
     return responses.index(statistic.response)
 
 
-def asked_of(
+def requested_of(
     objectives: Sequence[Statistic],
     constraints: Sequence[RobustConstraint],
     responses: tuple[str, ...],
-) -> list[Asked]:
+) -> list[Requested]:
     """Return objectives and constraints as statistic, factor, bound and place of the response.
 
     What is to be small is the factor times the statistic's value, less the bound.
@@ -45,27 +45,27 @@ def asked_of(
     InvalidInput
         As `place_of`.
     """
-    asked = [(one, one.sign, 0.0) for one in objectives]
+    requested = [(statistic, statistic.sign, 0.0) for statistic in objectives]
     for limit in constraints:
-        one, side = limit.statistic, limit.side
-        asked.append((one, side * one.sign, side * limit.bound))
-    return [(*one, place_of(one[0], responses)) for one in asked]
+        statistic, side = limit.statistic, limit.side
+        requested.append((statistic, side * statistic.sign, side * limit.bound))
+    return [(*request, place_of(request[0], responses)) for request in requested]
 
 
 def by_moments(
-    asked: Sequence[Asked], moments: SparseMoments, x: NDArray[np.float64]
+    requested: Sequence[Requested], moments: SparseMoments, x: NDArray[np.float64]
 ) -> NDArray[np.float64] | None:
-    """Return what is asked for at very many designs, shape (n, n_asked).
+    """Return the requested values at very many designs, shape (n, n_requested).
 
     None if there are few designs, or if mean and deviation do not suffice.
     """
-    weights = [found for one, *_ in asked if (found := one.weights) is not None]
-    if len(x) < MANY or len(weights) < len(asked):
+    weights = [weight for statistic, *_ in requested if (weight := statistic.weights) is not None]
+    if len(x) < ENOUGH_FOR_THREADS or len(weights) < len(requested):
         return None
     mean, std = moments(x)
-    values = np.empty((len(x), len(asked)))
-    each = zip(values.T, weights, asked, strict=True)
-    for column, (of_mean, of_std), (_, sign, bound, place) in each:
+    values = np.empty((len(x), len(requested)))
+    columns = zip(values.T, weights, requested, strict=True)
+    for column, (of_mean, of_std), (_, sign, bound, place) in columns:
         value = of_mean * mean[:, place] + of_std * std[:, place]
         np.subtract(sign * value, bound, out=column)
     return values
