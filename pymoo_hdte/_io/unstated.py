@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pymoo_hdte._io.array_files import READERS, format_of, read_arrays, vector_names
-from pymoo_hdte._io.budget import 
+from pymoo_hdte._io.budget import refused_if_too_large
 from pymoo_hdte._io.layout import CHANNEL_UNITS, COUNTS
 from pymoo_hdte._io.text_header import (
     AROUND,
@@ -101,7 +101,7 @@ def read_unstated(path: Path) -> UnstatedTable:
         If it cannot be read.
     """
     form = format_of(path, "csv")
-    with (path):
+    with refused_if_too_large(path):
         if form not in READERS:
             return _read_text(path)
         names = vector_names(path, form)
