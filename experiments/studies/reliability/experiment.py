@@ -74,7 +74,7 @@ FULL = Extent(
     limits=tuple(LIMITS),
     experiments=(
         *(("table7",), ("table8",), ("sensitivity",), ("crosscheck",), ("calibration",)),
-        *(("blind",), ("emps",), ("kinova",)),
+        ("blind",),
     ),
 )
 QUICK = Extent(
