@@ -5,10 +5,8 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 
-from tqdm import tqdm
-
 from experiments.runner.result import Column, Finding, Table
-from experiments.studies.measured.known_answers import KNOWN_RIGS, KnownRig
+from experiments.studies.measured.known_answers import KnownRig
 from experiments.studies.measured.rigs import Study, study
 
 SECONDS = (Column("rig"), Column("tool"), Column("CPU time", "s", 3))
@@ -31,10 +29,3 @@ def cpu_table(rows: Sequence[Sequence[str]]) -> Table:
     cells = tuple((name, tool, float(taken)) for name, tool, taken in rows)
     finding = Finding(seconds <= LONGEST, words, check=True)
     return Table("seconds", "CPU time", SECONDS, cells, findings=(finding,), wall_times=True)
-
-
-def measured_cpu() -> tuple[Table, ...]:
-    """Return the table of all rigs whose records are there, measured now; none without any."""
-    rigs = tqdm(KNOWN_RIGS, desc="measured rigs", leave=False)
-    rows = [row for one, row in map(timed_study, rigs) if one is not None]
-    return (cpu_table(rows),) if rows else ()
