@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Collection, Iterable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -24,7 +24,7 @@ NAME = "suites"
 BBOB = f"{NAME}_bbob"
 DIGITS = 6
 COMMAND = "python -m experiments suites --quick"
-"""What an outcome is made by, unless `gather` made it; told in its first line."""
+"""What an outcome is made by, unless `renew` made it; told in its first line."""
 SUITE_COLUMNS = ("problem", "algorithm", "evaluations", "seed", "spent", *MEASURES)
 BBOB_COLUMNS = (
     "dimension",
@@ -76,22 +76,14 @@ class Outcome:
         keys = ((job.problem, job.algorithm, budget, job.seed) for budget in job.budgets)
         return all(key in self.suites for key in keys)
 
-    def numbers(self, job: SuiteRun | BbobRun) -> NDArray[np.float64]:
-        """Return all numbers of a job's run, which is there."""
+    def take(self, job: SuiteRun | BbobRun, other: Outcome) -> None:
+        """Take over what another outcome has of a job."""
         if isinstance(job, BbobRun):
-            return np.array([*self.bbob[job].items()], dtype=float)
-        keys = ((job.problem, job.algorithm, budget, job.seed) for budget in job.budgets)
-        return np.array([self.suites[key] for key in keys], dtype=float)
-
-    def take(self, job: SuiteRun | BbobRun, other: Outcome, algorithm: str | None = None) -> None:
-        """Take over what another outcome has of a job, or of an algorithm that gives the same."""
-        like = algorithm or job.algorithm
-        if isinstance(job, BbobRun):
-            self.bbob[job] = other.bbob[replace(job, algorithm=like)]
+            self.bbob[job] = other.bbob[job]
             return
         for budget in job.budgets:
-            row = other.suites[job.problem, like, budget, job.seed]
-            self.suites[job.problem, job.algorithm, budget, job.seed] = row
+            key = job.problem, job.algorithm, budget, job.seed
+            self.suites[key] = other.suites[key]
 
     def without(self, algorithms: Collection[str]) -> Outcome:
         """Return the outcome without the runs of some algorithms."""

@@ -19,13 +19,12 @@ from experiments.studies.suites.data import NAME, Outcome, outcome_for
 from experiments.studies.suites.demands import counted, demands_table, in_one_sentence
 from experiments.studies.suites.figures import how_to_choose, runtime_profiles
 from experiments.studies.suites.formulas import engineering, imop, lz09, zcat
-from experiments.studies.suites.gather import kept_table
 from experiments.studies.suites.own_time import own_time_table
 from experiments.studies.suites.parts import parts_table
 from experiments.studies.suites.peers import OURS
 from experiments.studies.suites.problems import DIFFICULTY, SUITES
 from experiments.studies.suites.protocol import DIMENSIONS, HELD_OUT
-from experiments.studies.suites.rule import steps_table
+from experiments.studies.suites.renew import kept_table
 from experiments.studies.suites.suite_tables import (
     in_short,
     medians_tables,
@@ -53,7 +52,6 @@ def run(context: Context) -> Result:
             shares_table(outcome),
             *(one for one in (duels_table(outcome),) if one.rows),
             parts_table(outcome),
-            steps_table(outcome),
             own_time_table(),
             *ranks_tables(outcome),
             rivals_table(outcome),
