@@ -5,7 +5,7 @@ import time
 from experiments.runner.machine import machine_table
 from experiments.studies import workers
 from experiments.studies.cost import best_time
-from experiments.studies.measured import cpu_time
+from experiments.studies.measured import real
 from pymoo_hdte.surrogate.threads import usable_cores
 
 
@@ -33,7 +33,7 @@ def test_cores_are_those_the_scheduler_leaves(monkeypatch):
 
 def test_the_time_of_measured_rigs_is_shown_beside_what_is_allowed():
     rows = [["one", "workflow", "3.5"], ["two", "workflow", "21"], ["two", "other", "99"]]
-    table = cpu_time.cpu_table(rows)
+    table = real.cpu_table(rows)
     assert table.rows[0] == ("one", "workflow", 3.5)
     (finding,) = table.findings
     assert not finding.agrees
