@@ -14,7 +14,7 @@ import numpy as np
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from experiments.comparing.runs import AS_PRINTED, FIRST_STEP, VELOCITIES
-from experiments.paper import later_prototypes, printed_times, published, table2, table5
+from experiments.paper import later_prototypes, published, table2, table5, table8
 from experiments.paper.anytime.data import OF_TABLE_7, Case, Contested, Scores, committed_scores
 from experiments.paper.anytime.leads import RIVALS, totals_of, who_finds
 from experiments.paper.anytime.measures import RETURNED
@@ -26,10 +26,10 @@ from experiments.paper.calibrating import experiment as calibration
 from experiments.paper.calibrating.data import Outcome, read_outcomes
 from experiments.paper.calibrating.rigid import N_PARAMETERS, simplest
 from experiments.paper.calibrating.tables import best_rungs
-from experiments.paper.design_tables import dominated
 from experiments.paper.inference import experiment as inference
 from experiments.paper.inference.data import read_fits
-from experiments.paper.prototypes import ranking
+from experiments.paper.prototypes import consistency
+from experiments.paper.table8 import dominated
 from experiments.published_values import TABLE_5, TABLE_7, TABLE_8, TABLE_9, Moments
 from experiments.runner.committed import committed_file
 from experiments.runner.result import WITHIN_PAPER, significant
@@ -65,9 +65,10 @@ def in_three_sentences() -> tuple[str, str, str]:
     law, free = (totals_of(scores, velocity) for velocity in (AS_PRINTED, FIRST_STEP))
     return (
         f"The paper contradicts itself where no model is needed: by its own validation figures, "
-        f"prototype {ranking.HIGHEST} must be predicted "
-        f"{significant(ranking.bounds().least_lead, 3)} arcsec above prototype {ranking.LOWEST}, "
-        f"whose static error is {significant(ranking.excess(), 2)} arcsec larger.",
+        f"prototype {consistency.HIGHEST} must be predicted "
+        f"{significant(consistency.bounds().least_lead, 3)} arcsec above prototype "
+        f"{consistency.LOWEST}, "
+        f"whose static error is {significant(consistency.excess(), 2)} arcsec larger.",
         f"Its equations as printed give a transmission error of {low:.0f} or {high:.0f} arcsec, "
         f"depending on how the static error is read, where it has "
         f"{TABLE_8['initial'].mean_arcsec:.0f}; a rigid drive of which "
@@ -124,10 +125,10 @@ def values() -> dict[str, Any]:
 
 def _within_paper() -> Iterator[str]:
     for parts in (
-        ranking.of_the_first_page(),
+        consistency.of_the_first_page(),
         {WITHIN_PAPER: table2.of_the_first_page()},
         later_prototypes.of_the_first_page(),
-        printed_times.of_the_first_page(),
+        table8.of_the_first_page(),
     ):
         yield from parts.values()
 

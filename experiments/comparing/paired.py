@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.comparing.indicators import smaller_is_better
-from experiments.comparing.named import problem_named, source_of
-from experiments.comparing.open_runs import OpenRun
+from experiments.comparing.named import OpenRun, problem_named, source_of
 from experiments.comparing.quality import Quality, TrueFront
 from experiments.comparing.references import MODELS, objective_names, reference
 from experiments.comparing.runs import ALGORITHMS, OptimisationRun

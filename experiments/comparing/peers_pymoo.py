@@ -16,8 +16,8 @@ from pymoo.core.algorithm import Algorithm
 from pymoo.core.problem import Problem
 from pymoo.util.ref_dirs import get_reference_directions
 
+from experiments.comparing.named import seeded_default_rng
 from experiments.comparing.offers import POPULATION, Offer, at_budgets
-from experiments.comparing.open_runs import seeded_default_rng
 from pymoo_hdte.algorithms import AMPMOPSO, ElitistSwarm, FirstStepWithinBounds
 
 _PARTITIONS = {2: 99, 3: 12}

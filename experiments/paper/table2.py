@@ -6,14 +6,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from experiments.comparing.rates import at_least
-from experiments.paper.static_error.figures import heat_maps
-from experiments.paper.static_error.normality_tables import (
-    common_sizes,
-    pooling_table,
-    sizes_table,
-)
-from experiments.paper.static_error.sources import (
+from experiments.comparing.statistics import at_least
+from experiments.paper.static_error.statistics import (
     N_PROTOTYPES,
     N_REPEATS,
     NOISE_UM,
@@ -26,13 +20,17 @@ from experiments.paper.static_error.sources import (
     detections,
     outlier_counts,
     power,
+    prototypes,
     prototypes_needed,
     spoilt_readings,
 )
-from experiments.paper.static_error.statistics import prototypes
 from experiments.paper.static_error.tables import (
+    common_sizes,
     component_picture,
+    heat_maps,
+    pooling_table,
     reading_table,
+    sizes_table,
     statistic_table,
     total_picture,
 )

@@ -9,9 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.comparing.indicators import smaller_is_better
-from experiments.comparing.intervals import a12_intervals
 from experiments.comparing.paired import SIGNIFICANT
-from experiments.comparing.statistics import holm, wilcoxon_p
+from experiments.comparing.statistics import a12_intervals, holm, wilcoxon_p
 from experiments.paper.anytime.data import Contested, Scores, cases
 from experiments.paper.anytime.measures import NORMALISED, RAW, RETURNED, TRUE, Scale
 

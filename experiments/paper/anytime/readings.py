@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.comparing.intervals import mean_of_known, paired_interval
+from experiments.comparing.statistics import mean_of_known, paired_interval
 from experiments.paper.anytime.data import OF_TABLE_7, Case, Contested, Scores
 from experiments.paper.anytime.measures import EQUAL, RETURNED, SCALES, Scale
 from experiments.published_values import TABLE_7

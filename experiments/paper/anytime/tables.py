@@ -9,8 +9,8 @@ from typing import NamedTuple
 import numpy as np
 
 from experiments.comparing.indicators import NAMES
-from experiments.comparing.intervals import mean_intervals
 from experiments.comparing.runs import AS_PRINTED
+from experiments.comparing.statistics import mean_intervals
 from experiments.paper.anytime.data import OF_TABLE_7, Case, Contested, Scores
 from experiments.paper.anytime.duels import COMPARED, Duel, duels
 from experiments.paper.anytime.measures import EQUAL, NORMALISED, RETURNED, TRUE, Scale

@@ -14,7 +14,7 @@ from numpy.polynomial.legendre import leggauss
 from numpy.typing import NDArray
 
 from experiments.paper.calibrating.ladder import NARROW, WIDE
-from experiments.paper.quadrature import Rule, tensor_rule, weighted_moments
+from experiments.paper.scatter import Rule, tensor_rule, weighted_moments
 from experiments.published_values import TABLE_5, TABLE_6, TABLE_8, TABLE_9
 from pymoo_hdte.drive import PARAMETERS, DriveModel, OrderSpectrum
 from pymoo_hdte.problems.drive_response import SURROGATE_BOX, theta_s_scatter

@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 from experiments.paper.calibrating.ladder import EFFECTS, NARROW, Candidate
 from experiments.paper.inference.closures import CLOSURES
 from experiments.paper.inference.likelihood import OBSERVED, Evaluation, evaluate
-from experiments.paper.inference.optimum import OPTIMA
-from experiments.paper.inference.posterior import Posterior, Profile
+from experiments.paper.inference.posterior import OPTIMA, Posterior, Profile
 from experiments.paper.inference.rungs import Rung, rung_named
 from experiments.paper.inference.search import BASIN, Search
 from experiments.runner.campaign import Run

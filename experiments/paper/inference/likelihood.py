@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
 from experiments.paper.calibrating.predictions import PUBLISHED, TABLE_8_AND_BOX, UNCERTAINTY
-from experiments.paper.inference.draws import sampling_covariance
-from experiments.paper.inference.moments import DESIGNS, TensorSurrogate
+from experiments.paper.inference.moments import DESIGNS, TensorSurrogate, sampling_covariance
 from experiments.paper.inference.node_noise import LARGEST, published_influence
 from experiments.paper.inference.rungs import COLUMNS, Rung
 from experiments.published_values import TABLE_8

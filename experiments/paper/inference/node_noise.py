@@ -26,7 +26,7 @@ from experiments.paper.inference.moments import (
     place,
     uniform_rule,
 )
-from experiments.paper.quadrature import Rule
+from experiments.paper.scatter import Rule
 from experiments.published_values import TABLE_5, TABLE_9
 from pymoo_hdte.drive import PARAMETERS
 from pymoo_hdte.surrogate.tensor import chebyshev_basis, chebyshev_nodes, coefficients_from_nodes

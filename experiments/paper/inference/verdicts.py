@@ -12,15 +12,80 @@ from scipy.stats import chi2
 
 from experiments.paper.inference.data import Fit
 from experiments.paper.inference.likelihood import (
+    BAND,
+    BOX,
     DEPTH_TOLERANCE,
     FITTED,
+    FRONT_WIDTHS,
     OBSERVED,
     READING,
     Evaluation,
 )
-from experiments.paper.inference.noisy_front import NoisyChoice, noisy_choice
+from experiments.paper.inference.moments import TensorSurrogate
+from experiments.paper.inference.node_noise import grid_influence
 from experiments.paper.inference.rungs import RIGID, Rung
 from experiments.paper.inference.search import BASIN
+from experiments.published_values import TABLE_9
+from pymoo_hdte.decision import PREFERENCES, WeightedUtopia
+
+PER_AXIS = 5
+"""Designs on each axis of the box: K, J_in, B_in and B_fc. Noise makes B_in matter, too."""
+DRAWN = 400
+SEED = 3
+RANGE = (2.5, 97.5)
+"""Percentiles of a 95 % range."""
+FEATURES = ("width of the mean", "width of the std", *(f"K {name}" for name in PREFERENCES))
+"""Of a front, arcsec, and of the three designs chosen from it, as a share of the nominal K."""
+
+
+@dataclass(frozen=True)
+class NoisyChoice:
+    """Ranges of `FEATURES` over noise polynomials, (5, 2), and the published values, (5,)."""
+
+    ranges: NDArray[np.float64]
+    published: NDArray[np.float64]
+
+    @property
+    def holds_the_published(self) -> bool:
+        """Whether every published value lies within its range."""
+        low, high = self.ranges.T
+        return bool(np.all((low <= self.published) & (self.published <= high)))
+
+
+def noisy_choice(
+    rung: Rung, parameters: dict[str, float], node_noise: float, n: int = DRAWN
+) -> NoisyChoice:
+    """Return what preferences choose under n noise polynomials of this size in arcsec."""
+    surrogate = TensorSurrogate.fit(rung, parameters)
+    nominal = surrogate.model.nominal[1:]
+    shares = 1.0 + np.linspace(-BOX, BOX, PER_AXIS)
+    grid = np.stack(np.meshgrid(*[shares] * len(nominal), indexing="ij"), axis=-1)
+    designs = grid.reshape(-1, len(nominal))
+    found = grid_influence(surrogate, nominal * designs, BAND)
+    noise = node_noise * np.random.default_rng(SEED).standard_normal((n, found.of_means.shape[1]))
+    objectives = np.stack(
+        [found.means + noise @ found.of_means.T, found.stds + noise @ found.of_stds.T], axis=-1
+    )
+    features = np.array([_features(values, designs[:, 0]) for values in objectives])
+    # Rounded to four digits, one of the printed values lies outside the box.
+    stiffness = [min(TABLE_9[name][0] / nominal[0], 1.0 + BOX) for name in PREFERENCES]
+    published = np.array([*FRONT_WIDTHS, *stiffness])
+    return NoisyChoice(np.percentile(features, RANGE, axis=0).T, published)
+
+
+def _features(
+    objectives: NDArray[np.float64], stiffness: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return `FEATURES` of designs with objectives (n, 2) and shares of the nominal K, (n,)."""
+    order = np.lexsort((objectives[:, 1], objectives[:, 0]))
+    lowest = np.minimum.accumulate(objectives[order, 1])
+    front = order[np.concatenate([[True], objectives[order[1:], 1] < lowest[:-1]])]
+    chosen = [
+        front[WeightedUtopia(weights).do(objectives[front])] for weights in PREFERENCES.values()
+    ]
+    first, last = objectives[chosen[0]], objectives[chosen[-1]]
+    return np.array([last[0] - first[0], first[1] - last[1], *stiffness[chosen]])
+
 
 STEPS = (
     ("accuracy_first", "balanced"),

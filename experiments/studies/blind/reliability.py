@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from experiments.comparing.rates import Estimate
+from experiments.comparing.statistics import Estimate
 from experiments.runner.result import Cell, Column, Table
 from experiments.studies.blind.outcome import Outcome
 from experiments.studies.blind.targets import share

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from experiments.comparing.rates import Estimate, rate
+from experiments.comparing.statistics import Estimate, rate
 from experiments.runner.result import significant
 from experiments.studies.blind.runs import Counts
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from experiments.comparing.rates import Estimate, median
+from experiments.comparing.statistics import Estimate, median
 from experiments.runner.result import SCORE_STATES, Cell, Column, Table, scored, significant
 from experiments.studies.blind.codes import STATUSES
 from experiments.studies.blind.outcome import Outcome

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from experiments.comparing.rates import Estimate, median, rate
+from experiments.comparing.statistics import Estimate, median, rate
 from experiments.studies.blind.outcome import Outcome
 from experiments.studies.blind.runs import Counts
 

@@ -7,8 +7,7 @@ import numpy as np
 from experiments.comparing.indicators import NAMES, smaller_is_better
 from experiments.comparing.paired import SIGNIFICANT
 from experiments.comparing.ranks import medians
-from experiments.comparing.rates import state_of
-from experiments.comparing.statistics import holm
+from experiments.comparing.statistics import holm, state_of
 from experiments.runner.result import Cell, Column, Finding, Table, scored
 from experiments.runner.texts import paragraphs
 from experiments.studies.cards.data import Numbers

@@ -12,10 +12,10 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from experiments.comparing.contestants import CONTESTANTS
+from experiments.comparing.figures import critical_difference_plot, rank_heatmap
 from experiments.comparing.indicators import NAMES
 from experiments.comparing.peers_pymoo import POPULATION
 from experiments.comparing.ranks import nemenyi_difference, problem_ranks
-from experiments.comparing.ranks_figures import critical_difference_plot, rank_heatmap
 from experiments.runner.committed import stored_outcome
 from experiments.runner.registry import Context
 from experiments.runner.result import NEW, Picture, Result

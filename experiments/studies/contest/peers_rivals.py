@@ -11,8 +11,8 @@ from scipy.stats import mannwhitneyu
 from experiments.comparing.indicators import NAMES, smaller_is_better
 from experiments.comparing.paired import SIGNIFICANT
 from experiments.comparing.ranks import average_ranks
-from experiments.comparing.rates import median, state_of
 from experiments.comparing.rivals import better_than_each, tests_of_medians, win_tie_loss
+from experiments.comparing.statistics import median, state_of
 from experiments.runner.result import (
     Cell,
     Column,

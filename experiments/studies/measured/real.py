@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from experiments.comparing.rates import rate
+from experiments.comparing.statistics import rate
 from experiments.runner.committed import (
     committed_file,
     read_rows,

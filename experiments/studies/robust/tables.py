@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from experiments.comparing.rates import rate
+from experiments.comparing.statistics import rate
 from experiments.runner.result import NOT_SHOWN, SHOWN, Cell, Column, Finding, Table, scored
 from experiments.studies.robust.data import FURTHER, SEEDS, Outcome, ahead
 from experiments.studies.robust.functions import BY_NAME, FUNCTIONS

@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from experiments.comparing.rates import mean, rate, state_of
 from experiments.comparing.rivals import RivalTest, better_than_each
+from experiments.comparing.statistics import mean, rate, state_of
 from experiments.runner.result import SCORE_STATES, Cell, Column, Table, scored, significant
 from experiments.studies.suites.bbob.published import BEST, CITED
 from experiments.studies.suites.bbob_tables import reached, reached_shares

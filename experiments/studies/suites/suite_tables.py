@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from experiments.comparing import indicators as measures
 from experiments.comparing.paired import SIGNIFICANT
 from experiments.comparing.ranks import average_ranks
-from experiments.comparing.rates import rate
 from experiments.comparing.rivals import RivalTest, tests_of_medians
+from experiments.comparing.statistics import rate
 from experiments.runner.result import Cell, Column, Table
 from experiments.studies.suites.bbob.published import BEST, CITED
 from experiments.studies.suites.bbob_tables import reached

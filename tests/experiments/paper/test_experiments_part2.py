@@ -9,9 +9,8 @@ from numpy.polynomial.legendre import leggauss
 from scipy.signal import butter, sosfreqz
 
 from experiments.comparing.runs import robust_problem
-from experiments.paper import design_tables, fig12, published, table8
+from experiments.paper import fig12, published, table8
 from experiments.paper.choices import BAND, initial_choices, paper_choices
-from experiments.paper.design_tables import _idle_sweep, deviation_table
 from experiments.paper.models import FITTED
 from experiments.paper.prototypes.consistency import Prediction, best_case_table, consistency_table
 from experiments.paper.prototypes.printed_validation import (
@@ -28,7 +27,6 @@ from experiments.paper.prototypes.printed_validation import (
     bounds,
     nearest_assignment,
 )
-from experiments.paper.prototypes.records import record
 from experiments.paper.scatter import exact_moments
 from experiments.paper.shares import (
     design_indices,
@@ -36,6 +34,8 @@ from experiments.paper.shares import (
     scatter_indices,
     study_designs,
 )
+from experiments.paper.table6 import record
+from experiments.paper.table8 import _idle_sweep, deviation_table
 from experiments.published_values import TABLE_6, Moments
 from experiments.runner.campaign import Campaign
 from experiments.runner.registry import Context
@@ -284,8 +284,8 @@ class TestFitted:
     def test_optima_that_random_designs_dominate_are_not_of_this_model(
         self, share, words, verdict, monkeypatch
     ):
-        monkeypatch.setattr(design_tables, "dominating_shares", lambda _: {"balanced": share})
-        _, _, *found = design_tables.optima_table(paper_choices()).findings
+        monkeypatch.setattr(table8, "dominating_shares", lambda _: {"balanced": share})
+        _, _, *found = table8.optima_table(paper_choices()).findings
         assert [finding.verdict for finding in found] == [verdict] * len(FITTED)
         assert all(f" is {words} (balanced)." in finding.sentence for finding in found)
 
