@@ -12,16 +12,19 @@ from experiments.runner.campaign import Campaign
 from experiments.runner.registry import Context
 from experiments.runner.result import MISSED
 from experiments.studies.suites import data as suites
-from experiments.studies.suites.bbob.published import CITED
-from experiments.studies.suites.bbob_tables import reached
+from experiments.studies.suites.bbob_tables import CITED, reached
 from experiments.studies.suites.demands import demands
 from experiments.studies.suites.own_time import own_time_table
 from experiments.studies.suites.parts import part_tests
 from experiments.studies.suites.protocol import BUDGETS
-from experiments.studies.suites.suite_tables import feasible_runs, in_short
+from experiments.studies.suites.suite_tables import (
+    feasible_runs,
+    in_short,
+    ranks_together,
+    signs_together,
+)
 from experiments.studies.suites.suite_tables import ranks as suite_ranks
 from experiments.studies.suites.suite_tables import tests as rival_tests
-from experiments.studies.suites.together import ranks_together, signs_together
 
 
 def place_of_ours(ranks):

@@ -12,9 +12,9 @@ from pathlib import Path
 from experiments.runner.campaign import Run
 from experiments.runner.committed import read_origin, read_rows, table_with_origin
 from experiments.studies.blind.cases import Case
-from experiments.studies.blind.codes import ERROR, NAMES, PORTS, STATUSES, word, words_of_set
 from experiments.studies.blind.outcome import Outcome
 from experiments.studies.blind.scoring import NUMBERS, PARTS, PLACES, RIVALS
+from experiments.studies.blind.truth import ERROR, NAMES, PORTS, STATUSES, word, words_of_set
 from pymoo_hdte._io.text_table import csv_text
 
 _CASE = ("kind", "number", "truth", "forms", "stress")

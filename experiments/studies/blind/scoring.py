@@ -17,8 +17,17 @@ from tqdm import tqdm
 from experiments.runner.campaign import Run
 from experiments.studies.blind.campaigns import Hiding, campaign_of, hiding
 from experiments.studies.blind.cases import Case
-from experiments.studies.blind.codes import ERROR, NAMES, PORTS, STATUSES, code, code_of_set
-from experiments.studies.blind.truth import may_be_named, one_name, to_be_named
+from experiments.studies.blind.truth import (
+    ERROR,
+    NAMES,
+    PORTS,
+    STATUSES,
+    code,
+    code_of_set,
+    may_be_named,
+    one_name,
+    to_be_named,
+)
 from pymoo_hdte.discrepancy import Campaign
 from pymoo_hdte.discrepancy._answers.next_test_drive import next_experiment
 from pymoo_hdte.discrepancy._answers.where.location import locate

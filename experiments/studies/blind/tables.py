@@ -6,7 +6,6 @@ from collections.abc import Iterable, Sequence
 
 from experiments.comparing.statistics import Estimate, median
 from experiments.runner.result import SCORE_STATES, Cell, Column, Table, scored, significant
-from experiments.studies.blind.codes import STATUSES
 from experiments.studies.blind.outcome import Outcome
 from experiments.studies.blind.rig.forms import LISTED
 from experiments.studies.blind.runs import BlindRun, total
@@ -23,6 +22,7 @@ from experiments.studies.blind.targets import (
     share,
     time_demand,
 )
+from experiments.studies.blind.truth import STATUSES
 
 JUDGED_COLUMNS = (
     Column("demand"),

@@ -18,13 +18,14 @@ from experiments.comparing.figures import BLUE, GREY, grid
 from experiments.runner.result import Table, significant
 from experiments.studies.cards.data import Numbers, committed_numbers
 from experiments.studies.cards.experiment import LEFT_OUT, SETTING
-from experiments.studies.cards.separation import Separation, separations
 from experiments.studies.cards.tables import (
     HARDNESS_NOTE,
     SEPARATION_NOTE,
+    Separation,
     hardness_table,
     medians_table,
     separation_table,
+    separations,
 )
 from experiments.studies.contest.peers_data import MEASURES
 from experiments.studies.contest.problems import CARDS, problem_of

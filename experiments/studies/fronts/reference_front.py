@@ -22,17 +22,17 @@ from experiments.comparing.quality import GAP, TrueFront
 from experiments.runner.registry import Context
 from experiments.runner.result import Column, Finding, Picture, Result, Table
 from experiments.runner.store import write_atomically
-from experiments.studies.fronts.agreement import disagreement
-from experiments.studies.fronts.front_search import Solution
-from experiments.studies.fronts.level_search import LevelSearch, without_local_optima
+from experiments.studies.fronts.front_search import Solution, falling, find_true_front
 from experiments.studies.fronts.tolerance_front import (
     POINTS,
     TOLERANCES,
+    LevelSearch,
+    disagreement,
     find_tolerance_front,
     front_designs,
     tolerance_disagreement,
+    without_local_optima,
 )
-from experiments.studies.fronts.true_front import falling, find_true_front
 from pymoo_hdte.problems import (
     RobustDTE,
     RobustDTEGrades,

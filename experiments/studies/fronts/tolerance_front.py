@@ -13,13 +13,141 @@ from pymoo.core.problem import Problem
 from pymoo.util.nds.non_dominated_sorting import NonDominatedSorting
 from tqdm import tqdm
 
-from experiments.studies.fronts.agreement import disagreement
-from experiments.studies.fronts.front_search import FrontSearch
-from experiments.studies.fronts.level_search import LevelSearch, hand_over
-from experiments.studies.fronts.true_front import falling
+from experiments.studies.fronts.front_search import FrontSearch, Solution, falling
 from pymoo_hdte.problems import RobustDTETolerance
 from pymoo_hdte.problems.reference import ReferenceFront
 from pymoo_hdte.problems.robust_dte_tolerance import PAPERS_TOLERANCE
+
+_BESIDE = 1e-6
+"""A design closer to its level than this, relatively, is meant to be on it."""
+_FAR = 0.1
+"""Distance of neighbours, as a share of the search space in some variable."""
+_IMPROVEMENT = 1e-10
+_ACTIVE = 1e-6
+"""A constraint closer than this to 0 holds a design."""
+
+
+class LevelSearch(FrontSearch):
+    """A search whose solutions lie on their levels exactly."""
+
+    def best(self, level: float, starts: list[NDArray[np.float64]]) -> Solution | None:
+        """Return what `below` finds from these starts, moved on to the level."""
+        found = self.below(level, starts)
+        if found is None:
+            return None
+        problem = self._problem
+        design = on_level(problem, self.designs(found.cube), level)
+        return self._solution((design - problem.xl) / self._width)
+
+
+def without_local_optima(
+    problem: Problem, found: ReferenceFront, rng: np.random.Generator
+) -> ReferenceFront:
+    """Return a front of two objectives after `hand_over`; other rows keep their digits."""
+    search = LevelSearch(problem, rng)
+    cubes = (found.designs - problem.xl) / (problem.xu - problem.xl)
+    before = [Solution(*row) for row in zip(cubes, found.front, strict=True)]
+    after = list(before)
+    hand_over(search, found.front[:, 0], after)
+    front, designs = found.front.copy(), found.designs.copy()
+    for row, (old, new) in enumerate(zip(before, after, strict=True)):
+        if new is not old:
+            front[row], designs[row] = new.objectives, search.designs(new.cube)
+    return ReferenceFront(front, designs)
+
+
+def hand_over(search: LevelSearch, levels: NDArray[np.float64], solutions: list[Solution]) -> None:
+    """Start each inner level from its neighbours' solutions until nothing improves.
+
+    Only neighbours far apart are tried: one of them may be a local optimum.
+    """
+    inner = range(1, len(solutions) - 1)
+    neighbours = [(i, i + 1) for i in reversed(inner)] + [(i, i - 1) for i in inner]
+    improved = True
+    while improved:
+        improved = False
+        for target, source in neighbours:
+            mine, other = solutions[target], solutions[source]
+            if np.max(np.abs(mine.cube - other.cube)) <= _FAR:
+                continue
+            found = search.best(levels[target], [other.cube])
+            limit = mine.objectives[1] * (1.0 - _IMPROVEMENT)
+            if found is not None and found.objectives[1] < limit:
+                solutions[target], improved = found, True
+
+
+def on_level(problem: Problem, design: NDArray[np.float64], level: float) -> NDArray[np.float64]:
+    """Move a design on to a level of f1, by one Newton step along its slope in the free part.
+
+    Active constraints keep their value to first order.
+
+    SLSQP leaves it beside the level by some 1e-7 of the range of f1 over all designs. That is more
+    than it seems: the front is far narrower than that range, and may be steep. A design well below
+    its level, as in a gap of the front, stays where it is.
+    """
+    asked = ["F", "dF", "G", "dG"] if problem.n_ieq_constr else ["F", "dF"]
+    values, slopes, *limits = problem.evaluate(design, return_values_of=asked)
+    width = problem.xu - problem.xl
+    free = (design > problem.xl) & (design < problem.xu)
+    slope = np.where(free, slopes[0] * width, 0.0)
+    rounding = 1e-20 * (slope @ slope)
+    if limits:
+        slope = _along(slope, np.where(free, limits[1] * width, 0.0)[limits[0] > -_ACTIVE])
+    length = slope @ slope
+    missing = level - values[0]
+    if length <= rounding or missing > _BESIDE * abs(level):
+        return design
+    step = missing / length * slope
+    return np.clip(design + step * width, problem.xl, problem.xu)
+
+
+def _along(slope: NDArray[np.float64], of_limits: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the part of a slope (n_var,) that leaves constraints of slopes (m, n_var) alone."""
+    weights, *_ = np.linalg.lstsq(of_limits.T, slope, rcond=None)
+    return slope - weights @ of_limits
+
+
+def disagreement(
+    problem: Problem, found: ReferenceFront, other: ReferenceFront, width: NDArray[np.float64]
+) -> float:
+    """Return the largest difference of two searches as a share of the width.
+
+    It is taken in f1 and f2 at the ends, and in f2 at every level of f1 that the first has found.
+
+    Parameters
+    ----------
+    problem : Problem
+        Two objectives with ``dF``.
+    found, other : ReferenceFront
+        Sorted by f1; only the designs of the second are asked.
+    width : ndarray, shape (2,)
+        One unit of each objective.
+    """
+    first, last = found.front[0, 0] - other.front[0, 0], found.front[-1, 1] - other.front[-1, 1]
+    levels = found.front[1:-1, 0]
+    again = _second_objective_at(problem, levels, other.designs)
+    between = np.max(np.abs(again - found.front[1:-1, 1]), initial=0.0)
+    return float(max(abs(first) / width[0], abs(last) / width[1], between / width[1]))
+
+
+def _second_objective_at(
+    problem: Problem, levels: NDArray[np.float64], designs: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return the least f2 at these levels of f1, shape (n,), found from the designs of a front."""
+    search = LevelSearch(problem, np.random.default_rng(0))
+    firsts = problem.evaluate(designs, return_values_of=["F"])[:, 0]
+    cubes = (designs - problem.xl) / (problem.xu - problem.xl)
+    values = np.full(len(levels), np.inf)
+    for row, level in enumerate(levels):
+        nearest = int(np.searchsorted(firsts, level).clip(1, len(firsts) - 1))
+        between = (cubes[nearest - 1] + cubes[nearest]) / 2.0
+        # One by one, since together only the starts that look best early are followed to the end.
+        for start in (cubes[nearest - 1], between, cubes[nearest]):
+            found = search.best(level, [start])
+            if found is not None:
+                values[row] = min(values[row], found.objectives[1])
+    return values
+
 
 TOLERANCES = 40
 POINTS = 50

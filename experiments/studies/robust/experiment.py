@@ -21,12 +21,22 @@ The whole, ``--full``, takes some 15 minutes of one core and 0.5 GB.
 
 from __future__ import annotations
 
+from matplotlib.figure import Figure
+
+from experiments.comparing.figures import BLUE, GREEN, ORANGE, grid
 from experiments.runner.committed import stored_outcome
 from experiments.runner.registry import Context
 from experiments.runner.result import NEW, Picture, Result
 from experiments.runner.texts import paragraphs
-from experiments.studies.robust.data import NAME, outcome_for
-from experiments.studies.robust.figures import error_over_runs
+from experiments.studies.robust.data import (
+    ACCURACY,
+    CHAOSPY,
+    NAME,
+    OPENTURNS,
+    OURS,
+    Outcome,
+    outcome_for,
+)
 from experiments.studies.robust.functions import FUNCTIONS
 from experiments.studies.robust.tables import (
     curves_table,
@@ -62,3 +72,32 @@ def run(context: Context) -> Result:
             ),
         ),
     )
+
+
+STYLES = {OURS: (BLUE, "o-"), CHAOSPY: (ORANGE, "^--"), OPENTURNS: (GREEN, "s-.")}
+_COLUMNS = 5
+
+
+def error_over_runs(outcome: Outcome) -> Figure:
+    """Draw all curves; of chaospy every way."""
+    names = outcome.functions()
+    figure, axes = grid(-(-len(names) // _COLUMNS), _COLUMNS, width=2.6, height=2.6)
+    for place, axis in enumerate(axes.flat):
+        if place >= len(names):
+            axis.set_visible(False)
+            continue
+        for (name, method, _), steps in outcome.curves.items():
+            if name == names[place]:
+                colour, style = STYLES[method]
+                runs, errors = [one[0] for one in steps], [100.0 * one[1] for one in steps]
+                axis.loglog(runs, errors, style, color=colour, markersize=3, lw=0.9, mfc="none")
+        axis.axhline(100.0 * ACCURACY, color="black", linestyle=":", linewidth=1)
+        axis.set_title(names[place], fontsize=9)
+        axis.set_xlabel("model runs")
+    axes[0, 0].set_ylabel("error of the deviation [%]")
+    handles = [
+        axes[0, 0].plot([], [], style, color=colour, mfc="none", label=method)[0]
+        for method, (colour, style) in STYLES.items()
+    ]
+    figure.legend(handles=handles, loc="outside lower center", ncols=3, frameon=False)
+    return figure

@@ -6,9 +6,8 @@ import numpy as np
 
 from experiments.comparing.statistics import rate
 from experiments.runner.result import NOT_SHOWN, SHOWN, Cell, Column, Finding, Table, scored
-from experiments.studies.robust.data import FURTHER, SEEDS, Outcome, ahead
+from experiments.studies.robust.data import BUDGET, FURTHER, METHODS, OURS, SEEDS, Outcome, ahead
 from experiments.studies.robust.functions import BY_NAME, FUNCTIONS
-from experiments.studies.robust.job import BUDGET, METHODS, OURS
 from experiments.studies.robust.task import DESIGNS
 
 WANTED_AHEAD = 0.8

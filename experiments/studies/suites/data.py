@@ -14,7 +14,7 @@ from experiments.runner.campaign import Run
 from experiments.runner.committed import committed_file, read_rows, rounded, table_with_origin
 from experiments.runner.registry import Context, require
 from experiments.runner.store import write_atomically
-from experiments.studies.suites.bbob.coco import EXTRA
+from experiments.studies.suites.coco import EXTRA
 from experiments.studies.suites.jobs import MEASURES, BbobRun, SuiteRun
 from experiments.studies.suites.peers import OURS, PEERS, takes
 from experiments.studies.suites.problems import PROBLEMS, SUITES, problem_of

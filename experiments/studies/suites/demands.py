@@ -10,8 +10,7 @@ import numpy as np
 from experiments.comparing.rivals import RivalTest, better_than_each
 from experiments.comparing.statistics import mean, rate, state_of
 from experiments.runner.result import SCORE_STATES, Cell, Column, Table, scored, significant
-from experiments.studies.suites.bbob.published import BEST, CITED
-from experiments.studies.suites.bbob_tables import reached, reached_shares
+from experiments.studies.suites.bbob_tables import BEST, CITED, reached, reached_shares
 from experiments.studies.suites.data import Outcome
 from experiments.studies.suites.peers import OURS
 from experiments.studies.suites.protocol import (
@@ -29,9 +28,10 @@ from experiments.studies.suites.suite_tables import (
     indicators,
     named,
     ranks,
+    ranks_together,
+    signs_together,
     tests,
 )
-from experiments.studies.suites.together import ranks_together, signs_together
 
 
 class Demand(NamedTuple):

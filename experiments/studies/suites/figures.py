@@ -6,8 +6,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from experiments.comparing.figures import BLUE, GREEN, GREY, ORANGE, PINK, SKY, YELLOW, grid
-from experiments.studies.suites.bbob.published import BEST, CITED, curves
-from experiments.studies.suites.bbob_tables import told_most
+from experiments.studies.suites.bbob_tables import BEST, CITED, curves, told_most
 from experiments.studies.suites.data import Outcome
 from experiments.studies.suites.peers import OURS
 from experiments.studies.suites.protocol import BUDGETS, DIMENSIONS, HELD_OUT

@@ -16,7 +16,7 @@ from experiments.comparing.contestants import CONTESTANTS, Contestant, of_jmetal
 from experiments.comparing.indicators import front_among
 from experiments.comparing.offers import POPULATION, Offer
 from experiments.comparing.peers_pymoo import OWN, PYMOO, run_pymoo
-from experiments.studies.suites.bbob.coco import StartBox
+from experiments.studies.suites.coco import StartBox
 from experiments.studies.suites.reduced import LESS
 from pymoo_hdte.algorithms import CompactSwarm
 

@@ -59,7 +59,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from experiments.studies.suites.bbob.coco import FUNCTIONS
+from experiments.studies.suites.coco import FUNCTIONS
 from experiments.studies.suites.jobs import BbobRun, SuiteRun
 from experiments.studies.suites.peers import BBOB_PEERS, ON_SUITES, OURS, PEERS, takes
 from experiments.studies.suites.problems import SUITES, problem_of

@@ -41,9 +41,16 @@ from experiments.runner.campaign import Campaign
 from experiments.runner.registry import Context
 from experiments.runner.store import load, png_bytes, save
 from experiments.studies import dte_map, sensitivity
-from experiments.studies.accuracy_per_run import Trial, needed_table
-from experiments.studies.chaospy_twins import chaos, compare
-from experiments.studies.rival_surrogates import FAMILIES, SCREENED, TENSOR, fit_grid, rivals
+from experiments.studies.accuracy_per_run import (
+    FAMILIES,
+    SCREENED,
+    TENSOR,
+    Trial,
+    fit_grid,
+    needed_table,
+    rivals,
+)
+from experiments.studies.crosscheck import chaos, compare
 from pymoo_hdte.decision import deviation_degree
 from pymoo_hdte.drive import (
     PARAMETERS,

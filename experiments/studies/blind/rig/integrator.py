@@ -14,8 +14,7 @@ from scipy.linalg import expm
 
 from experiments.studies.blind.rig.elements import Values
 from experiments.studies.blind.rig.machine import LinearPart, Matrix
-from experiments.studies.blind.rig.shapes import copy_into
-from experiments.studies.blind.rig.torques import LOAD, Plant, torques
+from experiments.studies.blind.rig.torques import LOAD, Plant, copy_into, torques
 
 
 class Step(NamedTuple):

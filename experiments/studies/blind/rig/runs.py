@@ -12,10 +12,10 @@ from experiments.studies.blind.rig import elements as el
 from experiments.studies.blind.rig.elements import Values, table
 from experiments.studies.blind.rig.integrator import follow, readout_of, step_of
 from experiments.studies.blind.rig.machine import LinearPart, Machine, Matrix, linear_part
-from experiments.studies.blind.rig.shapes import copy_into
 from experiments.studies.blind.rig.torques import (
     LOAD,
     Plant,
+    copy_into,
     elastic_torque,
     friction_torque,
     static_error,

@@ -22,7 +22,6 @@ from experiments.runner.result import Result
 from experiments.studies.reliability import data
 from experiments.studies.reliability import experiment as reliability
 from experiments.studies.reliability import kill as reliability_kill
-from experiments.studies.reliability.commands import Wrong
 from experiments.studies.reliability.data import (
     FUZZ,
     KILL,
@@ -45,7 +44,7 @@ from experiments.studies.reliability.fuzz import (
     outcome,
     outcomes_of_process,
 )
-from experiments.studies.reliability.inputs import KINDS, THROUGH_COMMANDS
+from experiments.studies.reliability.inputs import KINDS, THROUGH_COMMANDS, Wrong
 from experiments.studies.reliability.mutations import Link, mutated, put
 from experiments.studies.reliability.text import BYTES, TEXTS
 

@@ -7,6 +7,9 @@ from experiments.runner.campaign import Campaign
 from experiments.runner.registry import Context
 from experiments.runner.result import MISSED, NOT_SHOWN, SHOWN
 from experiments.studies.robust.data import (
+    CHAOSPY,
+    OPENTURNS,
+    OURS,
     SEEDS,
     STOP_NUMBERS,
     Outcome,
@@ -18,7 +21,6 @@ from experiments.studies.robust.data import (
 )
 from experiments.studies.robust.experiment import run
 from experiments.studies.robust.functions import FUNCTIONS, G_WEIGHTS
-from experiments.studies.robust.job import CHAOSPY, OPENTURNS, OURS
 from experiments.studies.robust.ours import Growth
 from experiments.studies.robust.rivals import (
     CHAOSPY_WAYS,
