@@ -40,7 +40,7 @@ class Elementwise(ElementwiseProblem):
 def run(context: Context) -> Result:
     """Show how busy workers are by generations and one by one."""
     table = virtual_table()
-    gains = [row[3] for row in table.rows]
+    gains = [row[3] for row in table.rows if isinstance(row[3], float)]
     return Result(
         title="How busy workers are",
         command="python -m experiments workers",
