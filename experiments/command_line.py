@@ -26,10 +26,10 @@ from pymoo_hdte.surrogate.threads import usable_cores
 
 FAILED = 1
 """Exit code where the workers or the disk fail, or a stored outcome or an extra is missing."""
-SMALL = [one for one in EXPERIMENTS if one.has_small_version]
-STORED = [one for one in EXPERIMENTS if one.reads_outcome]
-SEEDED = [one for one in EXPERIMENTS if one.takes_seeds]
-LIMITED = [one for one in EXPERIMENTS if one.takes_cases]
+SMALL = [experiment for experiment in EXPERIMENTS if experiment.has_small_version]
+STORED = [experiment for experiment in EXPERIMENTS if experiment.reads_outcome]
+SEEDED = [experiment for experiment in EXPERIMENTS if experiment.takes_seeds]
+LIMITED = [experiment for experiment in EXPERIMENTS if experiment.takes_cases]
 SEEDS = 20
 """Runs of every algorithm: the paper's number, and the default here."""
 IN_USE = ".in-use"
@@ -226,7 +226,7 @@ def _chosen(name: str | None, parser: argparse.ArgumentParser) -> list[Experimen
 
 
 def _names(experiments: Sequence[Experiment]) -> str:
-    return ", ".join(one.name for one in experiments)
+    return ", ".join(experiment.name for experiment in experiments)
 
 
 def _list_of_experiments() -> str:

@@ -122,7 +122,7 @@ def _with_neighbours(files: list[Path]) -> list[Path]:
 
 def _arguments(factory: Callable[..., Any], population: int, n_obj: int) -> dict[str, Any]:
     takes = inspect.signature(factory).parameters
-    any_keyword = any(one.kind is one.VAR_KEYWORD for one in takes.values())
+    any_keyword = any(part.kind is part.VAR_KEYWORD for part in takes.values())
     arguments: dict[str, Any] = {}
     if "pop_size" in takes or (any_keyword and "ref_dirs" not in takes):
         arguments["pop_size"] = population

@@ -150,10 +150,10 @@ def _ends(
     data: tuple[NDArray[np.float64], ...], statistic: Callable[..., NDArray[np.float64]]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     low, high = np.full((2, len(data[0])), np.nan)
-    complete = np.all([np.isfinite(one).all(axis=1) for one in data], axis=0)
+    complete = np.all([np.isfinite(sample).all(axis=1) for sample in data], axis=0)
     if complete.any() and data[0].shape[1] > 1:
         found = bootstrap(
-            tuple(one[complete] for one in data),
+            tuple(sample[complete] for sample in data),
             statistic,
             axis=1,
             paired=len(data) > 1,

@@ -66,12 +66,12 @@ def run(context: Context) -> Result:
 
 def _answer(findings: Sequence[Finding]) -> str:
     """Say how many parts make the difference that the paper shows, then the findings."""
-    shown = sum(one.agrees for one in findings)
+    shown = sum(finding.agrees for finding in findings)
     first = (
         f"Of the {len(findings)} differences that the paper shows, {shown or 'none'} came out "
         "when the pyramid or the entropy weight was left out."
     )
-    return " ".join([first, *(one.sentence for one in findings)])
+    return " ".join([first, *(finding.sentence for finding in findings)])
 
 
 def _gaps(comparisons: Sequence[Comparison]) -> Iterator[Finding]:

@@ -188,7 +188,10 @@ def _readings(printed: dict[str, Printed]) -> Table:
         (*rows, ("the paper", None, *paper)),
         findings=(
             Finding(
-                any(abs(one.mean / paper.mean_arcsec - 1.0) <= ONE_PERCENT for one in (low, high)),
+                any(
+                    abs(value.mean / paper.mean_arcsec - 1.0) <= ONE_PERCENT
+                    for value in (low, high)
+                ),
                 f"The printed equations give {low.dte:.1f} arcsec if theta_s is a peak-to-peak, "
                 f"and {high.dte:.1f} (mean {high.mean:.1f}, standard deviation {high.std:.1f}) if "
                 f"it is a semi-amplitude; the paper has {paper.mean_arcsec:.1f} and "

@@ -42,8 +42,8 @@ def processor() -> str:
 
 def _linear_algebra() -> str:
     found = {
-        f"{one['internal_api']} {one['version']}, {one['num_threads']} threads"
-        for one in threadpool_info()
-        if one["user_api"] == "blas"
+        f"{library['internal_api']} {library['version']}, {library['num_threads']} threads"
+        for library in threadpool_info()
+        if library["user_api"] == "blas"
     }
     return "; ".join(sorted(found)) or "unknown"

@@ -102,8 +102,8 @@ def _curve(
     indicator: str,
 ) -> None:
     points = {
-        budget: scores.of(one, COMPARED[indicator])
-        for size, budget, (one,) in cases(scores, contested, [algorithm])
+        budget: scores.of(cell, COMPARED[indicator])
+        for size, budget, (cell,) in cases(scores, contested, [algorithm])
         if size == population
     }
     budgets = list(points)
@@ -123,8 +123,8 @@ def _legend(figure: Figure, axis: Axes, *, printed: bool) -> None:
 
 def closeness(readings: Sequence[Reading]) -> Figure:
     """Draw, for each population and budget, by what factor the closest reading is off."""
-    populations = sorted({one.population for one in readings})
-    budgets = sorted({one.evaluations for one in readings})
+    populations = sorted({reading.population for reading in readings})
+    budgets = sorted({reading.evaluations for reading in readings})
     best = np.full((len(populations), len(budgets)), np.nan)
     for one in reversed(readings):
         # The closest comes last and stays.

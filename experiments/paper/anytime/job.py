@@ -64,7 +64,7 @@ class AnytimeRun:
         together = self.algorithm in UNSCHEDULED
         runs = [self.budgets] if together else [(budget,) for budget in self.budgets]
         started = time.perf_counter()
-        found = [one for budgets in runs for one in self._stages(budgets)]
+        found = [stage for budgets in runs for stage in self._stages(budgets)]
         seconds = time.perf_counter() - started
         rows = []
         for budget, (X, F) in zip(self.budgets, found, strict=True):

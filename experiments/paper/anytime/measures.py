@@ -72,8 +72,8 @@ def measure(
     for (counting, most), (who, run) in product(counted.items(), runs.items()):
         as_seen, as_is = sets_of(run, budget, most)
         found = {
-            scale: _indicators_of(one, as_is if scale.reference == TRUE else as_seen)
-            for scale, one in against.items()
+            scale: _indicators_of(indicators_of, as_is if scale.reference == TRUE else as_seen)
+            for scale, indicators_of in against.items()
         }
         measured[counting, *who] = [
             float(len(as_seen)),

@@ -120,23 +120,23 @@ def number_of_designs(scores: Scores, ranked: Sequence[Reading]) -> str:
     )
 
 
-def _lead(scores: Scores, one: Reading, counted: str) -> float:
+def _lead(scores: Scores, reading: Reading, counted: str) -> float:
     """Return how many times AMP-MOPSO's mean IGD NSGA-II's is; NaN if that was not counted."""
     means = []
     for algorithm in ("NSGA-II", OURS):
-        case = Case(*one.contested, counted, one.population, one.evaluations, algorithm)
+        case = Case(*reading.contested, counted, reading.population, reading.evaluations, algorithm)
         if case not in scores.values:
             return np.nan
-        means.append(scores.of(case, f"igd_{one.scale.suffix}").mean())
+        means.append(scores.of(case, f"igd_{reading.scale.suffix}").mean())
     return float(means[0] / means[1])
 
 
-def _setting(one: Reading) -> str:
-    unit = "in arcsec" if one.scale.unit == "arcsec" else one.scale.unit
+def _setting(reading: Reading) -> str:
+    unit = "in arcsec" if reading.scale.unit == "arcsec" else reading.scale.unit
     return (
-        f"{one.population} particles after {one.evaluations:,} evaluations "
-        f"({one.contested.model}, {one.contested.moments} moments, velocities drawn "
-        f"{drawn(one.contested)}, against the {one.scale.reference}, {unit})"
+        f"{reading.population} particles after {reading.evaluations:,} evaluations "
+        f"({reading.contested.model}, {reading.contested.moments} moments, velocities drawn "
+        f"{drawn(reading.contested)}, against the {reading.scale.reference}, {unit})"
     )
 
 

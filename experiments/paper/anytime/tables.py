@@ -242,22 +242,24 @@ def readings_table(ranked: Sequence[Reading], findings: Sequence[Finding], note:
 
 def stated_place(ranked: Sequence[Reading]) -> int | None:
     """Return the place, from 0, of the closest reading at the stated setting, if it was run."""
-    places = (i for i, one in enumerate(ranked) if (one.population, one.evaluations) == STATED)
+    places = (
+        i for i, reading in enumerate(ranked) if (reading.population, reading.evaluations) == STATED
+    )
     return next(places, None)
 
 
-def _reading_row(place: int, one: Reading) -> tuple[Cell, ...]:
+def _reading_row(place: int, reading: Reading) -> tuple[Cell, ...]:
     return (
         f"{place + 1}",
-        *one.contested,
-        one.scale.reference,
-        one.scale.unit,
-        one.counted,
-        one.population,
-        one.evaluations,
-        *one.means.T.ravel().tolist(),
-        one.factor,
-        _range(*one.factor_interval()),
-        one.shape_factor,
-        "kept" if one.in_order else "not kept",
+        *reading.contested,
+        reading.scale.reference,
+        reading.scale.unit,
+        reading.counted,
+        reading.population,
+        reading.evaluations,
+        *reading.means.T.ravel().tolist(),
+        reading.factor,
+        _range(*reading.factor_interval()),
+        reading.shape_factor,
+        "kept" if reading.in_order else "not kept",
     )

@@ -88,11 +88,17 @@ def format_outcomes(outcomes: Sequence[Outcome]) -> str:
     """Return the CSV text of outcomes, with date and versions in a first comment line."""
     parameters = list(Candidate(EFFECTS, "peak_to_peak", "R1").bounds)
     rows = []
-    for one in outcomes:
-        identity = (one.kind, one.direction, one.candidate.name, one.seed, one.budget)
-        numbers = [one.chi_square, *(one.parameters.get(name) for name in parameters)]
-        numbers += [one.predictions[name] for name in PUBLISHED]
-        numbers += [one.traits[name] for name in TRAITS]
+    for outcome in outcomes:
+        identity = (
+            outcome.kind,
+            outcome.direction,
+            outcome.candidate.name,
+            outcome.seed,
+            outcome.budget,
+        )
+        numbers = [outcome.chi_square, *(outcome.parameters.get(name) for name in parameters)]
+        numbers += [outcome.predictions[name] for name in PUBLISHED]
+        numbers += [outcome.traits[name] for name in TRAITS]
         rows.append([*identity, *("" if n is None else f"{n:.7g}" for n in numbers)])
     return table_with_origin([*_IDENTITY, *parameters, *PUBLISHED, *TRAITS], rows)
 

@@ -123,7 +123,9 @@ def fit_rigid(bands: str) -> RigidDrive:
 
 def simplest() -> RigidDrive:
     """Return the better one of the two readings of the bands."""
-    return min((fit_rigid(bands) for bands in (NARROW, WIDE)), key=lambda one: one.chi_square)
+    return min(
+        (fit_rigid(bands) for bands in (NARROW, WIDE)), key=lambda outcome: outcome.chi_square
+    )
 
 
 def _residuals(drive: RigidDrive) -> NDArray[np.float64]:

@@ -101,9 +101,9 @@ def fits_of(jobs: Sequence[Search], runs: Sequence[Run]) -> list[Fit]:
 def format_fits(fits: Sequence[Fit]) -> str:
     """Return the CSV text of fits, with date and versions in a first comment line."""
     rows = [
-        [one.target, one.rung.name, one.seed, one.effort, one.starts, one.followed, one.reached,
-         f"{one.deviance:.7g}", *_cells(one.parameters)]
-        for one in fits
+        [fit.target, fit.rung.name, fit.seed, fit.effort, fit.starts, fit.followed, fit.reached,
+         f"{fit.deviance:.7g}", *_cells(fit.parameters)]
+        for fit in fits
     ]  # fmt: skip
     return table_with_origin([*_FIT, *PARAMETERS], rows)
 

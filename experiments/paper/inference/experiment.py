@@ -101,11 +101,11 @@ def curves(profiled: Sequence[Profiled]) -> Figure:
     names = list(profiled[0].curves)
     figure, axes = grid(-(-len(names) // 3), 3, width=3.6, height=2.4)
     for axis, name in zip(axes.flat, names, strict=False):
-        for one, colour in zip(profiled, COLOURS, strict=False):
-            values, deviance = one.curves[name].T
+        for profile, colour in zip(profiled, COLOURS, strict=False):
+            values, deviance = profile.curves[name].T
             shown = np.exp(values) if name in LOGARITHMIC else values
             axis.plot(shown, deviance - deviance.min(), "o-", color=colour, markersize=3,
-                      label=title(one.target, one.rung))  # fmt: skip
+                      label=title(profile.target, profile.rung))  # fmt: skip
         axis.axhline(BOUND, color=GREY, linewidth=1)
         axis.set_ylim(-0.5, 12.0)
         axis.set_xlabel(name.replace("_", " "))
@@ -154,7 +154,9 @@ SETTING, DEPTH, NOISE = paragraphs(
 WORDS = (
     "R1 and R2 are the readings of the bands of the calibration: R1 has every Monte "
     "Carlo run at ±5 %, R2 that of the initial design at ±35 %. Closures, each one equation beside "
-    "Eq. (9): " + "; ".join(f"{name}: {one.sentence}" for name, one in CLOSURES.items()) + "."
+    "Eq. (9): "
+    + "; ".join(f"{name}: {closure.sentence}" for name, closure in CLOSURES.items())
+    + "."
 )
 
 

@@ -220,7 +220,7 @@ def singular(fit: Fit) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
 
 
 def _fit_of(fits: Sequence[Fit], drawn: Draws) -> Fit:
-    (found,) = (one for one in fits if (one.target, one.rung) == (drawn.target, drawn.rung))
+    (found,) = (fit for fit in fits if (fit.target, fit.rung) == (drawn.target, drawn.rung))
     return found
 
 

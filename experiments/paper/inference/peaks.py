@@ -53,9 +53,9 @@ def shape_peak_to_peak(orders: Real, phasors: Complex) -> float:
     steady, in_phase, quadrature = _waves(orders, phasors[None, :])
     bend = np.abs(phasors) @ orders**2 * (2.0 * np.pi / POINTS) ** 2 / 8.0
     nothing = np.zeros_like(steady)
-    one = np.ones(1)
+    unit = np.ones(1)
     return float(
-        _spans(steady, in_phase, quadrature, np.array([bend]), nothing, np.zeros(1), one,
+        _spans(steady, in_phase, quadrature, np.array([bend]), nothing, np.zeros(1), unit,
                np.zeros(1, dtype=np.int_))[0]
     )  # fmt: skip
 

@@ -99,7 +99,7 @@ def all_rungs() -> list[Rung]:
     found = [Rung(candidate) for candidate in ladder_rungs()]
     every = tuple(CLOSURES)
     for bands in (WIDE, NARROW):
-        full, printed = (Candidate(one, "semi_amplitude", bands) for one in (EFFECTS, ()))
+        full, printed = (Candidate(effects, "semi_amplitude", bands) for effects in (EFFECTS, ()))
         found += [Rung(full, (name,)) for name in CLOSURES]
         found += [Rung(printed, RIGID), Rung(printed, every), Rung(full, every)]
     return found
@@ -121,7 +121,7 @@ def noisy_rungs() -> list[Rung]:
 def rung_named(name: str) -> Rung:
     """Return the rung of that name."""
     candidate, *closures = name.split("__")
-    (found,) = (one for one in ladder_rungs() if one.name == candidate)
+    (found,) = (rung for rung in ladder_rungs() if rung.name == candidate)
     return Rung(found, tuple(closures))
 
 

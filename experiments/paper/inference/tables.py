@@ -95,7 +95,7 @@ UNIT = 1.0
 
 def of_the_first_page(fits: Sequence[Fit]) -> str:
     """Say what gives its trade-off and its optima, as part of a longer sentence."""
-    common = [one for one in fits if one.target == "common"]
+    common = [fit for fit in fits if fit.target == "common"]
     both = len(_models(gives_both(without_noise(fits))))
     noisy = with_noise(fits)
     meeting, simplest = _meeting(noisy), rigid(noisy)
@@ -125,7 +125,7 @@ def opening(fits: Sequence[Fit]) -> str:
 
 
 def _without_noise(fits: Sequence[Fit]) -> str:
-    common = [one for one in fits if one.target == "common"]
+    common = [fit for fit in fits if fit.target == "common"]
     searched = len(common)
     meeting = _meeting(common)
     both = gives_both(fits)
@@ -140,7 +140,7 @@ def _without_noise(fits: Sequence[Fit]) -> str:
             f"Without solver noise, none of {searched} drive models gives the paper's trade-off "
             "between mean and standard deviation within the errors of common random numbers."
         )
-    first = min(meeting, key=lambda one: one.bic)
+    first = min(meeting, key=lambda fit: fit.bic)
     return (
         f"Without solver noise, none of {searched} drive models gives both the paper's numbers and "
         f"its optima. {len(meeting)} {_give(len(meeting))} the nine numbers with the steps between "
@@ -183,12 +183,12 @@ def _share(fit: Fit) -> float:
 
 
 def _meeting(fits: Sequence[Fit]) -> list[Fit]:
-    return [one for one in fits if gives_trade_off(one)]
+    return [fit for fit in fits if gives_trade_off(fit)]
 
 
 def _models(fits: Sequence[Fit]) -> set[Rung]:
     """Return the models of fits: one may be fitted to several targets."""
-    return {one.rung for one in fits}
+    return {fit.rung for fit in fits}
 
 
 def _nearest(fits: Sequence[Fit]) -> str:
@@ -248,9 +248,9 @@ def _steps_row(named: Named) -> tuple[Cell, ...]:
 
 
 def _findings(fits: Sequence[Fit]) -> list[Finding]:
-    (independent,) = (one for one in fits if one.target == "independent")
-    common = [one for one in fits if one.target == "common"]
-    meeting = [one for one in common if gives_trade_off(one)]
+    (independent,) = (fit for fit in fits if fit.target == "independent")
+    common = [fit for fit in fits if fit.target == "common"]
+    meeting = [fit for fit in common if gives_trade_off(fit)]
     both = gives_both(without_noise(fits))
     found = independent.evaluation
     ours, paper = steps_of(found.predicted), steps_of(OBSERVED)
@@ -271,7 +271,7 @@ def _findings(fits: Sequence[Fit]) -> list[Finding]:
             f"within {WITHIN:g} standard errors and the nine numbers with a chi-square that is not "
             "improbable"
             + (
-                f"; the likeliest is {describe(min(meeting, key=lambda one: one.bic).rung)}. By "
+                f"; the likeliest is {describe(min(meeting, key=lambda fit: fit.bic).rung)}. By "
                 f"sampling alone, without the {READING:g} arcsec, it misses a step by "
                 f"{_miss_by_sampling(meeting):.1f} standard errors."
                 if meeting
@@ -310,30 +310,30 @@ def _reversal(found: Evaluation) -> Finding:
 
 
 def _miss_by_sampling(meeting: Sequence[Fit]) -> float:
-    found = min(meeting, key=lambda one: one.bic).evaluation
+    found = min(meeting, key=lambda fit: fit.bic).evaluation
     return float(np.abs(step_errors(found, sampling_alone=True)).max())
 
 
 def ladder_table(fits: Sequence[Fit]) -> Table:
     """Return all rungs fitted with the covariance, the likeliest first."""
-    common = sorted((one for one in fits if one.target == "common"), key=lambda one: one.bic)
+    common = sorted((fit for fit in fits if fit.target == "common"), key=lambda fit: fit.bic)
     least = common[0].bic
     rows = tuple(
         (
-            ", ".join(name.replace("_", " ") for name in one.rung.candidate.effects) or "none",
-            ", ".join(one.rung.closures) or "none",
-            one.rung.candidate.reading.replace("_", " "),
-            one.rung.candidate.bands,
-            one.n_parameters,
-            one.evaluation.chi_square("common"),
-            one.bic - least,
-            float(np.abs(step_errors(one.evaluation)).max()),
-            float(one.evaluation.depths.max()),
-            one.starts,
-            one.followed,
-            one.reached,
+            ", ".join(name.replace("_", " ") for name in fit.rung.candidate.effects) or "none",
+            ", ".join(fit.rung.closures) or "none",
+            fit.rung.candidate.reading.replace("_", " "),
+            fit.rung.candidate.bands,
+            fit.n_parameters,
+            fit.evaluation.chi_square("common"),
+            fit.bic - least,
+            float(np.abs(step_errors(fit.evaluation)).max()),
+            float(fit.evaluation.depths.max()),
+            fit.starts,
+            fit.followed,
+            fit.reached,
         )
-        for one in common
+        for fit in common
     )
     columns = (
         Column("effects"),
@@ -363,7 +363,7 @@ def ladder_table(fits: Sequence[Fit]) -> Table:
 def noise_table(fits: Sequence[Fit]) -> Table:
     """Return the rungs fitted with node noise of unknown size, the likeliest first."""
     noisy = with_noise(fits)
-    rows = tuple(_noise_row(one, noisy[0].bic) for one in noisy)
+    rows = tuple(_noise_row(fit, noisy[0].bic) for fit in noisy)
     columns = (
         Column("model"),
         Column("parameters"),

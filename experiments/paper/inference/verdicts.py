@@ -109,14 +109,14 @@ class Named:
 
 def chosen_fits(fits: Sequence[Fit]) -> list[Named]:
     """Return the fits that stand for the outcome: `PRESET`'s kind, and the best of each target."""
-    (independent,) = (one for one in fits if one.target == "independent")
-    plain = [one for one in fits if one.target == "common" and not one.rung.closures]
-    closed = [one for one in fits if one.target == "common" and one.rung.closures]
-    front = [one for one in fits if one.target == "front"]
-    same = next(one for one in plain if one.rung == independent.rung)
+    (independent,) = (fit for fit in fits if fit.target == "independent")
+    plain = [fit for fit in fits if fit.target == "common" and not fit.rung.closures]
+    closed = [fit for fit in fits if fit.target == "common" and fit.rung.closures]
+    front = [fit for fit in fits if fit.target == "front"]
+    same = next(fit for fit in plain if fit.rung == independent.rung)
 
     def best(group: Sequence[Fit]) -> Fit:
-        return min(group, key=lambda one: one.deviance)
+        return min(group, key=lambda fit: fit.deviance)
 
     return [
         Named(f"as {PRESET}: numbers taken as independent", independent),
@@ -138,18 +138,18 @@ def noisy_fits(fits: Sequence[Fit]) -> list[Named]:
 
 def without_noise(fits: Sequence[Fit]) -> list[Fit]:
     """Return the fits in whose likelihood the nodes are free of noise."""
-    return [one for one in fits if one.target != "noise"]
+    return [fit for fit in fits if fit.target != "noise"]
 
 
 def with_noise(fits: Sequence[Fit]) -> list[Fit]:
     """Return the fits with node noise of unknown size, the likeliest by BIC first."""
-    return sorted((one for one in fits if one.target == "noise"), key=lambda one: one.bic)
+    return sorted((fit for fit in fits if fit.target == "noise"), key=lambda fit: fit.bic)
 
 
 def rigid(fits: Sequence[Fit]) -> Fit:
     """Return the likeliest of the fits of a rigid drive with a share of torsion, and no more."""
-    alike = [one for one in fits if not one.rung.candidate.effects and one.rung.closures == RIGID]
-    return min(alike, key=lambda one: one.bic)
+    alike = [fit for fit in fits if not fit.rung.candidate.effects and fit.rung.closures == RIGID]
+    return min(alike, key=lambda fit: fit.bic)
 
 
 def choice_of(fit: Fit) -> NoisyChoice:
@@ -220,29 +220,29 @@ def undominated(fit: Fit) -> bool:
 def above_a_special_case(fits: Sequence[Fit]) -> list[Fit]:
     """Return the fits whose search ended above a model that theirs contains: it fell short."""
     return [
-        one
-        for one in fits
+        fit
+        for fit in fits
         if any(
-            other.target == one.target
-            and _contains(one.rung, other.rung)
-            and other.deviance + BASIN < one.deviance
+            other.target == fit.target
+            and _contains(fit.rung, other.rung)
+            and other.deviance + BASIN < fit.deviance
             for other in fits
         )
     ]
 
 
-def _contains(one: Rung, other: Rung) -> bool:
-    wide, special = one.candidate, other.candidate
+def _contains(rung: Rung, other: Rung) -> bool:
+    wide, special = rung.candidate, other.candidate
     return (
         (wide.reading, wide.bands) == (special.reading, special.bands)
         and set(wide.effects) >= set(special.effects)
-        and set(one.closures) >= set(other.closures)
+        and set(rung.closures) >= set(other.closures)
     )
 
 
 def gives_both(fits: Sequence[Fit]) -> list[Fit]:
     """Return the fits that give the trade-off and leave the optima undominated."""
-    return [one for one in fits if gives_trade_off(one) and undominated(one)]
+    return [fit for fit in fits if gives_trade_off(fit) and undominated(fit)]
 
 
 def describe(rung: Rung) -> str:

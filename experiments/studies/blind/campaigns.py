@@ -45,9 +45,9 @@ class Hiding:
     def quantities(self) -> Mapping[tuple[str, str], float]:
         """True values by name of the effect and of the unknown, SI."""
         return {
-            (one.name, name): value
-            for one in self.effects
-            for name, value in one.hidden.quantities.items()
+            (effect.name, name): value
+            for effect in self.effects
+            for name, value in effect.hidden.quantities.items()
         }
 
 
@@ -125,17 +125,17 @@ def stressed(about: Circumstances, stress: str, rng: np.random.Generator) -> Cir
             amplitudes[line] = SHEET.amplitudes[line] * (1.0 + off)
         return replace(about, machine=replace(machine, amplitudes=tuple(amplitudes.tolist())))
     if stress == "one_load":
-        conditions = tuple(replace(one, load=ONE_LOAD) for one in about.conditions)
+        conditions = tuple(replace(condition, load=ONE_LOAD) for condition in about.conditions)
         loads = np.where(
-            np.array([one.load for one in about.conditions]) == 0.0,
+            np.array([condition.load for condition in about.conditions]) == 0.0,
             ONE_LOAD,
-            ONE_LOAD + about.loads - np.array([one.load for one in about.conditions]),
+            ONE_LOAD + about.loads - np.array([condition.load for condition in about.conditions]),
         )
         return replace(about, conditions=conditions, loads=loads)
     if stress == "half":
         kept: list[int] = []
         for role, count in (("train", FEWEST_FIT), ("held_out", FEWEST_KEPT_OUT)):
-            places = [k for k, one in enumerate(about.conditions) if one.role == role]
+            places = [k for k, condition in enumerate(about.conditions) if condition.role == role]
             kept += rng.choice(places, count, replace=False).tolist()
         return restricted(about, sorted(kept))
     return about

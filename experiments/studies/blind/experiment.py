@@ -120,7 +120,7 @@ def _runs(outcomes: list[Outcome], full: bool) -> list[BlindRun]:
     if not full:
         return stored
     now = run_of(outcomes, _first(outcomes))
-    return [*(one for one in stored if one.last < now.first), now]
+    return [*(blind_run for blind_run in stored if blind_run.last < now.first), now]
 
 
 def _first(outcomes: list[Outcome]) -> int:
@@ -184,7 +184,7 @@ def found(counts: Counts, *, intervals: bool = True) -> str:
         rate(counts.single_right, counts.single),
         rate(counts.pair_both, counts.pair),
     )
-    ends = [f" ({in_percent(one)})" if intervals else "" for one in (wrong, single, both)]
+    ends = [f" ({in_percent(rate_of)})" if intervals else "" for rate_of in (wrong, single, both)]
     return (
         f"in blind tests against an independent simulator, {counts.plain_wrong} of {counts.plain} "
         f"unqualified answers were wrong{ends[0]}; {counts.single_right} of {counts.single} single "
@@ -192,9 +192,9 @@ def found(counts: Counts, *, intervals: bool = True) -> str:
     )
 
 
-def in_percent(one: Estimate) -> str:
+def in_percent(estimate: Estimate) -> str:
     """Write an interval in per cent, with three digits."""
-    low, high = (significant(100.0 * end, 3) for end in (one.low, one.high))
+    low, high = (significant(100.0 * end, 3) for end in (estimate.low, estimate.high))
     return f"{low} to {high} %"
 
 
@@ -208,14 +208,14 @@ _OF_ONE = ("none", "single", "unlisted")
 
 def confusion_matrix(outcomes: Sequence[Outcome]) -> Figure:
     """Draw what is hidden against what is answered, for all cases that hide at most one effect."""
-    drawn = [one for one in outcomes if one.case.kind in _OF_ONE]
+    drawn = [case_outcome for case_outcome in outcomes if case_outcome.case.kind in _OF_ONE]
     known = (*LISTED, PARAMETER, ENCODER_LINE)
     # The library holds effects that the bench never hides, as the new zero of a sensor.
-    others = sorted({one.answer for one in drawn} - {*known, *_OF_NO_EFFECT})
+    others = sorted({case_outcome.answer for case_outcome in drawn} - {*known, *_OF_NO_EFFECT})
     answers = (*known, *others, *_OF_NO_EFFECT)
     counts = np.zeros((len(_TRUTHS), len(answers)), dtype=int)
-    for one in drawn:
-        counts[_TRUTHS.index(one.case.truth), answers.index(one.answer)] += 1
+    for answer in drawn:
+        counts[_TRUTHS.index(answer.case.truth), answers.index(answer.answer)] += 1
     figure, axes = grid(1, 1, width=9.5, height=9.0)
     axis = axes.flat[0]
     axis.grid(False)
@@ -243,10 +243,10 @@ def reliability_diagram(outcomes: Sequence[Outcome]) -> Figure:
     axis = axes.flat[0]
     axis.plot([0.0, 1.0], [0.0, 1.0], color=GREY, linewidth=0.8, linestyle="--")
     said = [point for point, _ in points]
-    values = [one.value for _, one in points]
+    values = [point.value for _, point in points]
     ends = [
-        [one.value - one.low for _, one in points],
-        [one.high - one.value for _, one in points],
+        [point.value - point.low for _, point in points],
+        [point.high - point.value for _, point in points],
     ]
     if points:
         axis.errorbar(said, values, np.abs(ends), fmt="o", color=BLUE, markersize=4, linewidth=1)

@@ -177,7 +177,7 @@ class Outcome:
         """
         if self.status == ERROR:
             return 1.0
-        before, error = (self.numbers.get(f"bias_{one}", 0.0) for one in ("before", "error"))
+        before, error = (self.numbers.get(f"bias_{state}", 0.0) for state in ("before", "error"))
         after = self.numbers.get("bias_after", 0.0)
         if max(before, after) <= error:
             return None

@@ -164,24 +164,26 @@ def verdict_scores(case: Case, verdict: Verdict) -> Scores:
         scores[place] = code(candidate.name, NAMES)
         scores[f"{place}_port"] = code(candidate.port, PORTS)
         scores[f"{place}_order"] = np.nan if candidate.order is None else candidate.order
-    sets = [_names(one) for one in verdict.equivalent]
+    sets = [_names(hypothesis) for hypothesis in verdict.equivalent]
     scores["equivalents"] = code_of_set(set().union(*sets))
     rivals = verdict.equivalent if verdict.chosen is None else (verdict.chosen, *verdict.equivalent)
-    scores["members"] = float(len({_places(one) for one in rivals})) if rivals else 0.0
+    scores["members"] = (
+        float(len({_places(hypothesis) for hypothesis in rivals})) if rivals else 0.0
+    )
     hidden, allowed = to_be_named(case), may_be_named(case)
     scores["truth_in_class"] = float(
-        bool(hidden) and any(hidden <= _names(one) <= allowed for one in rivals)
+        bool(hidden) and any(hidden <= _names(hypothesis) <= allowed for hypothesis in rivals)
     )
     return scores
 
 
-def _names(one: Hypothesis) -> set[str]:
-    return {one_name(candidate.name, candidate.port) for candidate in one.candidates}
+def _names(hypothesis: Hypothesis) -> set[str]:
+    return {one_name(candidate.name, candidate.port) for candidate in hypothesis.candidates}
 
 
-def _places(one: Hypothesis) -> frozenset[tuple[str, str, float | None]]:
+def _places(hypothesis: Hypothesis) -> frozenset[tuple[str, str, float | None]]:
     """Return names, ports and orders: forms of one effect are one member of a class."""
-    return frozenset((one_name(c.name, c.port), c.port, c.order) for c in one.candidates)
+    return frozenset((one_name(c.name, c.port), c.port, c.order) for c in hypothesis.candidates)
 
 
 def coverage_scores(hidden: Hiding, verdict: Verdict) -> Scores:

@@ -135,10 +135,10 @@ def _load(data: Data) -> Values:
     return data.features.conditions.output_torque
 
 
-def _correlation(one: Values, other: Values) -> float:
-    if np.ptp(one) == 0.0 or np.ptp(other) == 0.0:
+def _correlation(column: Values, other: Values) -> float:
+    if np.ptp(column) == 0.0 or np.ptp(other) == 0.0:
         return 0.0
-    return float(np.corrcoef(one, other)[0, 1])
+    return float(np.corrcoef(column, other)[0, 1])
 
 
 def sparse_regression(analysis: DriveFinding) -> str:

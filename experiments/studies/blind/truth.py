@@ -20,7 +20,7 @@ from pymoo_hdte.drive._effects import ENCODER_LINE, drive_effects
 ERROR = "error"
 """Status of a case in which the workflow raised an exception."""
 STATUSES = (*VERDICTS, ERROR)
-_NEVER_HIDDEN = tuple(sorted({one.name for one in drive_effects()} - set(LISTED)))
+_NEVER_HIDDEN = tuple(sorted({effect.name for effect in drive_effects()} - set(LISTED)))
 """Effects of the library that no case hides under their names."""
 NAMES = (
     *LISTED,
@@ -83,7 +83,7 @@ def to_be_named(case: Case) -> frozenset[str]:
 
 def may_be_named(case: Case) -> frozenset[str]:
     """Return the names that are not wrong: what is hidden, and what that contains."""
-    contained = {name for one in case.drawn for name in one.components}
+    contained = {name for effect in case.drawn for name in effect.components}
     if case.stress == "parameters":
         # All base parameters are far off, those with names of their own among them.
         contained |= set(SAME.values())

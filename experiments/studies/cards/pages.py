@@ -171,19 +171,23 @@ def _of(table: Table, name: str) -> Table:
 
 
 def _verdicts(numbers: Numbers, name: str) -> str:
-    found = [one for one in separations(numbers.scores, numbers.hardness) if one.problem == name]
+    found = [
+        separation
+        for separation in separations(numbers.scores, numbers.hardness)
+        if separation.problem == name
+    ]
     return " ".join(map(_verdict, found))
 
 
-def _verdict(one: Separation) -> str:
-    at = f"At {one.evaluations:,} evaluations"
-    reach = f"{one.reached} of {one.algorithms} reach the front."
-    if one.separates is None:
+def _verdict(separation: Separation) -> str:
+    at = f"At {separation.evaluations:,} evaluations"
+    reach = f"{separation.reached} of {separation.algorithms} reach the front."
+    if separation.separates is None:
         return f"{at} too few algorithms ran to say whether it separates them; {reach}"
     return (
-        f"{at} it {'separates' if one.separates else 'does not separate'} algorithms: quartiles "
-        f"of their median IGD differ {significant(one.spread, 2)} times, one algorithm's seeds "
-        f"{significant(one.scatter, 2)} times; {reach}"
+        f"{at} it {'separates' if separation.separates else 'does not separate'} algorithms: "
+        f"quartiles of their median IGD differ {significant(separation.spread, 2)} times, one "
+        f"algorithm's seeds {significant(separation.scatter, 2)} times; {reach}"
     )
 
 

@@ -127,13 +127,16 @@ def hardness_table(numbers: Numbers) -> Table:
         tuple(
             (
                 name,
-                one.optima,
-                _percent(one.best_reached),
-                one.pieces,
-                *(_percent(share) for share in (one.feasible, one.near, one.wide)),
-                one.floor,
+                hardness_of.optima,
+                _percent(hardness_of.best_reached),
+                hardness_of.pieces,
+                *(
+                    _percent(share)
+                    for share in (hardness_of.feasible, hardness_of.near, hardness_of.wide)
+                ),
+                hardness_of.floor,
             )
-            for name, one in numbers.hardness.items()
+            for name, hardness_of in numbers.hardness.items()
         ),
         note=HARDNESS_NOTE,
     )
@@ -172,10 +175,16 @@ def summary(found: list[Separation]) -> Finding:
         if names:
             parts.append(f"After {budget:,}: {', '.join(names)}.")
     largest = max(entry.evaluations for entry in found)
-    last = [one for one in found if one.evaluations == largest and one.separates is not None]
-    corrected = holm([one.p for one in last])
-    separate = [bool(one.separates) for one in last]
-    shown = any(one and p <= SIGNIFICANT for one, p in zip(separate, corrected, strict=True))
+    last = [
+        finding
+        for finding in found
+        if finding.evaluations == largest and finding.separates is not None
+    ]
+    corrected = holm([separation.p for separation in last])
+    separate = [bool(separation.separates) for separation in last]
+    shown = any(
+        separation and p <= SIGNIFICANT for separation, p in zip(separate, corrected, strict=True)
+    )
     return scored(
         state_of(any(separate), shown=shown),
         f"Robust problems that separate the algorithms: {', '.join(counts)} evaluations; at least "

@@ -69,14 +69,14 @@ def tnk_front() -> NDArray[np.float64]:
 def osy_front(problem: Problem) -> NDArray[np.float64]:
     """Return the front of OSY from the five parts of its Pareto set, shape (n, 2)."""
     t = np.linspace(0.0, 1.0, 4 * N_POINTS)
-    one, none = np.ones_like(t), np.zeros_like(t)
+    ones, none = np.ones_like(t), np.zeros_like(t)
     x1 = 4.0556 + 0.9444 * t
     parts = [
-        [5 * one, one, 1 + 4 * t, none, 5 * one, none],
-        [5 * one, one, 1 + 4 * t, none, one, none],
-        [x1, (x1 - 2) / 3, one, none, one, none],
-        [none, 2 * one, 1 + 2.7321 * t, none, one, none],
-        [t, 2 - t, one, none, one, none],
+        [5 * ones, ones, 1 + 4 * t, none, 5 * ones, none],
+        [5 * ones, ones, 1 + 4 * t, none, ones, none],
+        [x1, (x1 - 2) / 3, ones, none, ones, none],
+        [none, 2 * ones, 1 + 2.7321 * t, none, ones, none],
+        [t, 2 - t, ones, none, ones, none],
     ]
     designs = np.hstack([np.array(part) for part in parts]).T
     F, G = problem.evaluate(designs, return_values_of=["F", "G"])

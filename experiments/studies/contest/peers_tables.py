@@ -403,7 +403,7 @@ def nearest_rival_table(scores: Scores) -> Table:
     distances = median_values(scores, "igd", evaluations, tuning=False)
     ranks = average_ranks(volumes, smaller_is_better=False)
     _, name, _ = _ours_and_best(scores.algorithms, ranks)
-    pair = ours, rival = [scores.algorithms.index(one) for one in (OURS, name)]
+    pair = ours, rival = [scores.algorithms.index(rival_name) for rival_name in (OURS, name)]
     problems = [scores.problems[row] for row in scores.rows(False)]
     gains = volumes[:, ours] - volumes[:, rival]
     slight = (gains < 0.0) & (-gains < SLIGHT * volumes[:, rival])

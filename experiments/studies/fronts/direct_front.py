@@ -120,8 +120,8 @@ def _search(problem: RobustDTEDirect, seed: int) -> ReferenceFront:
 
 def _together(searches: list[ReferenceFront]) -> ReferenceFront:
     """Return what no design of any search dominates, by rising mean."""
-    front = np.vstack([one.front for one in searches])
-    designs = np.vstack([one.designs for one in searches])
+    front = np.vstack([search.front for search in searches])
+    designs = np.vstack([search.designs for search in searches])
     kept = NonDominatedSorting().do(front, only_non_dominated_front=True)
     kept = kept[np.argsort(front[kept, 0], kind="stable")]
     return ReferenceFront(front[kept], designs[kept])

@@ -242,8 +242,8 @@ def falling(solutions: list[Solution]) -> list[Solution]:
     return kept
 
 
-def _distance(one: Solution, other: Solution, span: NDArray[np.float64]) -> float:
-    return float(np.hypot(*((other.objectives - one.objectives) / span)))
+def _distance(point: Solution, other: Solution, span: NDArray[np.float64]) -> float:
+    return float(np.hypot(*((other.objectives - point.objectives) / span)))
 
 
 def _refine(
@@ -279,7 +279,7 @@ def _fill(
     search: FrontSearch, knots: list[Solution], span: NDArray[np.float64], n_points: int
 ) -> list[Solution]:
     """Solve again at levels that are even in arc length along each piece."""
-    steps = [_distance(one, other, span) for one, other in pairwise(knots)]
+    steps = [_distance(left, other, span) for left, other in pairwise(knots)]
     total = sum(step for step in steps if step <= _GAP)
     filled: list[Solution] = []
     start = 0

@@ -141,7 +141,7 @@ def with_gaps_halved(
             if np.linalg.norm((ends[1] - ends[0]) / width) > GAP:
                 level = (ends[0][0] + ends[1][0]) / 2.0
                 between.append(search.best(level, [low.cube, high.cube]))
-        found = falling([*found, *(one for one in between if one is not None)])
+        found = falling([*found, *(solution for solution in between if solution is not None)])
     kept = search.designs(np.array([solution.cube for solution in found]))
     return ReferenceFront(problem.evaluate(kept, return_values_of=["F"]), kept)
 

@@ -54,16 +54,16 @@ LOST = -10.0
 """R2 below which a prediction is lost."""
 
 
-def named(one: Study) -> list[dict[str, Any]]:
+def named(machine: Study) -> list[dict[str, Any]]:
     """Return what a verdict names with its values, ripple beyond the band included."""
-    beyond = (effect for ripple in one.finding.ripples.found for effect in ripple.as_dicts())
-    twist = torsion_document(one.joint)["effects"] if one.joint else []
-    return [*effects(one.finding), *beyond, *twist]
+    beyond = (effect for ripple in machine.finding.ripples.found for effect in ripple.as_dicts())
+    twist = torsion_document(machine.joint)["effects"] if machine.joint else []
+    return [*effects(machine.finding), *beyond, *twist]
 
 
-def torsion_errors(one: Study) -> list[str]:
+def torsion_errors(machine: Study) -> list[str]:
     """Return the errors of the held-out torsion before and after, arcseconds, where measured."""
-    gaps = one.joint.gaps if one.joint else ()
+    gaps = machine.joint.gaps if machine.joint else ()
     sizes = ([getattr(gap, side) for gap in gaps] for side in ("before", "after"))
     return [f"{np.sqrt(np.mean(np.square(each))) / ARCSEC:.4g}" if each else "" for each in sizes]
 
@@ -73,21 +73,21 @@ def share_in_words(value: float | None) -> str:
     return "" if value is None else f"{value:.5f}" if value > LOST else f"below {LOST:g}"
 
 
-def determinations(one: Study) -> list[str]:
+def determinations(machine: Study) -> list[str]:
     """Return R2 of force and simulated position by the accepted model, held out."""
-    finding, gaps = one.finding, [gap for gap in one.gaps if gap.kind == "balance"]
+    finding, gaps = machine.finding, [gap for gap in machine.gaps if gap.kind == "balance"]
     (name,) = finding.mechanism.coordinates
     gaps = [gap for gap in gaps if gap.quantity == name]
     if not gaps:
         return ["", ""]
     power = terms_of(finding, "held_out", ()).power
     left = float(np.mean([gap.after**2 for gap in gaps]))
-    return [f"{1.0 - left / power:.5f}", f"{explained(one)[1]:.5f}"]
+    return [f"{1.0 - left / power:.5f}", f"{explained(machine)[1]:.5f}"]
 
 
-def explained(one: Study) -> tuple[float, float]:
+def explained(machine: Study) -> tuple[float, float]:
     """Return R2 of all simulated positions, before and after."""
-    gaps = [gap for gap in one.gaps if gap.extent is not None]
+    gaps = [gap for gap in machine.gaps if gap.extent is not None]
     if not gaps:
         return np.nan, np.nan
     power = np.concatenate([gap.measured - gap.measured.mean() for gap in gaps])
@@ -95,47 +95,47 @@ def explained(one: Study) -> tuple[float, float]:
         np.concatenate([gap.measured - getattr(gap, side) for gap in gaps])
         for side in ("predicted_before", "predicted_after")
     )
-    before, after = (1.0 - float(np.mean(one**2) / np.mean(power**2)) for one in left)
+    before, after = (1.0 - float(np.mean(residual**2) / np.mean(power**2)) for residual in left)
     return before, after
 
 
-def pooled(one: Study, kind: str, side: int) -> float | None:
+def pooled(machine: Study, kind: str, side: int) -> float | None:
     """Return the root mean square over the held-out records, of the first coordinate."""
-    name = one.finding.mechanism.coordinates[0]
+    name = machine.finding.mechanism.coordinates[0]
     sizes = [
         (gap.before, gap.after)[side]
-        for gap in one.gaps
+        for gap in machine.gaps
         if (gap.kind, gap.quantity) == (kind, name)
     ]
     return float(np.sqrt(np.mean(np.square(sizes)))) if sizes else None
 
 
-def farthest(rig: KnownRig, one: Study) -> float | None:
+def farthest(rig: KnownRig, machine: Study) -> float | None:
     """Return the largest deviation from a known value or from the curve of friction, in %."""
-    found = fitted_values(one)
+    found = fitted_values(machine)
     off = [
         abs(found[name.replace("_", " ")]["value"] / value - 1.0)
         for name, value in rig.values
         if name.replace("_", " ") in found
     ]
     if rig.friction is not None:
-        speed = _speeds(one)
-        off.append(float(np.max(np.abs(_friction(one, speed) / rig.friction.at(speed) - 1.0))))
+        speed = _speeds(machine)
+        off.append(float(np.max(np.abs(_friction(machine, speed) / rig.friction.at(speed) - 1.0))))
     return 100.0 * max(off) if off else None
 
 
-def _speeds(one: Study) -> Values:
+def _speeds(machine: Study) -> Values:
     """Return speeds at which the records move, between the 10th and the 90th of a hundred."""
-    spectra = one.finding.data.spectra
-    (name,) = one.finding.mechanism.coordinates
+    spectra = machine.finding.data.spectra
+    (name,) = machine.finding.mechanism.coordinates
     speed = np.concatenate([np.abs(balance.motions[name].speed) for balance in spectra])
     slowest, fastest = np.quantile(speed, (0.1, 0.9)).tolist()
     return np.linspace(slowest, fastest, 30)
 
 
-def _friction(one: Study, speed: Values) -> Values:
+def _friction(machine: Study, speed: Values) -> Values:
     """Return the friction of the accepted model, odd part, at speeds (n,)."""
-    finding = one.finding
+    finding = machine.finding
     damping = sum(
         value
         for parameter, value in zip(
@@ -155,16 +155,16 @@ def _friction(one: Study, speed: Values) -> Values:
     return np.asarray(force)
 
 
-def nearest_order(rig: KnownRig, one: Study) -> float | None:
+def nearest_order(rig: KnownRig, machine: Study) -> float | None:
     """Return the order of a named ripple, that nearest to the known one."""
     if rig.order is None:
         return None
     orders = [
         effect["parameters"]["order"]["value"]
-        for effect in named(one)
+        for effect in named(machine)
         if "order" in effect["parameters"]
     ]
-    orders += [order for each in one.finding.accepted.effects if (order := place_of(each)[2])]
+    orders += [order for each in machine.finding.accepted.effects if (order := place_of(each)[2])]
     known = rig.order
     return min(orders, key=lambda order: abs(order - known), default=None)
 
@@ -178,8 +178,8 @@ TOOL = "workflow"
 def timed_study(rig: KnownRig) -> tuple[Study | None, list[str]]:
     """Return the study of a rig, None where its records are not there, and a row of `SECONDS`."""
     began = time.process_time()
-    one = study(rig.name, rig.folder)
-    return one, [rig.name, TOOL, f"{time.process_time() - began:.3g}"]
+    machine = study(rig.name, rig.folder)
+    return machine, [rig.name, TOOL, f"{time.process_time() - began:.3g}"]
 
 
 def cpu_table(rows: Sequence[Sequence[str]]) -> Table:
@@ -242,7 +242,7 @@ def run(context: Context) -> Result:
         return Result("Verdicts on real machines", context.command(NAME), sentence)
     found = _examined(context) if context.full else _committed()
     order = [FALLS_SHORT.index(row[1]) for row in found[0]]
-    first = [row for _, row in sorted(zip(order, found[0], strict=True), key=lambda one: one[0])]
+    first = [row for _, row in sorted(zip(order, found[0], strict=True), key=lambda pair: pair[0])]
     return Result(
         title="Verdicts on real machines",
         command=context.command(NAME),
@@ -275,35 +275,37 @@ def examined(rig: KnownRig, tools: bool = True, whole: bool = True) -> Examined 
     whole : bool
         Whether the held-out record of `ARROW` is simulated without a break, too.
     """
-    one, taken = timed_study(rig)
-    if one is None:
+    machine, taken = timed_study(rig)
+    if machine is None:
         return None
     seconds = [taken]
-    rows = [[TOOL, *_said(rig, one), *determinations(one)]]
-    for answer in answers(one.finding) if tools else []:
+    rows = [[TOOL, *_said(rig, machine), *determinations(machine)]]
+    for answer in answers(machine.finding) if tools else []:
         rows.append(_tool_row(rig, answer))
         seconds.append([rig.name, answer.tool, f"{answer.seconds:.3g}"])
     if whole and rig.name == ARROW:
         gap = next(
-            gap for gap in prove_measured(one.finding, whole=True) if gap.determination is not None
+            gap
+            for gap in prove_measured(machine.finding, whole=True)
+            if gap.determination is not None
         )
         assert gap.determination is not None
         words = f"the same, {gap.record} without a break"
         rows.append([TOOL, "", words, "", f"{gap.determination[1]:.5f}"])
-    return Examined(verdict_row(rig, one), [[rig.name, *row] for row in rows], seconds)
+    return Examined(verdict_row(rig, machine), [[rig.name, *row] for row in rows], seconds)
 
 
-def verdict_row(rig: KnownRig, one: Study) -> list[str]:
+def verdict_row(rig: KnownRig, machine: Study) -> list[str]:
     """Return what is said of a rig, in the order of `VERDICTS`."""
-    judgement, words = _said(rig, one)
-    off, order = farthest(rig, one), nearest_order(rig, one)
-    rms = [pooled(one, kind, side) for kind in ("balance", "simulation") for side in (0, 1)]
-    extents = [gap.extent.length for gap in one.gaps if gap.extent is not None]
+    judgement, words = _said(rig, machine)
+    off, order = farthest(rig, machine), nearest_order(rig, machine)
+    rms = [pooled(machine, kind, side) for kind in ("balance", "simulation") for side in (0, 1)]
+    extents = [gap.extent.length for gap in machine.gaps if gap.extent is not None]
     numbers = [off, order, rig.order, *rms, min(extents, default=None)]
     shown = ["" if number is None else f"{number:.4g}" for number in numbers]
-    by_simulation = [f"{value:.5f}" for value in explained(one)]
-    told = rig.name, judgement, one.status, words, rig.answer
-    return [*told, *shown, *by_simulation, *torsion_errors(one)]
+    by_simulation = [f"{value:.5f}" for value in explained(machine)]
+    told = rig.name, judgement, machine.status, words, rig.answer
+    return [*told, *shown, *by_simulation, *torsion_errors(machine)]
 
 
 def shortfalls(rows: Sequence[Sequence[str]]) -> tuple[str, ...]:
@@ -359,7 +361,7 @@ def _any_of(effects: frozenset[str]) -> str:
 
 def _in_one_sentence(rows: Sequence[Sequence[str]]) -> str:
     """Count the judgements, those that fall short first."""
-    counts = [(one, sum(row[1] == one for row in rows)) for one in FALLS_SHORT]
+    counts = [(judgement, sum(row[1] == judgement for row in rows)) for judgement in FALLS_SHORT]
     told = ", ".join(
         f"{count} with {word}" if word == UNKNOWN else f"{count} {word}"
         for word, count in counts
@@ -371,13 +373,13 @@ def _in_one_sentence(rows: Sequence[Sequence[str]]) -> str:
     return f"Verdicts on {len(rows)} machines that others measured: {told}{none}."
 
 
-def _said(rig: KnownRig, one: Study) -> tuple[str, str]:
+def _said(rig: KnownRig, machine: Study) -> tuple[str, str]:
     """Return the judgement on a verdict, and what it names."""
-    names = list(dict.fromkeys(effect["name"] for effect in named(one)))
+    names = list(dict.fromkeys(effect["name"] for effect in named(machine)))
     words = " + ".join(names).replace("_", " ") or "nothing"
-    if one.joint and one.joint.torsion.verdict.status == "unlisted":
+    if machine.joint and machine.joint.torsion.verdict.status == "unlisted":
         words += "; of the torsion nothing"
-    return judged(rig, one.status, names), words
+    return judged(rig, machine.status, names), words
 
 
 def _tool_row(rig: KnownRig, answer: Answer) -> list[str]:
@@ -386,7 +388,7 @@ def _tool_row(rig: KnownRig, answer: Answer) -> list[str]:
         answer.tool,
         judgement,
         answer.words,
-        *(share_in_words(one) for one in (answer.of_force, answer.of_motion)),
+        *(share_in_words(share) for share in (answer.of_force, answer.of_motion)),
     ]
 
 
@@ -397,11 +399,11 @@ def _findings(rows: Sequence[Sequence[str]]) -> tuple[Finding, ...]:
     named = [row for row in rows if row[2] in ("named", "class", "partial") and row[10] and row[11]]
     worse = [row[0] for row in named if not float(row[11]) < float(row[10])]
     missed = [
-        one.name
-        for one in KNOWN_RIGS
+        rig.name
+        for rig in KNOWN_RIGS
         for row in rows
-        if row[0] == one.name and one.order is not None
-        if not row[6] or abs(float(row[6]) - one.order) > one.reach
+        if row[0] == rig.name and rig.order is not None
+        if not row[6] or abs(float(row[6]) - rig.order) > rig.reach
     ]
     return (
         scored(

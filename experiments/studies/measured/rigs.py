@@ -67,10 +67,10 @@ def torques_of(rig: MeasuredMechanism) -> MeasuredMechanism:
     return replace(rig, mechanism=half.mechanism, records=half.records, effects=half.known)
 
 
-def fitted_values(one: Study) -> dict[str, Any]:
+def fitted_values(machine: Study) -> dict[str, Any]:
     """Return values with intervals by parameter, those of effects with the effect's name."""
-    found = dict(quantities(one.finding))
-    for effect in effects(one.finding):
+    found = dict(quantities(machine.finding))
+    for effect in effects(machine.finding):
         for name, value in effect["parameters"].items():
             found[f"{effect['name'].replace('_', ' ')}: {name.replace('_', ' ')}"] = value
     return found

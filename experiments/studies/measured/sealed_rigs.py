@@ -85,7 +85,7 @@ def run(context: Context) -> Result:
 def _counted(statuses: Sequence[str]) -> str:
     """Say how many rigs end with each status."""
     counts = Counter(statuses).most_common()
-    told = ", ".join(f"{SHOWN[one]} in {n}" for one, n in counts)
+    told = ", ".join(f"{SHOWN[status]} in {n}" for status, n in counts)
     return f"Verdicts on {len(statuses)} rigs: {told}."
 
 
@@ -94,19 +94,22 @@ def verdict_row(name: str, analysis: DriveAnalysis) -> list[str]:
     verdict, proof = analysis.verdict, analysis.prove()
     accepted = verdict.accepted
     effects = "" if accepted is verdict.base else _labels(accepted.candidates)
-    rivals = " or ".join(_labels(one.candidates) for one in verdict.equivalent)
-    fits = [one.chi_square / verdict.degrees_of_freedom for one in (verdict.base, accepted)]
+    rivals = " or ".join(_labels(hypothesis.candidates) for hypothesis in verdict.equivalent)
+    fits = [
+        hypothesis.chi_square / verdict.degrees_of_freedom
+        for hypothesis in (verdict.base, accepted)
+    ]
     words = [name, verdict.status, effects, rivals, "; ".join(map(in_a_sentence, verdict.reasons))]
     gaps = [float("nan")] * 5
     if proof is not None:
         error = proof.channels["transmission_error"]
         gaps = [proof.overall.before, proof.overall.after]
         gaps += [error.before, error.after, error.noise_floor]
-    return [*words, *(f"{one:.5g}" for one in (*fits, *gaps))]
+    return [*words, *(f"{number:.5g}" for number in (*fits, *gaps))]
 
 
 def _labels(candidates: Sequence[Candidate]) -> str:
-    return " + ".join(one.label for one in candidates)
+    return " + ".join(candidate.label for candidate in candidates)
 
 
 def _analysed(context: Context) -> tuple[Rows, Rows]:

@@ -118,9 +118,9 @@ def run(context: Context) -> Result:
         command=context.command("reliability"),
         paragraphs=(*stored_outcome(context, "reliability"), SETTING, KILLING),
         tables=(
-            _inputs_table([one for one in tallies if one.part == FUZZ]),
-            _kills_table([one for one in tallies if one.part == KILL]),
-            _limits_table([one for one in tallies if one.part == LIMIT]),
+            _inputs_table([tally for tally in tallies if tally.part == FUZZ]),
+            _kills_table([tally for tally in tallies if tally.part == KILL]),
+            _limits_table([tally for tally in tallies if tally.part == LIMIT]),
             _memory_table(peaks),
         ),
     )
@@ -172,7 +172,7 @@ def _below(total: Tally) -> str:
 
 def _inputs_table(tallies: list[Tally]) -> Table:
     inputs, refused, accepted, failed = (
-        sum(getattr(one, name) for one in tallies)
+        sum(getattr(tally, name) for tally in tallies)
         for name in ("trials", "refused", "accepted", "failed")
     )
     total = Tally(FUZZ, "all", inputs, refused, accepted, failed)
@@ -185,10 +185,10 @@ def _inputs_table(tallies: list[Tally]) -> Table:
         ),
         tuple(
             (
-                *(one.kind, one.trials, one.refused, one.accepted, one.failed),
-                *(100.0 * one.bound, one.failing or None),
+                *(tally.kind, tally.trials, tally.refused, tally.accepted, tally.failed),
+                *(100.0 * tally.bound, tally.failing or None),
             )
-            for one in (*tallies, total)
+            for tally in (*tallies, total)
         ),
         note=UPPER,
         findings=(
@@ -204,7 +204,7 @@ def _inputs_table(tallies: list[Tally]) -> Table:
 
 
 def _kills_table(tallies: list[Tally]) -> Table:
-    kills, failed = sum(one.trials for one in tallies), sum(one.failed for one in tallies)
+    kills, failed = sum(tally.trials for tally in tallies), sum(tally.failed for tally in tallies)
     total = Tally(KILL, "all", kills, 0, 0, failed)
     return Table(
         "kills",
@@ -214,8 +214,15 @@ def _kills_table(tallies: list[Tally]) -> Table:
             *(Column("failed"), Column("rate of failures below", "%", 2), Column("what failed")),
         ),
         tuple(
-            (one.kind, one.trials, one.accepted, one.failed, 100.0 * one.bound, one.failing or None)
-            for one in tallies
+            (
+                tally.kind,
+                tally.trials,
+                tally.accepted,
+                tally.failed,
+                100.0 * tally.bound,
+                tally.failing or None,
+            )
+            for tally in tallies
         ),
         note=UPPER,
         findings=(
@@ -232,13 +239,13 @@ def _kills_table(tallies: list[Tally]) -> Table:
 
 
 def _limits_table(tallies: list[Tally]) -> Table:
-    trials, failed = sum(one.trials for one in tallies), sum(one.failed for one in tallies)
+    trials, failed = sum(tally.trials for tally in tallies), sum(tally.failed for tally in tallies)
     total = Tally(LIMIT, "all", trials, 0, 0, failed)
     return Table(
         "limits",
         "Full disks, folders without permission, and two runs in one folder",
         (Column("limit"), Column("trials"), Column("failed")),
-        tuple((one.kind, one.trials or "not possible here", one.failed) for one in tallies),
+        tuple((tally.kind, tally.trials or "not possible here", tally.failed) for tally in tallies),
         note="Disks of 0 to 512 kB in memory, which only the superuser may mount. A run on a full "
         "disk must end in a message, leave whole files only, and come to the bytes of an "
         "undisturbed run once there is space; where one must not write, it is refused before "
@@ -255,12 +262,12 @@ def _limits_table(tallies: list[Tally]) -> Table:
 
 
 def _memory_table(peaks: list[Peak]) -> Table:
-    largest = max(peaks, key=lambda one: one.memory)
+    largest = max(peaks, key=lambda tally: tally.memory)
     return Table(
         "memory",
         "Peak of resident memory in one process",
         (Column("experiment"), Column("memory", "MB", 3), Column("processor time", "s", 3)),
-        tuple((one.experiment, one.memory / 1e6, one.seconds) for one in peaks),
+        tuple((need.experiment, need.memory / 1e6, need.seconds) for need in peaks),
         note="Jobs of a campaign are independent, so its length adds nothing but their results; "
         "every worker process needs as much again.",
         findings=(

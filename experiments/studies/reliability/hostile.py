@@ -124,7 +124,7 @@ def damaged_lines() -> Iterator[bool]:
                 warnings.simplefilter("always")
                 _study(runs, problem)
             words = f"line {number + 1} "
-            heard = any(words in str(one.message) for one in told)
+            heard = any(words in str(warning.message) for warning in told)
             yield heard and problem.read_bytes() == expected
 
 

@@ -121,7 +121,7 @@ def _read_campaign(folder: Path) -> None:
     campaign = read_campaign(folder)
     write_campaign(campaign, folder.parent / "again")
     again = read_campaign(folder.parent / "again")
-    if [one.name for one in again.running] != [one.name for one in campaign.running]:
+    if [record.name for record in again.running] != [record.name for record in campaign.running]:
         raise Wrong("a campaign that is read back as another")
 
 

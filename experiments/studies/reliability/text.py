@@ -129,8 +129,8 @@ def lines_doubled(text: str, rng: np.random.Generator) -> str:
 def lines_swapped(text: str, rng: np.random.Generator) -> str:
     """Swap two lines."""
     lines = text.split("\n")
-    one, other = rng.integers(len(lines), size=2)
-    lines[one], lines[other] = lines[other], lines[one]
+    place, other = rng.integers(len(lines), size=2)
+    lines[place], lines[other] = lines[other], lines[place]
     return "\n".join(lines)
 
 
@@ -186,14 +186,14 @@ def column_replaced(text: str, rng: np.random.Generator) -> str:
 
 
 def _rearranged(cells: list[str], rng: np.random.Generator) -> list[str]:
-    one, other = rng.integers(len(cells), size=2)
+    place, other = rng.integers(len(cells), size=2)
     match rng.integers(3):
         case 0:
-            del cells[one]
+            del cells[place]
         case 1:
-            cells.insert(other, cells[one])
+            cells.insert(other, cells[place])
         case _:
-            cells[one], cells[other] = cells[other], cells[one]
+            cells[place], cells[other] = cells[other], cells[place]
     return cells
 
 

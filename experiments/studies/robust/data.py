@@ -131,7 +131,7 @@ class Outcome:
     def functions(self) -> list[str]:
         """Names of the functions, in the order of `FUNCTIONS`."""
         found = {function for function, _, _ in self.curves}
-        return [one.name for one in FUNCTIONS if one.name in found]
+        return [function.name for function in FUNCTIONS if function.name in found]
 
     def needed(self, function: str, method: str, column: int = 1) -> int | None:
         """Return the least runs that a method needs by its best way, None if above the budget."""
@@ -140,7 +140,7 @@ class Outcome:
             for (name, who, _), steps in self.curves.items()
             if (name, who) == (function, method)
         ]
-        return min((one for one in counts if one is not None), default=None)
+        return min((count for count in counts if count is not None), default=None)
 
     def tried(self, function: str, method: str) -> int:
         """Return the most runs that a method was given on a function; 0 if it was not run."""
@@ -159,7 +159,7 @@ def outcome_for(context: Context) -> Outcome:
         return read_outcome(*(committed_file(f"{name}.csv", NAME) for name in (NAME, STOPS)))
     require("openturns", "uq")
     require("sklearn", "uq")
-    names = [one.name for one in FUNCTIONS] if context.full else QUICK_FUNCTIONS
+    names = [function.name for function in FUNCTIONS] if context.full else QUICK_FUNCTIONS
     budget, seeds = (BUDGET, SEEDS) if context.full else (QUICK_BUDGET, SEEDS[:1])
     # The curve is that of the first seed.
     ours = [Grown(name, seed, seed == seeds[0], budget) for name in names for seed in seeds]
@@ -184,7 +184,7 @@ def gathered(grown: dict[Grown, Run], rivals: dict[Curve, Run]) -> Outcome:
     for growth, run in grown.items():
         if growth.whole_curve:
             steps = run.values[:, : len(STEP)].tolist()
-            curves[growth.function, OURS, OURS] = [(int(n), one, all_) for n, one, all_ in steps]
+            curves[growth.function, OURS, OURS] = [(int(n), step, all_) for n, step, all_ in steps]
         numbers = run.values[0, len(STEP) :].tolist()
         stops[growth.function, growth.seed] = dict(zip(STOP_NUMBERS, numbers, strict=True))
     for job, run in rivals.items():
@@ -240,4 +240,4 @@ def ahead(outcome: Outcome, function: str) -> bool:
         for method in METHODS
         if method != OURS
     ]
-    return ours is not None and all(ours < one for one in rivals)
+    return ours is not None and all(ours < runs_of for runs_of in rivals)

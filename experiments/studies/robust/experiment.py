@@ -55,7 +55,7 @@ CHOSEN = (
 def run(context: Context) -> Result:
     """Show the runs that every method needs, and what our band covers."""
     outcome = outcome_for(context)
-    sources = "; ".join(f"{one.name}: {one.source}" for one in FUNCTIONS)
+    sources = "; ".join(f"{function.name}: {function.source}" for function in FUNCTIONS)
     return Result(
         title="Runs of a simulator that its robust surrogate takes",
         command=context.command(NAME),
@@ -89,7 +89,7 @@ def error_over_runs(outcome: Outcome) -> Figure:
         for (name, method, _), steps in outcome.curves.items():
             if name == names[place]:
                 colour, style = STYLES[method]
-                runs, errors = [one[0] for one in steps], [100.0 * one[1] for one in steps]
+                runs, errors = [step[0] for step in steps], [100.0 * step[1] for step in steps]
                 axis.loglog(runs, errors, style, color=colour, markersize=3, lw=0.9, mfc="none")
         axis.axhline(100.0 * ACCURACY, color="black", linestyle=":", linewidth=1)
         axis.set_title(names[place], fontsize=9)

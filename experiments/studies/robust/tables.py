@@ -89,16 +89,16 @@ def stops_table(outcome: Outcome) -> Table:
         found = [outcome.stops[name, seed] for seed in SEEDS if (name, seed) in outcome.stops]
         if not found:
             continue
-        stopped = [one for one in found if np.isfinite(one["runs"])]
+        stopped = [finding for finding in found if np.isfinite(finding["runs"])]
         rows.append(
             (
                 name,
                 len(found),
-                int(np.median([one["runs"] for one in stopped])) if stopped else None,
+                int(np.median([stop["runs"] for stop in stopped])) if stopped else None,
                 len(found) - len(stopped),
-                *(100.0 * max(one[key] for one in found) for key in _ERRORS),
+                *(100.0 * max(finding[key] for finding in found) for key in _ERRORS),
                 *(
-                    100.0 * min(one[key] for one in stopped) if stopped else None
+                    100.0 * min(stop[key] for stop in stopped) if stopped else None
                     for key in _COVERED
                 ),
             )
@@ -108,8 +108,12 @@ def stops_table(outcome: Outcome) -> Table:
         Column("seeds"),
         Column("runs where it stops, median"),
         Column("refused"),
-        *(Column(one, "%", 2, group) for group in ("true error", "stated") for one in _MOMENTS),
-        *(Column(one, "%", 3, "designs that the band covers") for one in _MOMENTS),
+        *(
+            Column(moment, "%", 2, group)
+            for group in ("true error", "stated")
+            for moment in _MOMENTS
+        ),
+        *(Column(moment, "%", 3, "designs that the band covers") for moment in _MOMENTS),
     )
     return Table(
         "stops",
@@ -129,14 +133,16 @@ _ERRORS = ("true_mean_error", "true_std_error", "stated_mean_error", "stated_std
 
 def _cover_finding(outcome: Outcome) -> Finding:
     """Judge the band of the build that covers least, of those that gave an answer at all."""
-    refused = [key for key, one in outcome.stops.items() if not np.isfinite(one["runs"])]
+    refused = [key for key, stop in outcome.stops.items() if not np.isfinite(stop["runs"])]
     covered = {
-        key: min(numbers[one] for one in _COVERED)
+        key: min(numbers[moment] for moment in _COVERED)
         for key, numbers in outcome.stops.items()
         if key not in refused
     }
     missing = [
-        one.name for one in FUNCTIONS if any((one.name, k) not in outcome.stops for k in SEEDS)
+        function.name
+        for function in FUNCTIONS
+        if any((function.name, k) not in outcome.stops for k in SEEDS)
     ]
     none = ", ".join(dict.fromkeys(name for name, _ in refused))
     words = f"{len(refused)} refused ({none})" if refused else "none was refused"
@@ -146,7 +152,7 @@ def _cover_finding(outcome: Outcome) -> Finding:
     (name, seed), least = min(covered.items(), key=lambda item: item[1])
     share = rate(round(least * DESIGNS), DESIGNS)
     state = share.state(WANTED_COVERED)
-    enough = sum(one >= WANTED_COVERED for one in covered.values())
+    enough = sum(share >= WANTED_COVERED for share in covered.values())
     return scored(
         NOT_SHOWN if missing and state == SHOWN else state,
         f"The stated band of {OURS} covers mean and deviation at {100.0 * WANTED_COVERED:g} % of "

@@ -40,7 +40,7 @@ class Task:
         self.names = tuple(self.function.laws)
         assert self.names[: len(self.function.designed)] == self.function.designed
         rng = np.random.default_rng(7)
-        bounds = np.array([(one.lower, one.upper) for one in self.designs.values()])
+        bounds = np.array([(design.lower, design.upper) for design in self.designs.values()])
         lower, upper = bounds.T
         self.X = rng.uniform(lower, upper, (DESIGNS, len(bounds)))
 

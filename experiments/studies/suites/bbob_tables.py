@@ -150,9 +150,9 @@ def shares_table(outcome: Outcome) -> Table:
         for algorithm, budget in told_most(outcome, dimension):
             shares = outcome.shares(dimension, algorithm, budget)
             where = f"here{_extent(outcome, dimension, algorithm, budget)}"
-            rows.append((algorithm, dimension, where, *(shares.get(one) for one in BUDGETS)))
+            rows.append((algorithm, dimension, where, *(shares.get(budget) for budget in BUDGETS)))
         for name, curve in curves(dimension).items():
-            rows.append((name, dimension, "published", *(curve.get(one) for one in BUDGETS)))
+            rows.append((name, dimension, "published", *(curve.get(budget) for budget in BUDGETS)))
     return Table(
         "shares",
         "bbob-biobj, held out: share of COCO's 58 targets reached, every evaluation counted",
@@ -169,7 +169,7 @@ def shares_table(outcome: Outcome) -> Table:
 def told_most(outcome: Outcome, dimension: int) -> list[tuple[str, int]]:
     """Return which peers ran in a dimension, each with its largest budget."""
     ran = {(run.algorithm, run.told) for run in outcome.bbob if run.dimension == dimension}
-    largest = {name: max(told for one, told in ran if one == name) for name, _ in ran}
+    largest = {name: max(told for run, told in ran if run == name) for name, _ in ran}
     return [(name, largest[name]) for name in BBOB_PEERS if name in largest]
 
 

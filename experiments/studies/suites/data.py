@@ -115,18 +115,26 @@ class Outcome:
         One that could take a problem, but was not run on it, is left out: it would rank last there.
         """
         problems = self.problems(suite, budget)
-        ran = {(one, name) for one in problems for name in PEERS if self.runs(one, name, budget, 0)}
+        ran = {
+            (problem, name)
+            for problem in problems
+            for name in PEERS
+            if self.runs(problem, name, budget, 0)
+        }
         return [
             name
             for name in PEERS
-            if any((one, name) in ran for one in problems)
-            and all((one, name) in ran or not takes(name, problem_of(one)) for one in problems)
+            if any((problem, name) in ran for problem in problems)
+            and all(
+                (problem, name) in ran or not takes(name, problem_of(problem))
+                for problem in problems
+            )
         ]
 
     def problems(self, suite: str, budget: int, control: str = OURS) -> list[str]:
         """Return the problems of a suite on which ours, or another, was judged at a budget."""
         ran = {key[0] for key in self.suites if key[1:3] == (control, budget)}
-        return [one.name for one in SUITES[suite] if one.name in ran]
+        return [problem.name for problem in SUITES[suite] if problem.name in ran]
 
     def medians(
         self,

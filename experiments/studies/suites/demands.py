@@ -60,7 +60,9 @@ def demands(outcome: Outcome) -> list[Demand]:
 def demands_table(outcome: Outcome) -> Table:
     """Show the demands."""
     found = demands(outcome)
-    rows: list[tuple[Cell, ...]] = [(*one[:-1], (one.state or "not run").lower()) for one in found]
+    rows: list[tuple[Cell, ...]] = [
+        (*finding[:-1], (finding.state or "not run").lower()) for finding in found
+    ]
     return Table(
         "must_reach",
         "What was demanded, and what came out",
@@ -74,9 +76,12 @@ def demands_table(outcome: Outcome) -> Table:
         "what was asked, each with one run. Own time per generation of at most half of NSGA-II's "
         "was demanded too and is missed: see the table of own time.",
         findings=tuple(
-            scored(one.state, f"{one.asked}, after {one.evaluations:,} evaluations: {_out(one)}.")
-            for one in found
-            if one.state is not None
+            scored(
+                finding.state,
+                f"{finding.asked}, after {finding.evaluations:,} evaluations: {_out(finding)}.",
+            )
+            for finding in found
+            if finding.state is not None
         ),
     )
 
@@ -87,9 +92,9 @@ def _out(demand: Demand) -> str:
 
 def counted(outcome: Outcome) -> str:
     """Count the demands by what came out."""
-    states = [one.state for one in demands(outcome)]
-    counts = ", ".join(f"{states.count(one)} {one.lower()}" for one in SCORE_STATES)
-    return f"Of {sum(one is not None for one in states)} demands that were run: {counts}."
+    states = [demand.state for demand in demands(outcome)]
+    counts = ", ".join(f"{states.count(state)} {state.lower()}" for state in SCORE_STATES)
+    return f"Of {sum(state is not None for state in states)} demands that were run: {counts}."
 
 
 def _shares(outcome: Outcome) -> Iterable[Demand]:
@@ -155,7 +160,7 @@ def _on_engineering(outcome: Outcome) -> Iterable[Demand]:
             yield Demand(asked, budget, "not run", "", None)
             continue
         found = tests(outcome, "RE", budget, "hypervolume")
-        test = next(one for one in found if one.rival == RIVAL_ON_RE)
+        test = next(finding for finding in found if finding.rival == RIVAL_ON_RE)
         measured = f"{test.better} better, {test.worse} worse, p = {significant(test.p, 2)}"
         state = rate(test.better, test.better + test.worse).state(0.5)
         yield Demand(asked, budget, measured, "", state)

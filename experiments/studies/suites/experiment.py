@@ -56,7 +56,7 @@ def run(context: Context) -> Result:
             demands_table(outcome),
             together_table(outcome),
             shares_table(outcome),
-            *(one for one in (duels_table(outcome),) if one.rows),
+            *(table for table in (duels_table(outcome),) if table.rows),
             parts_table(outcome),
             own_time_table(),
             *ranks_tables(outcome),
@@ -86,7 +86,9 @@ def run(context: Context) -> Result:
 
 def _source(text: str | None) -> str:
     """Return the paragraph of a module that names its source."""
-    (paragraph,) = (one for one in (text or "").split("\n\n") if one.startswith("Source:"))
+    (paragraph,) = (
+        paragraph for paragraph in (text or "").split("\n\n") if paragraph.startswith("Source:")
+    )
     return " ".join(paragraph.split())
 
 

@@ -68,7 +68,7 @@ SUITES: dict[str, tuple[SuiteProblem, ...]] = {
 }
 """Problems by suite."""
 
-PROBLEMS = {one.name: one for suite in SUITES.values() for one in suite}
+PROBLEMS = {problem.name: problem for suite in SUITES.values() for problem in suite}
 """The same by name."""
 
 

@@ -101,7 +101,11 @@ class SuitePart:
         """
         for seed in range(1, self.seeds + 1):
             for algorithm in self.algorithms:
-                taken = [one.name for one in SUITES[self.suite] if _takes(algorithm, one.name)]
+                taken = [
+                    problem.name
+                    for problem in SUITES[self.suite]
+                    if _takes(algorithm, problem.name)
+                ]
                 for budgets in ON_SUITES[algorithm].budgets_of_runs(self.budgets):
                     yield [SuiteRun(problem, algorithm, seed, budgets) for problem in taken]
 

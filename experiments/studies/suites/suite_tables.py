@@ -35,7 +35,7 @@ SWARMS = (OURS, "ElitistSwarm")
 
 def indicators(suite: str) -> list[str]:
     """Return the indicators of a suite: IGD+ only where all fronts are known in closed form."""
-    known = all(one.front is not None for one in SUITES[suite])
+    known = all(problem.front is not None for problem in SUITES[suite])
     return list(NAMES) if known else ["hypervolume"]
 
 
@@ -196,8 +196,10 @@ def medians_tables(outcome: Outcome) -> list[Table]:
                     f"{suite}: median hypervolume after {budget:,} evaluations",
                     (Column("problem"), *map(Column, algorithms)),
                     tuple(
-                        (one, *(None if np.isnan(value) else float(value) for value in row))
-                        for one, row in zip(outcome.problems(suite, budget), values, strict=True)
+                        (problem, *(None if np.isnan(value) else float(value) for value in row))
+                        for problem, row in zip(
+                            outcome.problems(suite, budget), values, strict=True
+                        )
                     ),
                     folded=True,
                 )
@@ -306,7 +308,7 @@ def together_table(outcome: Outcome) -> Table:
     for budget in BUDGETS:
         tests = {test.rival: test for test in signs_together(outcome, budget)}
         found = ranks_together(outcome, budget)
-        for name in sorted(found, key=lambda one: found[one]):
+        for name in sorted(found, key=lambda name: found[name]):
             cells: tuple[Cell, ...] = (None, None, None)
             if name in tests:
                 cells = tests[name].better, tests[name].worse, tests[name].p

@@ -24,7 +24,9 @@ class Shown:
 
 def shown(about: Circumstances, effects: Sequence[Drawn]) -> Shown:
     """Run a session with hidden effects."""
-    machine, sensors = equipped(about.machine, about.sensors, tuple(one.hidden for one in effects))
+    machine, sensors = equipped(
+        about.machine, about.sensors, tuple(effect.hidden for effect in effects)
+    )
     records = tuple(
         running(about, place, machine, sensors) for place in range(len(about.conditions))
     )

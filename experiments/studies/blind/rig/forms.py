@@ -460,11 +460,13 @@ _UNLISTED: tuple[Draw, ...] = (
     warming_friction,
     torque_sensor_curvature,
 )
-_DRAWS = {draw.__name__: draw for draw, _ in _LISTED} | {one.__name__: one for one in _UNLISTED}
+_DRAWS = {draw.__name__: draw for draw, _ in _LISTED} | {
+    effect.__name__: effect for effect in _UNLISTED
+}
 FORMS = {draw.__name__: count for draw, count in _LISTED}
 """Number of forms of each listed effect, that of the library among them."""
 LISTED = tuple(FORMS)
-UNLISTED = tuple(one.__name__ for one in _UNLISTED)
+UNLISTED = tuple(effect.__name__ for effect in _UNLISTED)
 
 
 def draw_effect(name: str, form: int, rng: np.random.Generator) -> Drawn:

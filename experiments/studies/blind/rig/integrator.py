@@ -45,13 +45,13 @@ class Readout(NamedTuple):
 def step_of(linear: LinearPart, length: float) -> Step:
     """Return the matrices of a step of ``length`` seconds."""
     half = _phi(linear, 0.5 * length, 1)
-    one, two, three = (_phi(linear, length, order) for order in (1, 2, 3))
+    order_1, two, three = (_phi(linear, length, order) for order in (1, 2, 3))
     return Step(
         length,
         expm(linear.system * length),
         expm(linear.system * 0.5 * length),
         half,
-        one - 3.0 * two + 4.0 * three,
+        order_1 - 3.0 * two + 4.0 * three,
         2.0 * two - 4.0 * three,
         4.0 * three - two,
     )

@@ -46,7 +46,7 @@ _EVER = (1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 2.02)
 def orders_seen(ratio: float, further: Sequence[float] = ()) -> Values:
     """Return the orders whose lines count, cycles per input turn."""
     wanted = [1.0 / ratio, 2.0 / ratio, *_EVER]
-    wanted += [one for one in further if min(abs(one - other) for other in wanted) > 0.005]
+    wanted += [effect for effect in further if min(abs(effect - other) for other in wanted) > 0.005]
     return np.array(sorted(wanted))
 
 
@@ -69,9 +69,9 @@ def visibility(
     ``sweep`` (k,) is the change of the angle in the torsion sweep, rad.
     """
     kept = list(changes)
-    change = np.concatenate([one.ravel() for one in changes.values()])
+    change = np.concatenate([change.ravel() for change in changes.values()])
     noise = np.concatenate([_noise(about, place, orders).ravel() for place in kept])
-    sizes = np.concatenate([_sizes(one).ravel() for one in changes.values()])
+    sizes = np.concatenate([_sizes(change).ravel() for change in changes.values()])
     noise = np.hypot(noise, LINEAR * sizes)
     within, low, high = _of_base(about, kept, orders)
     costly = np.column_stack([_of_sensors(about, kept, orders), _unrepeated(about, kept, orders)])

@@ -54,19 +54,19 @@ def imop_front(number: int) -> Array:
         if number < 3:
             return even_curve(points)
         return points[:: max(1, len(points) // N_POINTS)]
-    one = np.linspace(0.0, 1.0, _GRID)
+    axis = np.linspace(0.0, 1.0, _GRID)
     if number == 5:
-        return _discs(one)
+        return _discs(axis)
     if number == 7:
-        return _ribbons(one[::2])
-    first, second = (grid.ravel() for grid in np.meshgrid(one, one))
+        return _ribbons(axis[::2])
+    first, second = (grid.ravel() for grid in np.meshgrid(axis, axis))
     points = FRONTS[number](np.zeros_like(first), first, second)
     return points[is_nondominated(points)]
 
 
-def _discs(one: Array) -> Array:
+def _discs(parameter: Array) -> Array:
     """Return eight discs of radius 0.1 in the plane f1 + f2 + f3 = 0.5."""
-    side = 0.2 * (one[:: _GRID // 25] - 0.5)
+    side = 0.2 * (parameter[:: _GRID // 25] - 0.5)
     x, y = (grid.ravel() for grid in np.meshgrid(side, side))
     inside = np.column_stack([x, y])[np.hypot(x, y) <= 0.1]
     turn = np.pi / 4.0 * np.arange(1, 9)
@@ -75,9 +75,9 @@ def _discs(one: Array) -> Array:
     return np.column_stack([plane, 0.5 - plane.sum(axis=1)])
 
 
-def _ribbons(one: Array) -> Array:
+def _ribbons(parameter: Array) -> Array:
     """Return the parts of the unit sphere where two objectives differ by no more than 0.1."""
-    first, second = (grid.ravel() for grid in np.meshgrid(one, one))
+    first, second = (grid.ravel() for grid in np.meshgrid(parameter, parameter))
     points = FRONTS[7](np.zeros_like(first), first, second)
     return points[np.linalg.norm(points, axis=1) <= 1.0 + 1e-9]
 

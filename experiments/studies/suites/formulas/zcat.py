@@ -43,8 +43,8 @@ def zcat_front(number: int, n_obj: int) -> Array:
     if n_obj == 2 or number in ON_CURVES:
         y = np.linspace(0.0, 1.0, _GRID[0])[:, np.newaxis]
     else:
-        one = np.linspace(0.0, 1.0, _GRID[1])
-        y = np.column_stack([grid.ravel() for grid in np.meshgrid(one, one)])
+        axis = np.linspace(0.0, 1.0, _GRID[1])
+        y = np.column_stack([grid.ravel() for grid in np.meshgrid(axis, axis)])
     F = _weighted(_shape(number, y, n_obj))
     F = np.unique(F, axis=0)
     return F[is_nondominated(F)]
