@@ -195,10 +195,10 @@ def _listed(text: str) -> tuple[str, ...]:
 
 def _counted(text: str) -> range:
     """Return what a number, from 1 on, or a range stands for."""
-    first, dash, last = text.partition("-")
+    start, dash, end = text.partition("-")
     if not dash:
         return range(1, _positive(text) + 1)
-    counted = range(_positive(first), _positive(last) + 1)
+    counted = range(_positive(start), _positive(end) + 1)
     if not counted:
         raise argparse.ArgumentTypeError(f"{text!r} is not a range that rises, like 21-40")
     return counted

@@ -113,11 +113,11 @@ def source_of(*names: str) -> str:
 
 def _with_neighbours(files: list[Path]) -> list[Path]:
     """Return the files with all others of their packages."""
-    found = set(files)
+    given = set(files)
     for path in files:
         if (path.parent / "__init__.py").is_file():
-            found |= set(path.parent.rglob("*.py"))
-    return sorted(found)
+            given |= set(path.parent.rglob("*.py"))
+    return sorted(given)
 
 
 def _arguments(factory: Callable[..., Any], population: int, n_obj: int) -> dict[str, Any]:
@@ -145,12 +145,14 @@ def _pymoo_algorithm(name: str) -> Any:
     """Return a class of `pymoo.algorithms.moo` by its name."""
     for module in pkgutil.iter_modules(pymoo.algorithms.moo.__path__):
         try:
-            found = getattr(import_module(f"pymoo.algorithms.moo.{module.name}"), name, None)
+            algorithm_class = getattr(
+                import_module(f"pymoo.algorithms.moo.{module.name}"), name, None
+            )
         except ModuleNotFoundError:
             # One module of pymoo (kgb) needs scikit-learn, which pymoo does not ask for.
             continue
-        if inspect.isclass(found) and issubclass(found, Algorithm):
-            return found
+        if inspect.isclass(algorithm_class) and issubclass(algorithm_class, Algorithm):
+            return algorithm_class
     raise InvalidInput(OF_ALGORITHMS, name, f"{', '.join(ALGORITHMS)}, ElitistSwarm, {_OF_PYMOO}")
 
 
@@ -210,25 +212,25 @@ class OpenRun:
         problem = problem_named(self.problem)
         algorithm = algorithm_named(self.algorithm, self.population, self.problem)
         with seeded_default_rng(self.seed):
-            found = minimize(problem, algorithm, ("n_eval", self.evaluations), seed=self.seed)
-        spent = found.algorithm.evaluator.n_eval
+            ended = minimize(problem, algorithm, ("n_eval", self.evaluations), seed=self.seed)
+        spent = ended.algorithm.evaluator.n_eval
         columns = (SPENT, *(f"x{1 + i}" for i in range(problem.n_var)))
         columns += tuple(f"f{1 + i}" for i in range(problem.n_obj))
         X, F = np.empty((0, problem.n_var)), np.empty((0, problem.n_obj))
         # Without a feasible design, the optimum is the least infeasible one and F is None.
-        if found.F is not None:
-            X, F = found.opt.get("X", "F")
+        if ended.F is not None:
+            X, F = ended.opt.get("X", "F")
             sound = np.isfinite(F).all(axis=1)
             X, F = X[sound], F[sound]
         if not len(F):
             nothing = np.full((1, len(columns)), np.nan)
             nothing[0, 0] = spent
-            return Run(columns, nothing, found.exec_time)
+            return Run(columns, nothing, ended.exec_time)
         best = is_nondominated(F, keep_weakly=True)
         X, F = X[best], F[best]
-        kept = final_rows(F)
-        rows = np.hstack([np.full((len(kept), 1), spent), X[kept], F[kept]])
-        return Run(columns, rows, found.exec_time)
+        final = final_rows(F)
+        rows = np.hstack([np.full((len(final), 1), spent), X[final], F[final]])
+        return Run(columns, rows, ended.exec_time)
 
 
 @contextmanager

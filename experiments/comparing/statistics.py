@@ -152,7 +152,7 @@ def _ends(
     low, high = np.full((2, len(data[0])), np.nan)
     complete = np.all([np.isfinite(sample).all(axis=1) for sample in data], axis=0)
     if complete.any() and data[0].shape[1] > 1:
-        found = bootstrap(
+        interval = bootstrap(
             tuple(sample[complete] for sample in data),
             statistic,
             axis=1,
@@ -164,7 +164,7 @@ def _ends(
             # The same resamples everywhere: no table depends on what was made before it.
             rng=np.random.default_rng(1),
         ).confidence_interval
-        low[complete], high[complete] = found.low, found.high
+        low[complete], high[complete] = interval.low, interval.high
     return low, high
 
 

@@ -77,9 +77,9 @@ def dominating_shares(model: str) -> dict[str, float]:
     problem = robust_problem(model)
     rng = np.random.default_rng(1)
     drawn = rng.uniform(problem.xl, problem.xu, (RANDOM_DESIGNS, problem.n_var))
-    found = problem.evaluate(drawn)
+    evaluated = problem.evaluate(drawn)
     return {
-        choice.name: float(np.mean(np.all(found < np.array(choice.moments), axis=1)))
+        choice.name: float(np.mean(np.all(evaluated < np.array(choice.moments), axis=1)))
         for choice in paper_choices(model)
     }
 

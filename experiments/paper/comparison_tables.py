@@ -62,9 +62,9 @@ def _other_budgets(evaluations: int, comparisons: Sequence[Comparison]) -> Itera
         for algorithm, spent in comparison.spent.items():
             if set(spent) != {evaluations}:
                 few, many = min(spent), max(spent)
-                found = f"{few:,}" if few == many else f"{few:,} to {many:,}"
+                shown = f"{few:,}" if few == many else f"{few:,} to {many:,}"
                 yield (
-                    f"No fair comparison: on {comparison.model}, {algorithm} spent {found} "
+                    f"No fair comparison: on {comparison.model}, {algorithm} spent {shown} "
                     f"evaluations instead of {evaluations:,}."
                 )
 
@@ -173,8 +173,8 @@ def times_table(
     columns = (*_summary_columns("time", "s"), *_paper_columns("time", published, "s", digits=4))
     title = f"Wall time of one run of {evaluations:,} evaluations, other runs going on beside it"
     rows = _rows(comparisons, cells)
-    found = tuple(findings)
-    return Table("times", title, (*WHO, *columns), rows, findings=found, wall_times=True)
+    shown = tuple(findings)
+    return Table("times", title, (*WHO, *columns), rows, findings=shown, wall_times=True)
 
 
 def change(before: float, after: float) -> str:

@@ -116,7 +116,7 @@ def _table(distributions: Sequence[Distribution]) -> Table:
 def _findings(distributions: Sequence[Distribution]) -> Iterator[Finding]:
     for model in PRESETS:
         wide, narrow, _ = (entry for entry in distributions if entry.model == model)
-        shown, other = (
+        shown, moments = (
             f"{significant(e.moments.mean_arcsec, 4)} ± {significant(e.moments.std_arcsec, 4)} "
             f"arcsec with {BANDS[e.band]}"
             for e in (wide, narrow)
@@ -125,7 +125,7 @@ def _findings(distributions: Sequence[Distribution]) -> Iterator[Finding]:
         yield Finding(
             wide.alike,
             f"On {model} the DTE of the nominal design (mean ± std) is {shown}; the paper prints "
-            f"{PAPER.mean_arcsec} ± {PAPER.std_arcsec} arcsec. It is {other}{fitted}.",
+            f"{PAPER.mean_arcsec} ± {PAPER.std_arcsec} arcsec. It is {moments}{fitted}.",
             answers=model == "calibrated",
         )
 

@@ -150,14 +150,14 @@ def _design(model: DriveModel, parameters: NDArray[np.float64]) -> Design:
 
 def printed_equations() -> dict[str, Printed]:
     """Return what the printed equations give under each of `READINGS` of theta_s."""
-    found = {}
+    printed = {}
     for reading in READINGS:
         model = preset("published")
         error = replace(model.kinematic_error, reading=reading)
         problem = RobustDTE(replace(model, kinematic_error=error))
         dte = problem.model.dte_arcsec(problem.model.nominal[None])[0]
-        found[reading] = Printed(float(dte), *exact_moments(problem, problem.nominal, BAND))
-    return found
+        printed[reading] = Printed(float(dte), *exact_moments(problem, problem.nominal, BAND))
+    return printed
 
 
 def of_the_first_page(printed: dict[str, Printed]) -> str:

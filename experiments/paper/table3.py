@@ -53,21 +53,21 @@ def torsion_loop(records: Records, key: RunKey) -> Figure:
     """Draw one loop, branch by branch, and what is left of it without the line of a1."""
     loop = records.loops[key]
     fit = stiffness(loop)
-    left = loop.torque - fit.intercept - fit.slope * loop.torsion
-    figure, (both,) = grid(1, 2, width=5.4, height=4.2)
+    residual = loop.torque - fit.intercept - fit.slope * loop.torsion
+    figure, (axes,) = grid(1, 2, width=5.4, height=4.2)
     for name, samples in loop.branches.items():
         meaning, colour = BRANCHES[name]
         torsion = loop.torsion[samples] / ARCSEC
-        for axis, torque in zip(both, (loop.torque, left), strict=True):
+        for axis, torque in zip(axes, (loop.torque, residual), strict=True):
             label = f"{name}, {meaning}"
             axis.plot(torsion, torque[samples], ".", color=colour, markersize=3, label=label)
     ends = np.array([0.0, loop.torsion.max()])
     line = f"K = {fit.slope:.0f} ± {fit.slope_error:.0f} N.m/rad"
-    both[0].plot(ends / ARCSEC, fit.intercept + fit.slope * ends, "k-", linewidth=1, label=line)
-    both[0].set_ylabel("torque [N.m]")
-    both[1].set_ylabel("torque less the line of a1 [N.m]")
-    both[0].legend(fontsize=8, frameon=False)
-    for axis in both:
+    axes[0].plot(ends / ARCSEC, fit.intercept + fit.slope * ends, "k-", linewidth=1, label=line)
+    axes[0].set_ylabel("torque [N.m]")
+    axes[1].set_ylabel("torque less the line of a1 [N.m]")
+    axes[0].legend(fontsize=8, frameon=False)
+    for axis in axes:
         axis.set_xlabel("torsion [arcsec]")
     return figure
 
@@ -77,14 +77,14 @@ def damping_lines(
 ) -> Figure:
     """Draw the runs of one prototype with the fitted lines."""
     bearing, complete, output = records.bearing[key], records.complete[key], records.output[key]
-    figure, (both,) = grid(1, 2, width=5.4, height=4.0)
+    figure, (axes,) = grid(1, 2, width=5.4, height=4.0)
     difference = complete.torque - bearing.torque
-    _line(both[0], bearing.speed, bearing.torque, fits["B_in"][key], BLUE, "B_in")
-    _line(both[0], bearing.speed, difference, fits["B_fc"][key], ORANGE, "B_fc")
-    _line(both[1], output.speed, output.torque, fits["B_out"][key], GREEN, "B_out")
-    both[0].set_xlabel("input speed [r/min]")
-    both[1].set_xlabel("output speed [r/min]")
-    for axis in both:
+    _line(axes[0], bearing.speed, bearing.torque, fits["B_in"][key], BLUE, "B_in")
+    _line(axes[0], bearing.speed, difference, fits["B_fc"][key], ORANGE, "B_fc")
+    _line(axes[1], output.speed, output.torque, fits["B_out"][key], GREEN, "B_out")
+    axes[0].set_xlabel("input speed [r/min]")
+    axes[1].set_xlabel("output speed [r/min]")
+    for axis in axes:
         axis.set_ylabel("no-load torque [mN.m]")
         axis.legend(fontsize=8, frameon=False, loc="upper left")
     return figure
@@ -120,15 +120,15 @@ def run(context: Context) -> Result:
     rng = np.random.default_rng(SEED)
     records, _ = draw_campaign(rng)
     fits = records.fits()
-    found = summaries(fits)
+    summaries_of = summaries(fits)
     return Result(
         title="Tables 3 and 4: identified stiffness and damping",
         command="python -m experiments table3",
         paragraphs=(SETTING, MEANING),
         first_page=of_the_first_page(),
         tables=(
-            _coefficient_table(found),
-            _nominal_table(found),
+            _coefficient_table(summaries_of),
+            _nominal_table(summaries_of),
             _coverage_table(rng),
             _friction_table(rng),
             _resolution_table(),
@@ -187,7 +187,7 @@ def _coefficient_table(found: Mapping[str, Series]) -> Table:
     return Table("coefficients", title, tuple(columns), tuple(rows), note, (finding,))
 
 
-def _nominal_table(found: Mapping[str, Series]) -> Table:
+def _nominal_table(series: Mapping[str, Series]) -> Table:
     nominal = hs_20_100().nominal
     printed = {
         "theta_s": (nominal.static_error / ARCSEC, "arcsec", "from Eqs. (1) and (2), see table2"),
@@ -200,7 +200,7 @@ def _nominal_table(found: Mapping[str, Series]) -> Table:
     }
     rows = []
     for name, (value, unit, source) in printed.items():
-        ours = found[name].between if name in found else None
+        ours = series[name].between if name in series else None
         cells = (ours.mean, ours.mean_error) if ours else (None, None)
         rows.append((name, unit, *cells, value, source))
     columns = (

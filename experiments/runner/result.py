@@ -200,10 +200,10 @@ class Result:
         if unknown:
             raise ValueError(f"no section of the first page: {', '.join(sorted(unknown))}")
         if not self.answer:
-            found = (
+            answering = (
                 finding for table in self.tables for finding in table.findings if finding.answers
             )
-            object.__setattr__(self, "answer", " ".join(finding.sentence for finding in found))
+            object.__setattr__(self, "answer", " ".join(finding.sentence for finding in answering))
 
 
 def significant(value: float, digits: int) -> str:

@@ -170,8 +170,8 @@ def trials_of(models: Sequence[str]) -> Iterator[Trial]:
         for rival in tqdm(
             rivals(model.dte_arcsec, box), desc=f"surrogates of {name}", delay=2.0, leave=False
         ):
-            found = accuracy(rival.predict(points), actual)
-            yield Trial(name, rival.family, rival.order, rival.runs, found.rmse, found.max_error)
+            errors = accuracy(rival.predict(points), actual)
+            yield Trial(name, rival.family, rival.order, rival.runs, errors.rmse, errors.max_error)
 
 
 def _models(trials: Sequence[Trial]) -> list[str]:
@@ -224,10 +224,10 @@ def _needed_finding(model: str, trials: Sequence[Trial]) -> Finding:
         least.append(None if best is None else (reached[best], best))
     same, paper = least
     texts = [
-        "none of the surrogates" if found is None else f"{found[0]} runs ({found[1]})"
-        for found in (same, paper)
+        "none of the surrogates" if entry is None else f"{entry[0]} runs ({entry[1]})"
+        for entry in (same, paper)
     ]
-    fewer = any(found is not None and found[0] < PAPER_RUNS for found in least)
+    fewer = any(entry is not None and entry[0] < PAPER_RUNS for entry in least)
     return Finding(
         not fewer,
         f"On {model}, the accuracy of the Chebyshev grid of {PAPER_RUNS} runs is reached by "

@@ -105,14 +105,14 @@ def _moments_table() -> Table:
         (
             model,
             label,
-            found.ours.mean,
-            float(np.sqrt(found.ours.variance)),
-            found.moments,
-            found.indices,
-            100.0 * found.surrogate_mean,
-            100.0 * found.surrogate_std,
+            comparison.ours.mean,
+            float(np.sqrt(comparison.ours.variance)),
+            comparison.moments,
+            comparison.indices,
+            100.0 * comparison.surrogate_mean,
+            100.0 * comparison.surrogate_std,
         )
-        for model, label, found in comparisons
+        for model, label, comparison in comparisons
     )
     columns = (
         Column("model"),
@@ -124,7 +124,7 @@ def _moments_table() -> Table:
         Column("mean", "%", 2, "error of the surrogate of 1024 runs"),
         Column("std", "%", 2, "error of the surrogate of 1024 runs"),
     )
-    worst = max(max(found.moments, found.indices) for *_, found in comparisons)
+    worst = max(max(comparison.moments, comparison.indices) for *_, comparison in comparisons)
     agreement = Finding(
         worst <= AGREEMENT,
         "Exact moments and Sobol indices of the surrogate are chaospy's to "
@@ -144,8 +144,8 @@ def _moments_table() -> Table:
 
 
 def _surrogate_finding(model: str, comparisons: Sequence[Comparison]) -> Finding:
-    mean = 100.0 * max(abs(found.surrogate_mean) for found in comparisons)
-    std = 100.0 * max(abs(found.surrogate_std) for found in comparisons)
+    mean = 100.0 * max(abs(comparison.surrogate_mean) for comparison in comparisons)
+    std = 100.0 * max(abs(comparison.surrogate_std) for comparison in comparisons)
     limit = REEVALUATION_LIMITS["mean_percent"]
     return Finding(
         mean <= limit,
@@ -211,8 +211,8 @@ class Chaos:
     def indices(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return first and total Sobol indices, shape (2, 5), of the expansion of an output."""
         coefficients = self.values @ (self.weights * values)
-        first = chaospy.FirstOrderSobol(self.expansion, coefficients)
-        return np.array([first, chaospy.TotalOrderSobol(self.expansion, coefficients)])
+        first_order = chaospy.FirstOrderSobol(self.expansion, coefficients)
+        return np.array([first_order, chaospy.TotalOrderSobol(self.expansion, coefficients)])
 
 
 def chaos(degree: int, cut: float) -> Chaos:

@@ -60,10 +60,10 @@ def duels(
     """
     where, first, second = [], [], []
     for population, budget, (own, *others) in cases(scores, contested, [ours, *rivals], counted):
-        for other in others:
-            where.append((population, budget, other.algorithm))
+        for rival in others:
+            where.append((population, budget, rival.algorithm))
             first.append(scores.of(own, COMPARED[indicator]))
-            second.append(scores.of(other, COMPARED[indicator]))
+            second.append(scores.of(rival, COMPARED[indicator]))
     a, b = np.array(first), np.array(second)
     sign = -1.0 if smaller_is_better(indicator) else 1.0
     better, low, high = a12_intervals(sign * a, sign * b).T.tolist()

@@ -81,8 +81,8 @@ def who_finds(scores: Scores, contested: Contested) -> str:
     """Say which algorithms of Table 7 find the front at the stated setting; no full stop."""
     parts = []
     for algorithm in OF_TABLE_7:
-        found, runs = runs_that_find(scores, contested, algorithm)
-        share = "all" if found == runs else f"{found or 'none'} of"
+        counts, runs = runs_that_find(scores, contested, algorithm)
+        share = "all" if counts == runs else f"{counts or 'none'} of"
         parts.append(f"{algorithm} in {share} {runs} runs")
     return f"the front is found by {', '.join(parts[:-1])} and {parts[-1]}"
 
@@ -95,9 +95,9 @@ def leads_table(scores: Scores) -> Table:
     """Say what either law of velocities does to the lead of AMP-MOPSO below 100 particles."""
     rows: list[tuple[Cell, ...]] = []
     for contested in exactly(scores):
-        kept, n_cells = cells_in_order(scores, contested)
+        cells, n_cells = cells_in_order(scores, contested)
         counts = [count for lead in leads(scores, contested) for count in lead[1:]]
-        rows.append((contested.model, contested.velocity, n_cells, *counts, kept))
+        rows.append((contested.model, contested.velocity, n_cells, *counts, cells))
     words = ("ahead", "behind")
     return Table(
         "leads",
@@ -113,12 +113,12 @@ def leads_table(scores: Scores) -> Table:
         note="A cell is a population and a budget. The printed order is AMP-MOPSO before MOPSO "
         "before NSGA-II in the mean IGD.",
         findings=tuple(
-            Finding(2 * kept > n_cells, sentence)
+            Finding(2 * cells > n_cells, sentence)
             for contested in exactly(scores)
-            for kept, n_cells in [cells_in_order(scores, contested)]
+            for cells, n_cells in [cells_in_order(scores, contested)]
             for sentence in [
                 f"On {contested.model} with velocities drawn {drawn(contested)}, the paper's "
-                f"order AMP-MOPSO, MOPSO, NSGA-II holds in {kept} of {n_cells} cells below 100 "
+                f"order AMP-MOPSO, MOPSO, NSGA-II holds in {cells} of {n_cells} cells below 100 "
                 "particles."
             ]
         ),
@@ -131,8 +131,8 @@ def totals_of(scores: Scores, velocity: str) -> Totals:
     ahead = dict.fromkeys(RIVALS, 0)
     for contested in exactly(scores):
         if contested.velocity == velocity:
-            kept, of_all = cells_in_order(scores, contested)
-            in_order, n_cells = in_order + kept, n_cells + of_all
+            cells, of_all = cells_in_order(scores, contested)
+            in_order, n_cells = in_order + cells, n_cells + of_all
             for lead in leads(scores, contested):
                 ahead[lead.rival] += lead.ahead
     return Totals(n_cells, ahead, in_order)

@@ -64,9 +64,9 @@ class Reading(NamedTuple):
 
 def readings(scores: Scores) -> list[Reading]:
     """Return all readings, the closest first; one with a mean that has no value is left out."""
-    found = [_reading(scores, *entry) for entry in _ways(scores)]
+    judged = [_reading(scores, *entry) for entry in _ways(scores)]
     return sorted(
-        (finding for finding in found if np.isfinite(finding.factor)),
+        (finding for finding in judged if np.isfinite(finding.factor)),
         key=lambda finding: finding.factor,
     )
 

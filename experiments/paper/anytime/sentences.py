@@ -31,9 +31,9 @@ SPOKEN_OF = Contested("calibrated", EXACT, AS_PRINTED)
 """What the first sentence of the report speaks of."""
 
 
-def advantage_findings(found: Contests) -> Iterator[Finding]:
+def advantage_findings(contests: Contests) -> Iterator[Finding]:
     """Say where AMP-MOPSO is ahead of both rivals, and how it stands at the stated setting."""
-    for contest, entries in found.items():
+    for contest, entries in contests.items():
         at_stated = _of_stated(entries)
         if contest.indicator == "hypervolume" or not at_stated:
             continue
@@ -74,8 +74,8 @@ def settings_ahead(entries: Sequence[Duel]) -> str:
 
 
 def _listed(populations: Sequence[int]) -> str:
-    *first, last = map(str, populations)
-    return f"{', '.join(first)} or {last} particles" if first else f"{last} particles"
+    *smallest, largest = map(str, populations)
+    return f"{', '.join(smallest)} or {largest} particles" if smallest else f"{largest} particles"
 
 
 def _span(budgets: Sequence[int]) -> str:
@@ -140,13 +140,13 @@ def _setting(reading: Reading) -> str:
     )
 
 
-def opening(scores: Scores, found: Contests, ranked: Sequence[Reading]) -> str:
+def opening(scores: Scores, contests: Contests, ranked: Sequence[Reading]) -> str:
     """Return the first sentences of the report, about the stated setting where it was run."""
-    at_stated = _of_stated(found.get(Contest(SPOKEN_OF, "igd"), []))
+    at_stated = _of_stated(contests.get(Contest(SPOKEN_OF, "igd"), []))
     if not at_stated:
         return f"O{leads_sentence(scores)[1:]}."
     igd, spacing = (
-        settings_ahead(found[Contest(SPOKEN_OF, indicator)]) or "nowhere"
+        settings_ahead(contests[Contest(SPOKEN_OF, indicator)]) or "nowhere"
         for indicator in ("igd", "spacing")
     )
     return (
@@ -156,9 +156,9 @@ def opening(scores: Scores, found: Contests, ranked: Sequence[Reading]) -> str:
     )
 
 
-def first_page(scores: Scores, found: Contests) -> dict[str, str]:
+def first_page(scores: Scores, contests: Contests) -> dict[str, str]:
     """Return what holds of Table 7, and what does not, as a part of the first page."""
-    entries = found.get(Contest(SPOKEN_OF, "igd"), [])
+    entries = contests.get(Contest(SPOKEN_OF, "igd"), [])
     at_stated = _of_stated(entries)
     if not at_stated:
         return {}

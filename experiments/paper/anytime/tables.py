@@ -210,10 +210,10 @@ def _range(low: float, high: float) -> str | None:
 
 def readings_table(ranked: Sequence[Reading], findings: Sequence[Finding], note: str) -> Table:
     """List the readings that come closest to the printed numbers, and the stated setting."""
-    kept = list(range(min(SHOWN, len(ranked))))
+    shown = list(range(min(SHOWN, len(ranked))))
     stated = stated_place(ranked)
-    if stated is not None and stated not in kept:
-        kept.append(stated)
+    if stated is not None and stated not in shown:
+        shown.append(stated)
     columns = (
         Column("place"),
         *CONTESTED,
@@ -228,7 +228,7 @@ def readings_table(ranked: Sequence[Reading], findings: Sequence[Finding], note:
     )
     paper: tuple[Cell, ...] = ("the paper", *[None] * (len(CONTESTED) + 3), *STATED)
     rows = [(*paper, *PRINTED.T.ravel().tolist(), None, None, None, "kept")]
-    rows += [_reading_row(place, ranked[place]) for place in kept]
+    rows += [_reading_row(place, ranked[place]) for place in shown]
     return Table(
         "readings",
         f"Readings of Table 7 by closeness to its six numbers, {len(ranked)} in all",

@@ -47,11 +47,11 @@ def run(context: Context) -> Result:
     answers = [
         finding for table in (numbers, plain) for finding in table.findings if finding.answers
     ]
-    told = " ".join(finding.sentence for finding in answers)
+    sentences = " ".join(finding.sentence for finding in answers)
     return Result(
         title="Calibration: what the printed equations lack",
         command=context.command("calibration"),
-        answer=f"{first[0].upper()}{first[1:]}. {told}",
+        answer=f"{first[0].upper()}{first[1:]}. {sentences}",
         paragraphs=(*stored_outcome(context, "calibration"), SETTING),
         tables=(
             numbers,

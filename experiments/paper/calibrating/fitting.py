@@ -133,10 +133,10 @@ def _residuals(candidate: Candidate, direction: str, targets: dict[str, float]) 
     def residuals(searched: NDArray[np.float64]) -> NDArray[np.float64]:
         model = candidate.model(candidate.physical(searched))
         try:
-            found = predict(model, candidate.bands, names)
+            predictions = predict(model, candidate.bands, names)
         except UnstableDrive:
             return np.full(len(names), UNSTABLE_RESIDUAL)
-        return np.array([(found[name] - targets[name]) / UNCERTAINTY[name] for name in names])
+        return np.array([(predictions[name] - targets[name]) / UNCERTAINTY[name] for name in names])
 
     return residuals
 
@@ -152,7 +152,7 @@ def _global_search(
         # The logarithm keeps distant members comparable, but they do not dominate the search.
         return float(np.log1p(np.sum(residuals(searched) ** 2)))
 
-    found = differential_evolution(
+    ended = differential_evolution(
         cost,
         list(zip(low, high, strict=True)),
         init=low + rng.random((budget.population, len(low))) * (high - low),
@@ -161,7 +161,7 @@ def _global_search(
         polish=False,
         rng=rng,
     )
-    return found.population[np.argsort(found.population_energies, kind="stable")]
+    return ended.population[np.argsort(ended.population_energies, kind="stable")]
 
 
 def _refine(
@@ -170,7 +170,7 @@ def _refine(
     """Return chi-square and place of the local optimum near ``start``."""
     low, high = np.array(list(candidate.bounds.values())).T
     margin = 1e-9 * (high - low)
-    found = least_squares(
+    ended = least_squares(
         residuals,
         np.clip(start, low + margin, high - margin),
         bounds=(low, high),
@@ -178,7 +178,7 @@ def _refine(
         diff_step=1e-4,
         max_nfev=budget.local_evaluations,
     )
-    return 2.0 * float(found.cost), found.x
+    return 2.0 * float(ended.cost), ended.x
 
 
 def _as_run(rows: Sequence[dict[str, float]], seconds: float) -> Run:

@@ -110,10 +110,10 @@ def format_fits(fits: Sequence[Fit]) -> str:
 
 def read_fits(path: Path) -> list[Fit]:
     """Read what `format_fits` wrote."""
-    found = []
+    fits = []
     for row in read_rows(path):
         rung = rung_named(row["rung"])
-        found.append(
+        fits.append(
             Fit(
                 target=row["target"],
                 rung=rung,
@@ -126,7 +126,7 @@ def read_fits(path: Path) -> list[Fit]:
                 parameters={name: float(row[name]) for name in rung.bounds},
             )
         )
-    return found
+    return fits
 
 
 def format_draws(jobs: Sequence[Posterior], runs: Sequence[Run]) -> str:
@@ -146,7 +146,7 @@ def read_draws(path: Path) -> list[Draws]:
     groups: dict[tuple[str, str], list[dict[str, str]]] = {}
     for row in read_rows(path):
         groups.setdefault((row["target"], row["rung"]), []).append(row)
-    found = []
+    draws = []
     for (target, name), rows in groups.items():
         rung = rung_named(name)
 
@@ -155,8 +155,8 @@ def read_draws(path: Path) -> list[Draws]:
 
         parameters = {key: column(key) for key in rung.bounds}
         optima = {key: column(key) for key in OPTIMA}
-        found.append(Draws(target, rung, column("deviance"), parameters, optima))
-    return found
+        draws.append(Draws(target, rung, column("deviance"), parameters, optima))
+    return draws
 
 
 def format_profiles(jobs: Sequence[Profile], runs: Sequence[Run]) -> str:

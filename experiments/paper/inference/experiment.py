@@ -75,16 +75,16 @@ BEYOND = 7.0
 def objectives(shown: Sequence[Named], draws: Sequence[Draws]) -> Figure:
     """Draw optima and fronts of the models, and the optima of the posteriors' draws."""
     figure, axes = grid(1, 2, width=6.6, height=4.6)
-    left, right = axes.flat
+    axis, right = axes.flat
     for named, colour in zip(shown, COLOURS, strict=False):
         predicted = named.fit.evaluation.predicted
-        left.plot(*_front(named).T, "-", color=colour, linewidth=1)
-        left.plot(predicted[1:4], predicted[5:8], "o", color=colour, label=named.label)
-    left.plot(OBSERVED[1:4], OBSERVED[5:8], "x", color=BLACK, markersize=9, label="the paper")
+        axis.plot(*_front(named).T, "-", color=colour, linewidth=1)
+        axis.plot(predicted[1:4], predicted[5:8], "o", color=colour, label=named.label)
+    axis.plot(OBSERVED[1:4], OBSERVED[5:8], "x", color=BLACK, markersize=9, label="the paper")
     # A front that the target has drawn close runs on far beyond all others.
-    left.set_xlim(OBSERVED[1] - BEYOND, OBSERVED[3] + BEYOND)
-    left.set_ylim(OBSERVED[7] - 0.3 * BEYOND, OBSERVED[5] + 0.2 * BEYOND)
-    _labels(left)
+    axis.set_xlim(OBSERVED[1] - BEYOND, OBSERVED[3] + BEYOND)
+    axis.set_ylim(OBSERVED[7] - 0.3 * BEYOND, OBSERVED[5] + 0.2 * BEYOND)
+    _labels(axis)
     for drawn, colour in zip(draws, COLOURS, strict=False):
         values = drawn.optima["mean_balanced"], drawn.optima["std_balanced"]
         label = f"balanced, {title(drawn.target, drawn.rung)}"

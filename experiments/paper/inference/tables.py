@@ -96,13 +96,13 @@ UNIT = 1.0
 def of_the_first_page(fits: Sequence[Fit]) -> str:
     """Say what gives its trade-off and its optima, as part of a longer sentence."""
     common = [fit for fit in fits if fit.target == "common"]
-    both = len(_models(gives_both(without_noise(fits))))
+    count = len(_models(gives_both(without_noise(fits))))
     noisy = with_noise(fits)
     meeting, simplest = _meeting(noisy), rigid(noisy)
     return (
         f"{len(_meeting(common)) or 'none'} of {len(common)} fitted drive models "
         f"{_give(len(_meeting(common)) or 1)} its numbers and the steps between its optima, and "
-        f"{both or 'none'} its optima as well; with solver noise of at most {LARGEST:.1f} arcsec, "
+        f"{count or 'none'} its optima as well; with solver noise of at most {LARGEST:.1f} arcsec, "
         f"{len(meeting)} of {len(noisy)} give numbers and steps, {len(gives_both(noisy))} of them "
         f"the optima too{_simplest_clause(simplest)}"
     )
@@ -128,12 +128,12 @@ def _without_noise(fits: Sequence[Fit]) -> str:
     common = [fit for fit in fits if fit.target == "common"]
     searched = len(common)
     meeting = _meeting(common)
-    both = gives_both(fits)
-    if both:
+    fitting = gives_both(fits)
+    if fitting:
         return (
-            f"Of {searched} drive models searched, {len(both)} give the published numbers with the "
-            "steps between the optima, and leave the optima non-dominated: first "
-            f"{describe(both[0].rung)}."
+            f"Of {searched} drive models searched, {len(fitting)} give the published numbers with "
+            "the steps between the optima, and leave the optima non-dominated: first "
+            f"{describe(fitting[0].rung)}."
         )
     if not meeting:
         return (
@@ -211,9 +211,9 @@ def steps_table(fits: Sequence[Fit]) -> Table:
     columns = (
         Column("model"),
         *(
-            Column(moment, "arcsec", 3, f"{first} to {last}".replace("_", " "))
+            Column(moment, "arcsec", 3, f"{start} to {end}".replace("_", " "))
             for moment in ("mean", "std")
-            for first, last in STEPS
+            for start, end in STEPS
         ),
         Column("largest miss of a step", "standard errors", 2),
         Column("chi-square of the nine numbers", "", 3),
@@ -235,14 +235,14 @@ def steps_table(fits: Sequence[Fit]) -> Table:
 
 
 def _steps_row(named: Named) -> tuple[Cell, ...]:
-    found = named.fit.evaluation
+    evaluation = named.fit.evaluation
     shares = dominating_shares(named.fit.rung, named.fit.parameters)
     return (
         f"{named.label} ({describe(named.fit.rung)})",
-        *steps_of(found.predicted),
-        float(np.abs(step_errors(found)).max()),
-        found.chi_square("common"),
-        float(found.depths.max()),
+        *steps_of(evaluation.predicted),
+        float(np.abs(step_errors(evaluation)).max()),
+        evaluation.chi_square("common"),
+        float(evaluation.depths.max()),
         100.0 * float(shares.max()),
     )
 
@@ -251,20 +251,20 @@ def _findings(fits: Sequence[Fit]) -> list[Finding]:
     (independent,) = (fit for fit in fits if fit.target == "independent")
     common = [fit for fit in fits if fit.target == "common"]
     meeting = [fit for fit in common if gives_trade_off(fit)]
-    both = gives_both(without_noise(fits))
-    found = independent.evaluation
-    ours, paper = steps_of(found.predicted), steps_of(OBSERVED)
+    fitting = gives_both(without_noise(fits))
+    evaluation = independent.evaluation
+    ours, paper = steps_of(evaluation.predicted), steps_of(OBSERVED)
     return [
         Finding(
             gives_trade_off(independent),
             f"Fitted as {PRESET} was, each number with its own sampling error, the model of "
-            f"{PRESET} has a chi-square of {significant(found.chi_square('independent'), 2)}, and "
-            f"of {significant(found.chi_square('common'), 3)} with the covariance; from the "
+            f"{PRESET} has a chi-square of {significant(evaluation.chi_square('independent'), 2)}, "
+            f"and of {significant(evaluation.chi_square('common'), 3)} with the covariance; from the "
             f"balanced to the robust design it changes by {ours[1]:+.3f} and {ours[3]:+.3f} arcsec "
             f"(paper {paper[1]:+.3f} and {paper[3]:+.3f}).",
             fitted=True,
         ),
-        _reversal(found),
+        _reversal(evaluation),
         Finding(
             bool(meeting),
             f"Without node noise, {len(meeting)} of {len(common)} models give all four steps "
@@ -280,21 +280,21 @@ def _findings(fits: Sequence[Fit]) -> list[Finding]:
             fitted=True,
         ),
         Finding(
-            bool(both),
-            f"Without node noise, {len(_models(both))} of {len(_models(without_noise(fits)))} "
+            bool(fitting),
+            f"Without node noise, {len(_models(fitting))} of {len(_models(without_noise(fits)))} "
             "models do so and leave the three optima non-dominated; some were fitted to that as "
             f"well, {len(without_noise(fits))} fits in all.",
         ),
     ]
 
 
-def _reversal(found: Evaluation) -> Finding:
+def _reversal(evaluation: Evaluation) -> Finding:
     """Whether the step that the fitted model reverses contradicts the paper, noise included."""
     last = [1, 3]
-    alone = uncertainty_of_steps(found, sampling_alone=True)[last]
-    noisy = uncertainty_of_steps(found, node_noise=UNIT)[last]
-    misses = np.abs(step_errors(found, node_noise=UNIT)[last])
-    needed = float(noise_that_excuses(found)[last].max())
+    alone = uncertainty_of_steps(evaluation, sampling_alone=True)[last]
+    noisy = uncertainty_of_steps(evaluation, node_noise=UNIT)[last]
+    misses = np.abs(step_errors(evaluation, node_noise=UNIT)[last])
+    needed = float(noise_that_excuses(evaluation)[last].max())
     excused = needed <= LARGEST
     return Finding(
         excused,
@@ -310,8 +310,8 @@ def _reversal(found: Evaluation) -> Finding:
 
 
 def _miss_by_sampling(meeting: Sequence[Fit]) -> float:
-    found = min(meeting, key=lambda fit: fit.bic).evaluation
-    return float(np.abs(step_errors(found, sampling_alone=True)).max())
+    evaluation = min(meeting, key=lambda fit: fit.bic).evaluation
+    return float(np.abs(step_errors(evaluation, sampling_alone=True)).max())
 
 
 def ladder_table(fits: Sequence[Fit]) -> Table:
@@ -409,14 +409,14 @@ def _noise_row(fit: Fit, least: float) -> tuple[Cell, ...]:
 
 
 def _noise_findings(noisy: Sequence[Fit]) -> list[Finding]:
-    meeting, both = _meeting(noisy), gives_both(noisy)
+    meeting, groups = _meeting(noisy), gives_both(noisy)
     grown, printed = growth_of_rmse(), TABLE_5[4].rmse_arcsec / TABLE_5[3].rmse_arcsec
     return [
         Finding(
             bool(meeting),
             f"With node noise, {len(meeting)} of {len(noisy)} models give the nine numbers and all "
-            f"four steps; {len(both)} of them have the published optima within the spread of what "
-            "would be chosen.",
+            f"four steps; {len(groups)} of them have the published optima within the spread of "
+            "what would be chosen.",
             fitted=True,
         ),
         Finding(

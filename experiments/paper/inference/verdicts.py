@@ -61,10 +61,16 @@ def noisy_choice(
     shares = 1.0 + np.linspace(-BOX, BOX, PER_AXIS)
     grid = np.stack(np.meshgrid(*[shares] * len(nominal), indexing="ij"), axis=-1)
     designs = grid.reshape(-1, len(nominal))
-    found = grid_influence(surrogate, nominal * designs, BAND)
-    noise = node_noise * np.random.default_rng(SEED).standard_normal((n, found.of_means.shape[1]))
+    influence = grid_influence(surrogate, nominal * designs, BAND)
+    noise = node_noise * np.random.default_rng(SEED).standard_normal(
+        (n, influence.of_means.shape[1])
+    )
     objectives = np.stack(
-        [found.means + noise @ found.of_means.T, found.stds + noise @ found.of_stds.T], axis=-1
+        [
+            influence.means + noise @ influence.of_means.T,
+            influence.stds + noise @ influence.of_stds.T,
+        ],
+        axis=-1,
     )
     features = np.array([_features(values, designs[:, 0]) for values in objectives])
     # Rounded to four digits, one of the printed values lies outside the box.
@@ -83,8 +89,8 @@ def _features(
     chosen = [
         front[WeightedUtopia(weights).do(objectives[front])] for weights in PREFERENCES.values()
     ]
-    first, last = objectives[chosen[0]], objectives[chosen[-1]]
-    return np.array([last[0] - first[0], first[1] - last[1], *stiffness[chosen]])
+    start, end = objectives[chosen[0]], objectives[chosen[-1]]
+    return np.array([end[0] - start[0], start[1] - end[1], *stiffness[chosen]])
 
 
 STEPS = (
@@ -168,41 +174,41 @@ def steps_of(predicted: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def step_errors(
-    found: Evaluation, sampling_alone: bool = False, node_noise: float = 0.0
+    evaluation: Evaluation, sampling_alone: bool = False, node_noise: float = 0.0
 ) -> NDArray[np.float64]:
     """Return by how many standard errors each step misses the printed one, shape (4,).
 
     With ``sampling_alone`` without `READING`, what the text leaves open. ``node_noise`` is that of
     the surrogate's runs, arcsec.
     """
-    error = uncertainty_of_steps(found, sampling_alone, node_noise)
-    return np.asarray((steps_of(found.predicted) - steps_of(OBSERVED)) / error)
+    error = uncertainty_of_steps(evaluation, sampling_alone, node_noise)
+    return np.asarray((steps_of(evaluation.predicted) - steps_of(OBSERVED)) / error)
 
 
 def uncertainty_of_steps(
-    found: Evaluation, sampling_alone: bool = False, node_noise: float = 0.0
+    evaluation: Evaluation, sampling_alone: bool = False, node_noise: float = 0.0
 ) -> NDArray[np.float64]:
     """Return the standard errors of the steps, arcsec, shape (4,), as `step_errors` takes them."""
     contrast = _difference()
-    variance = np.diag(contrast @ found.covariance_with(node_noise) @ contrast.T)
+    variance = np.diag(contrast @ evaluation.covariance_with(node_noise) @ contrast.T)
     # Each step is the difference of two numbers.
     return np.asarray(np.sqrt(variance - (2.0 * READING**2 if sampling_alone else 0.0)))
 
 
-def noise_that_excuses(found: Evaluation) -> NDArray[np.float64]:
+def noise_that_excuses(evaluation: Evaluation) -> NDArray[np.float64]:
     """Return the least node noise with which each step misses by `WITHIN` at most, arcsec, (4,)."""
-    misses = steps_of(found.predicted) - steps_of(OBSERVED)
-    without, unit = (uncertainty_of_steps(found, node_noise=size) ** 2 for size in (0.0, 1.0))
+    misses = steps_of(evaluation.predicted) - steps_of(OBSERVED)
+    without, unit = (uncertainty_of_steps(evaluation, node_noise=size) ** 2 for size in (0.0, 1.0))
     lacking = (misses / WITHIN) ** 2 - without
     return np.asarray(np.sqrt(np.maximum(lacking, 0.0) / (unit - without)))
 
 
 def gives_trade_off(fit: Fit) -> bool:
     """Whether all four steps and the nine numbers are met."""
-    found = fit.evaluation
+    evaluation = fit.evaluation
     target = "noise" if fit.target == "noise" else "common"
-    likely = chi2.sf(found.chi_square(target), len(OBSERVED)) > SIGNIFICANT
-    errors = step_errors(found, node_noise=fit.node_noise)
+    likely = chi2.sf(evaluation.chi_square(target), len(OBSERVED)) > SIGNIFICANT
+    errors = step_errors(evaluation, node_noise=fit.node_noise)
     return bool(likely and np.all(np.abs(errors) <= WITHIN))
 
 
@@ -223,20 +229,20 @@ def above_a_special_case(fits: Sequence[Fit]) -> list[Fit]:
         fit
         for fit in fits
         if any(
-            other.target == fit.target
-            and _contains(fit.rung, other.rung)
-            and other.deviance + BASIN < fit.deviance
-            for other in fits
+            rival.target == fit.target
+            and _contains(fit.rung, rival.rung)
+            and rival.deviance + BASIN < fit.deviance
+            for rival in fits
         )
     ]
 
 
-def _contains(rung: Rung, other: Rung) -> bool:
-    wide, special = rung.candidate, other.candidate
+def _contains(rung: Rung, rival: Rung) -> bool:
+    wide, special = rung.candidate, rival.candidate
     return (
         (wide.reading, wide.bands) == (special.reading, special.bands)
         and set(wide.effects) >= set(special.effects)
-        and set(rung.closures) >= set(other.closures)
+        and set(rung.closures) >= set(rival.closures)
     )
 
 
@@ -256,9 +262,9 @@ def describe(rung: Rung) -> str:
 def _difference() -> NDArray[np.float64]:
     """Return the matrix from the nine numbers to the steps, means first, shape (4, 9)."""
     rows = np.zeros((4, len(FITTED)))
-    for place, (moment, (first, last)) in enumerate(
+    for place, (moment, (start, end)) in enumerate(
         (moment, step) for moment in ("mean", "std") for step in STEPS
     ):
-        rows[place, FITTED.index(f"{moment}_{first}")] = -1.0
-        rows[place, FITTED.index(f"{moment}_{last}")] = 1.0
+        rows[place, FITTED.index(f"{moment}_{start}")] = -1.0
+        rows[place, FITTED.index(f"{moment}_{end}")] = 1.0
     return rows

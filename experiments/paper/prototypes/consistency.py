@@ -88,18 +88,18 @@ class Prediction:
 
 def bounds_table() -> Table:
     """Tabulate what holds for every set of measured values with the printed statistics."""
-    found = bounds()
+    limits = bounds()
     rows = (
-        ("std of the errors (over n)", found.residual_std),
-        ("smallest error that one prototype can have", found.smallest_residual),
+        ("std of the errors (over n)", limits.residual_std),
+        ("smallest error that one prototype can have", limits.smallest_residual),
         ("largest error (printed)", MAX_ERROR),
-        ("largest difference between two errors", found.largest_difference),
-        ("mean of the measured DTE, near", found.measured_mean),
-        ("std of the measured DTE (over n)", found.measured_std),
-        ("least range, highest minus lowest measured DTE", found.least_range),
-        ("std of the predictions (over n), at least", found.predicted_std[0]),
-        ("std of the predictions (over n), at most", found.predicted_std[1]),
-        (f"least lead of the prediction for No. {HIGHEST} over No. {LOWEST}", found.least_lead),
+        ("largest difference between two errors", limits.largest_difference),
+        ("mean of the measured DTE, near", limits.measured_mean),
+        ("std of the measured DTE (over n)", limits.measured_std),
+        ("least range, highest minus lowest measured DTE", limits.least_range),
+        ("std of the predictions (over n), at least", limits.predicted_std[0]),
+        ("std of the predictions (over n), at most", limits.predicted_std[1]),
+        (f"least lead of the prediction for No. {HIGHEST} over No. {LOWEST}", limits.least_lead),
         ("the same, with all statistics rounded the worst way", least_lead_unrounded()),
     )
     note = (
@@ -236,16 +236,16 @@ def reach() -> float:
 def demands() -> list[Demand]:
     """Return what the design must do under several slopes of the DTE over theta_s."""
     static = np.array([prototype.theta_s_arcsec for prototype in TABLE_6.values()])
-    found = bounds()
+    limits = bounds()
     slopes = {
         "the DTE does not depend on theta_s": 0.0,
-        "theta_s alone makes the predictions scatter": found.predicted_std[0] / static.std(),
+        "theta_s alone makes the predictions scatter": limits.predicted_std[0] / static.std(),
         "the DTE is proportional to theta_s": (
             TABLE_8["initial"].mean_arcsec * ARCSEC / hs_20_100().nominal.static_error
         ),
     }
     return [
-        Demand(case, float(slope), float(found.least_lead + slope * excess()))
+        Demand(case, float(slope), float(limits.least_lead + slope * excess()))
         for case, slope in slopes.items()
     ]
 

@@ -239,13 +239,13 @@ def outlier_counts(
 def detections(n_campaigns: int, rng: np.random.Generator) -> tuple[int, int]:
     """Count campaigns in which the planted pair is found, and those with any other pair."""
     pair = tuple(SYMBOLS.index(symbol) for symbol in PLANTED_PAIR)
-    found = alarms = 0
+    count = alarms = 0
     for _ in range(n_campaigns):
         readings, _ = spoilt_readings(rng, skewed=False)
         pairs = error_statistics(readings, SYMBOLS).correlated_pairs
-        found += pair in pairs
-        alarms += any(other != pair for other in pairs)
-    return found, alarms
+        count += pair in pairs
+        alarms += any(rival != pair for rival in pairs)
+    return count, alarms
 
 
 def power(correlation: float, n_prototypes: int) -> float:

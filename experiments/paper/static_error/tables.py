@@ -128,7 +128,7 @@ def _possible_sizes() -> dict[str, tuple[int, int]]:
 def common_sizes() -> tuple[int, int]:
     """Return the least and the greatest sample size that fits all printed tests."""
     ranges = _possible_sizes().values()
-    return max(first for first, _ in ranges), min(last for _, last in ranges)
+    return max(start for start, _ in ranges), min(end for _, end in ranges)
 
 
 def sizes_table() -> Table:
@@ -232,11 +232,11 @@ def statistic_table(drawn: StaticErrorSample) -> Table:
 def reading_table(drawn: StaticErrorSample) -> Table:
     """Show every statistic under the other readings of Eqs. (1) and (2)."""
     readings = READINGS[1:]
-    found = {r: sample_statistics(r.sample(ASSUMED_ANGLE, drawn)) for r in readings}
+    statistics = {r: sample_statistics(r.sample(ASSUMED_ANGLE, drawn)) for r in readings}
     ranges = {r: angle_ranges(r, drawn, PRINTED) for r in readings}
     rows = tuple(
-        (name, *(c for r in readings for c in (found[r][name].mean(), ranges[r][name].exact)))
-        for name in found[readings[0]]
+        (name, *(c for r in readings for c in (statistics[r][name].mean(), ranges[r][name].exact)))
+        for name in statistics[readings[0]]
     )
     columns = [Column("statistic of theta_s")]
     for reading in readings:
@@ -285,11 +285,11 @@ def total_picture(drawn: StaticErrorSample) -> Picture:
     """Show the distribution of theta_s under several statistics."""
     figure, axes = grid(1, 1, width=7.5, height=4.0)
     axis = axes[0, 0]
-    found = sample_statistics(READINGS[0].sample(ASSUMED_ANGLE, drawn))
-    shown = [name for name in found if name.startswith("peak-to-peak")]
+    statistics = sample_statistics(READINGS[0].sample(ASSUMED_ANGLE, drawn))
+    shown = [name for name in statistics if name.startswith("peak-to-peak")]
     shown.append("sum of the order amplitudes, with order 404")
     for name, colour in zip(shown, COLOURS, strict=True):
-        _density(axis, found[name], colour, f"{name}, mean {found[name].mean():.1f}")
+        _density(axis, statistics[name], colour, f"{name}, mean {statistics[name].mean():.1f}")
     axis.axvline(PRINTED, color="black", linewidth=1, linestyle="--", label=f"Table 4: {PRINTED}")
     for number, prototype in TABLE_6.items():
         label = "prototypes 1-5 of Table 6" if number == 1 else None
@@ -337,12 +337,16 @@ def _statistic_findings(
     )
 
 
-def _holds(found: AngleRange, angle: float) -> bool:
-    return found.low is not None and found.high is not None and found.low <= angle <= found.high
+def _holds(interval: AngleRange, angle: float) -> bool:
+    return (
+        interval.low is not None
+        and interval.high is not None
+        and interval.low <= angle <= interval.high
+    )
 
 
-def _cells(found: AngleRange) -> tuple[Cell, ...]:
-    return found.exact, found.low, found.high
+def _cells(interval: AngleRange) -> tuple[Cell, ...]:
+    return interval.exact, interval.low, interval.high
 
 
 def _angle_columns() -> tuple[Column, ...]:

@@ -118,12 +118,12 @@ class Case:
 def all_cases(root: int = SCORING_SEED) -> list[Case]:
     """Return all cases of a root seed, in the order in which they are run."""
     counts: dict[str, int] = {}
-    found = []
+    cases = []
     for kind in BLOCK * BLOCKS:
         number = counts.get(kind, 0)
         counts[kind] = number + 1
-        found.append(Case(kind, number, root))
-    return found
+        cases.append(Case(kind, number, root))
+    return cases
 
 
 def _several(rng: np.random.Generator, count: int) -> tuple[Drawn, ...]:

@@ -179,16 +179,16 @@ def of_the_first_page(counts: Counts) -> str:
 
 def found(counts: Counts, *, intervals: bool = True) -> str:
     """Say it beginning in lower case, with exact 95 % intervals on request."""
-    wrong, single, both = (
+    wrong, single, pair = (
         rate(counts.plain_wrong, counts.plain),
         rate(counts.single_right, counts.single),
         rate(counts.pair_both, counts.pair),
     )
-    ends = [f" ({in_percent(rate_of)})" if intervals else "" for rate_of in (wrong, single, both)]
+    ends = [f" ({in_percent(rate_of)})" if intervals else "" for rate_of in (wrong, single, pair)]
     return (
         f"in blind tests against an independent simulator, {counts.plain_wrong} of {counts.plain} "
         f"unqualified answers were wrong{ends[0]}; {counts.single_right} of {counts.single} single "
-        f"effects{ends[1]} and {100.0 * both.value:.0f} % of pairs{ends[2]} were identified"
+        f"effects{ends[1]} and {100.0 * pair.value:.0f} % of pairs{ends[2]} were identified"
     )
 
 

@@ -208,9 +208,9 @@ def truly_moved(analysis: DriveFinding, twin: Campaign) -> Flags:
     The twin is the same run without them: it differs by nothing else, not even by its noise, but
     for the rounding of the encoders, a hundredth of that noise's variance.
     """
-    kept = analysis.data.features
+    features = analysis.data.features
     moved: NDArray[np.float64] = cell_chi_square(
-        analysis.data, kept.values - _features(twin, kept).values
+        analysis.data, features.values - _features(twin, features).values
     )
     return moved > cell_degrees_of_freedom(analysis.data)
 
@@ -224,9 +224,9 @@ def location_scores(moved: Flags, flagged: Flags) -> Scores:
     }
 
 
-def twin_fit(twin: Campaign, kept: Features) -> Fit:
+def twin_fit(twin: Campaign, features: Features) -> Fit:
     """Fit the base to a campaign without the effect, with the records and orders of ``kept``."""
-    return fit(training_data(twin, _features(twin, kept)))
+    return fit(training_data(twin, _features(twin, features)))
 
 
 def bias_scores(verdict: Verdict, twin: Fit) -> Scores:
@@ -265,11 +265,11 @@ def gap_scores(proof: Proof) -> Scores:
     return scores
 
 
-def _features(campaign: Campaign, kept: Features) -> Features:
+def _features(campaign: Campaign, features: Features) -> Features:
     """Return the features of a campaign in the records and at the orders of ``kept``."""
-    names = {record.name for record in kept.records}
+    names = {record.name for record in features.records}
     records = [record for record in campaign.train if record.name in names]
-    return measure(campaign, records, kept.orders.tolist())
+    return measure(campaign, records, features.orders.tolist())
 
 
 def _root_mean_square(values: NDArray[np.float64]) -> float:

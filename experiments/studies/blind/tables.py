@@ -113,8 +113,8 @@ def status_table(outcomes: Sequence[Outcome]) -> Table:
         flags = ("right_answer", "right", "wrong_confident", "wrong_partial")
         scores = [sum(getattr(outcome, flag) for outcome in chosen) for flag in flags]
         partly = sum(outcome.status == "partial" and outcome.true_names for outcome in chosen)
-        both = sum(outcome.status == "partial" and outcome.two_named for outcome in chosen)
-        rows.append((words, len(chosen), *counts, *scores, partly, both))
+        pairs = sum(outcome.status == "partial" and outcome.two_named for outcome in chosen)
+        rows.append((words, len(chosen), *counts, *scores, partly, pairs))
     columns = (
         Column("hidden"),
         Column("cases"),
@@ -211,8 +211,10 @@ def tools_table(outcomes: Sequence[Outcome]) -> Table:
             answers = [outcome.answers.get(tool, "error") == (expected or outcome.case.truth)
                        for outcome in chosen]  # fmt: skip
             rates[_plain(tool)] = share(answers)
-        for tool, found in rates.items():
-            rows.append((KINDS[kind], tool, found.n, found.value, found.low, found.high))
+        for tool, estimate in rates.items():
+            rows.append(
+                (KINDS[kind], tool, estimate.n, estimate.value, estimate.low, estimate.high)
+            )
         rows.append((KINDS[kind], "chance", None, 1.0 / _ANSWERS, None, None))
     columns = (
         Column("hidden"),

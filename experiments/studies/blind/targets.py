@@ -187,12 +187,12 @@ EDGES = (0.0, 0.5, 0.7, 0.8, 0.9, 0.95, 0.99, 1.0)
 
 def reliability(outcomes: Sequence[Outcome]) -> list[tuple[float, Estimate]]:
     """Return the mean probability said in each group, and the share of what was true."""
-    found = []
+    judged = []
     for _, _, chosen in _groups(outcomes):
         if chosen:
             said = float(np.mean([outcome.probability for outcome in chosen]))
-            found.append((said, share([outcome.true_statement for outcome in chosen])))
-    return found
+            judged.append((said, share([outcome.true_statement for outcome in chosen])))
+    return judged
 
 
 def reliability_table(outcomes: Sequence[Outcome]) -> Table:

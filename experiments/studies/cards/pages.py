@@ -166,17 +166,17 @@ def _markdown(head: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
 
 
 def _of(table: Table, name: str) -> Table:
-    kept = [row for row in table.rows if row[0] == name]
-    return Table(table.name, table.title, table.columns, tuple(kept))
+    rows = [row for row in table.rows if row[0] == name]
+    return Table(table.name, table.title, table.columns, tuple(rows))
 
 
 def _verdicts(numbers: Numbers, name: str) -> str:
-    found = [
+    separated = [
         separation
         for separation in separations(numbers.scores, numbers.hardness)
         if separation.problem == name
     ]
-    return " ".join(map(_verdict, found))
+    return " ".join(map(_verdict, separated))
 
 
 def _verdict(separation: Separation) -> str:

@@ -66,15 +66,15 @@ def separations(scores: Scores, hardness: dict[str, Hardness]) -> list[Separatio
     """Return one entry a problem and budget at which at least two algorithms ran."""
     igd = scores.values[MEASURES.index("igd")]
     chosen = [place for place, name in enumerate(scores.algorithms) if name != RANDOM]
-    found = []
+    separated = []
     for row, problem in enumerate(scores.problems):
         for column, budget in enumerate(scores.budgets):
             ran = [i for i in chosen if np.all(scores.spent[row, i, column] > 0)]
             if len(ran) < 2:
                 continue
             values = igd[row, ran, column][None]
-            found.append(_separation(problem, budget, values, hardness[problem].floor))
-    return found
+            separated.append(_separation(problem, budget, values, hardness[problem].floor))
+    return separated
 
 
 def _separation(problem: str, budget: int, values: np.ndarray, floor: float) -> Separation:
@@ -144,7 +144,7 @@ def hardness_table(numbers: Numbers) -> Table:
 
 def separation_table(numbers: Numbers) -> Table:
     """Return how far the algorithms lie apart, with a sentence on which problems separate them."""
-    found = separations(numbers.scores, numbers.hardness)
+    separated = separations(numbers.scores, numbers.hardness)
     return Table(
         "separation",
         "Which problems separate algorithms",
@@ -158,26 +158,26 @@ def separation_table(numbers: Numbers) -> Table:
             Column("reach the front"),
             Column("separates"),
         ),
-        tuple((*entry, _SAID[entry.separates]) for entry in found),
+        tuple((*entry, _SAID[entry.separates]) for entry in separated),
         note=SEPARATION_NOTE,
-        findings=(summary(found),),
+        findings=(summary(separated),),
     )
 
 
-def summary(found: list[Separation]) -> Finding:
+def summary(separated: list[Separation]) -> Finding:
     """Say which problems separate algorithms at which budgets."""
     counts, parts = [], []
-    for budget in sorted({entry.evaluations for entry in found}):
+    for budget in sorted({entry.evaluations for entry in separated}):
         names = [
-            entry.problem for entry in found if entry.evaluations == budget and entry.separates
+            entry.problem for entry in separated if entry.evaluations == budget and entry.separates
         ]
         counts.append(f"{len(names)} after {budget:,}")
         if names:
             parts.append(f"After {budget:,}: {', '.join(names)}.")
-    largest = max(entry.evaluations for entry in found)
+    largest = max(entry.evaluations for entry in separated)
     last = [
         finding
-        for finding in found
+        for finding in separated
         if finding.evaluations == largest and finding.separates is not None
     ]
     corrected = holm([separation.p for separation in last])

@@ -47,9 +47,9 @@ def dtlz_front(number: int) -> NDArray[np.float64]:
     """Return the front of DTLZ1, 2 or 7 with three objectives, shape (n, 3)."""
     if number == 7:
         one_side = np.linspace(0.0, 1.0, 200)
-        first, second = (grid.ravel() for grid in np.meshgrid(one_side, one_side))
-        bumps = sum(f / 2.0 * (1.0 + np.sin(3.0 * np.pi * f)) for f in (first, second))
-        front = np.column_stack([first, second, 2.0 * (3.0 - bumps)])
+        x, second = (grid.ravel() for grid in np.meshgrid(one_side, one_side))
+        bumps = sum(f / 2.0 * (1.0 + np.sin(3.0 * np.pi * f)) for f in (x, second))
+        front = np.column_stack([x, second, 2.0 * (3.0 - bumps)])
         return front[is_nondominated(front)]
     directions = get_reference_directions("das-dennis", 3, n_partitions=_PARTITIONS)
     if number == 1:
@@ -121,8 +121,8 @@ def follow_welded_beam(problem: Problem, levels: NDArray[np.float64]) -> NDArray
     best, points = (problem.xl + problem.xu) / 2.0, []
     for level in levels:
         starts = [best, *(problem.xl + rng.random((5, problem.n_var)) * width)]
-        found = [_least_cost(problem, level, start) for start in starts]
-        cost, best = min(found, key=lambda entry: entry[0])
+        costs = [_least_cost(problem, level, start) for start in starts]
+        cost, best = min(costs, key=lambda entry: entry[0])
         if not np.isfinite(cost):
             raise ArithmeticError(f"no feasible beam of deflection {level}")
         points.append(problem.evaluate(best, return_values_of=["F"]))

@@ -54,8 +54,8 @@ def in_one_sentence(scores: Scores) -> str:
             first = int(np.argmin(ranks))
             words = f"{NAMES[indicator]} ({ranks[first]:.2f})"
             best.setdefault(scores.algorithms[first], []).append(words)
-        told = ", ".join(f"{name} by {' and '.join(words)}" for name, words in best.items())
-        parts.append(f"after {evaluations:,} evaluations {told}")
+        words_of = ", ".join(f"{name} by {' and '.join(words)}" for name, words in best.items())
+        parts.append(f"after {evaluations:,} evaluations {words_of}")
     return (
         f"Best of {len(scores.algorithms)} algorithms in average rank on the "
         f"{len(scores.rows(False))} held-out problems: {'; '.join(parts)}."
@@ -367,13 +367,13 @@ def subsets_table(scores: Scores) -> Table:
     families = np.array([BENCHMARKS[scores.problems[row]].family for row in scores.rows(False)])
     rows: list[tuple[Cell, ...]] = []
     for subset, left_out in SUBSETS.items():
-        kept = ~np.isin(families, left_out)
-        if not kept.any():
+        chosen = ~np.isin(families, left_out)
+        if not chosen.any():
             continue
         for evaluations in scores.budgets:
-            cells: list[Cell] = [subset, int(kept.sum()), evaluations]
+            cells: list[Cell] = [subset, int(chosen.sum()), evaluations]
             for indicator in ("igd", "hypervolume"):
-                values = median_values(scores, indicator, evaluations, tuning=False)[kept]
+                values = median_values(scores, indicator, evaluations, tuning=False)[chosen]
                 cells += _standing(scores.algorithms, values, indicator)
             rows.append(tuple(cells))
     return Table(

@@ -72,9 +72,9 @@ class FrontSearch:
         # SLSQP asks for value and slope of objective and constraint at the same point in turn.
         key = cube.tobytes()
         if key != self._last[0]:
-            asked = ["F", "dF", "G", "dG"] if self._limits else ["F", "dF"]
+            names = ["F", "dF", "G", "dG"] if self._limits else ["F", "dF"]
             values, slopes, *limits = self._problem.evaluate(
-                self.designs(cube), return_values_of=asked
+                self.designs(cube), return_values_of=names
             )
             scaled = [values / self._scale, slopes * self._width / self._scale[:, None]]
             if limits:
@@ -119,14 +119,14 @@ class FrontSearch:
             return float(values[1]), slopes[1]
 
         def merit(cube: NDArray[np.float64]) -> float:
-            first, last = self._evaluate(cube)[0]
-            above = max(first - level / self._scale[0], 0.0)
-            return float(last + 1e3 * (above + self._excess(cube)))
+            lowest, highest = self._evaluate(cube)[0]
+            above = max(lowest - level / self._scale[0], 0.0)
+            return float(highest + 1e3 * (above + self._excess(cube)))
 
         rough = [self._minimise(second, start, _ROUGH, *limits) for start in starts]
         rough.sort(key=merit)
-        kept = rough[: max(1, len(rough) // 2)]
-        ended = [self._minimise(second, x, _FINE, *limits) for x in kept]
+        better = rough[: max(1, len(rough) // 2)]
+        ended = [self._minimise(second, x, _FINE, *limits) for x in better]
         best = min(ended, key=merit)
         flat = [end for end in _ends(best) if abs(merit(end) - merit(best)) < _FLAT]
         ended += [self._minimise(second, x, _FINE, *limits) for x in flat]
@@ -159,7 +159,7 @@ class FrontSearch:
         chosen: list[NDArray[np.float64]] = []
         for index in order[: 60 * _STARTS]:
             cube = self._cubes[index]
-            if all(np.max(np.abs(cube - other)) > 0.15 for other in chosen):
+            if all(np.max(np.abs(cube - rival)) > 0.15 for rival in chosen):
                 chosen.append(cube)
             if len(chosen) == _STARTS:
                 break
@@ -199,37 +199,37 @@ def find_true_front(
     arc length of the normalised objectives along each piece.
     """
     search = FrontSearch(problem, rng)
-    first, last = search.lowest(0), search.lowest(1)
-    span = last.objectives - first.objectives
-    if np.all(np.abs(span) <= 1e-6 * np.abs(first.objectives)):
-        return first.objectives[None, :], search.designs(first.cube)[None, :]
-    coarse = _sweep(search, first, last)
+    start, end = search.lowest(0), search.lowest(1)
+    span = end.objectives - start.objectives
+    if np.all(np.abs(span) <= 1e-6 * np.abs(start.objectives)):
+        return start.objectives[None, :], search.designs(start.cube)[None, :]
+    coarse = _sweep(search, start, end)
     knots = _refine(search, falling(coarse), span)
     filled = _fill(search, knots, span, n_points)
     front = np.array([solution.objectives for solution in filled])
     return front, search.designs(np.array([solution.cube for solution in filled]))
 
 
-def _sweep(search: FrontSearch, first: Solution, last: Solution) -> list[Solution]:
-    levels = np.linspace(first.objectives[0], last.objectives[0], _LEVELS)
-    best = [first]
+def _sweep(search: FrontSearch, start: Solution, end: Solution) -> list[Solution]:
+    levels = np.linspace(start.objectives[0], end.objectives[0], _LEVELS)
+    best = [start]
     for level in levels[1:]:
-        found = search.below(level, [best[-1].cube, *search.starts(level)])
+        solution = search.below(level, [best[-1].cube, *search.starts(level)])
         carried = best[-1]
-        better = found is not None and found.objectives[1] < carried.objectives[1]
-        best.append(found if found is not None and better else carried)
-    if last.objectives[1] < best[-1].objectives[1]:
-        best[-1] = last
+        better = solution is not None and solution.objectives[1] < carried.objectives[1]
+        best.append(solution if solution is not None and better else carried)
+    if end.objectives[1] < best[-1].objectives[1]:
+        best[-1] = end
     improved = True
     while improved:
         improved = False
         neighbours = [(i, i + 1) for i in range(len(best) - 2, -1, -1)]
         neighbours += [(i + 1, i) for i in range(len(best) - 1)]
         for target, source in neighbours:
-            found = search.below(levels[target], [best[source].cube])
-            gain = best[target].objectives[1] - (found.objectives[1] if found else np.inf)
-            if found is not None and gain > _IMPROVEMENT * abs(best[target].objectives[1]):
-                best[target], improved = found, True
+            solution = search.below(levels[target], [best[source].cube])
+            gain = best[target].objectives[1] - (solution.objectives[1] if solution else np.inf)
+            if solution is not None and gain > _IMPROVEMENT * abs(best[target].objectives[1]):
+                best[target], improved = solution, True
     return best
 
 
@@ -242,8 +242,8 @@ def falling(solutions: list[Solution]) -> list[Solution]:
     return kept
 
 
-def _distance(point: Solution, other: Solution, span: NDArray[np.float64]) -> float:
-    return float(np.hypot(*((other.objectives - point.objectives) / span)))
+def _distance(point: Solution, rival: Solution, span: NDArray[np.float64]) -> float:
+    return float(np.hypot(*((rival.objectives - point.objectives) / span)))
 
 
 def _refine(
@@ -254,7 +254,7 @@ def _refine(
     At a gap the solution stops changing below some level, where its branch ends, and another branch
     undercuts it above: halving then closes in on that level, and both ends are knots.
     """
-    found = list(knots)
+    points = list(knots)
     open_pairs = [(low, low.objectives[0], high) for low, high in pairwise(knots)]
     while open_pairs:
         low, level, high = open_pairs.pop()
@@ -270,16 +270,16 @@ def _refine(
         if between is None or between.objectives[1] >= low.objectives[1] * (1.0 - 1e-12):
             open_pairs.append((low, middle, high))
             continue
-        found.append(between)
+        points.append(between)
         open_pairs += [(low, level, between), (between, middle, high)]
-    return falling(found)
+    return falling(points)
 
 
 def _fill(
     search: FrontSearch, knots: list[Solution], span: NDArray[np.float64], n_points: int
 ) -> list[Solution]:
     """Solve again at levels that are even in arc length along each piece."""
-    steps = [_distance(left, other, span) for left, other in pairwise(knots)]
+    steps = [_distance(lower, upper, span) for lower, upper in pairwise(knots)]
     total = sum(step for step in steps if step <= _GAP)
     filled: list[Solution] = []
     start = 0
@@ -307,7 +307,7 @@ def _along(
         ends = piece[left], piece[right]
         level = (1.0 - share) * ends[0].objectives[0] + share * ends[1].objectives[0]
         between = (1.0 - share) * ends[0].cube + share * ends[1].cube
-        found = search.below(level, [between, ends[0].cube, ends[1].cube])
-        if found is not None:
-            solutions.append(found)
+        solution = search.below(level, [between, ends[0].cube, ends[1].cube])
+        if solution is not None:
+            solutions.append(solution)
     return solutions

@@ -61,8 +61,8 @@ class Terms:
 
     def explained(self, values: Values) -> float:
         """Return R2 of the force for values (k,) of the terms."""
-        left = self.force - self.columns @ values
-        return float(1.0 - left @ left / (self.constant @ self.constant) / self.power)
+        residual = self.force - self.columns @ values
+        return float(1.0 - residual @ residual / (self.constant @ self.constant) / self.power)
 
 
 TERMS: dict[str, Callable[[Values, Values, Values], Values]] = {
@@ -118,12 +118,12 @@ class Answer:
 
 def answers(finding: MechanismFinding) -> list[Answer]:
     """Return the answers of all tools on a mechanism of one coordinate and one input."""
-    found = []
+    given = []
     for tool in (least_squares, sparse_regression, narmax):
         began = time.process_time()
         answer = tool(finding)
-        found.append(Answer(*answer, time.process_time() - began))
-    return found
+        given.append(Answer(*answer, time.process_time() - began))
+    return given
 
 
 Said = tuple[str, str, frozenset[str] | None, float | None, float | None]
@@ -167,9 +167,9 @@ def sparse_regression(finding: MechanismFinding) -> Said:
     least = 1.0 - _AS_GOOD * (1.0 - max(explained))
     near = zip(_THRESHOLDS.tolist(), explained, strict=True)
     values = fitted(max(threshold for threshold, share in near if share >= least), whole)
-    kept = [name for name, value in zip(names, values, strict=True) if value != 0.0]
+    selected = [name for name, value in zip(names, values, strict=True) if value != 0.0]
     believed = {"linear_stiffness"} if _sprung(finding) else set()
-    named = frozenset(MEANS[name] for name in kept if name in MEANS) - believed
+    named = frozenset(MEANS[name] for name in selected if name in MEANS) - believed
     of_force = terms_of(finding, "held_out", names).explained(values)
     return "pysindy", _in_words(names, values), named, of_force, None
 
@@ -257,7 +257,7 @@ def terms_of(
     part : (float, float)
         First and last share of each record.
     """
-    found = []
+    values = []
     for record in finding.records:
         if record.role != role:
             continue
@@ -269,16 +269,16 @@ def terms_of(
         columns = [TERMS[name](*state) for name in names]
         signals = np.column_stack([*columns, force[rows], np.ones(last - first)])
         bins = int(2.0 * (last - first) * record.step * finding.cutoff) + 1
-        found.append(dct(signals, type=2, norm="ortho", axis=0)[:bins])
-    together = np.concatenate(found)
+        values.append(dct(signals, type=2, norm="ortho", axis=0)[:bins])
+    together = np.concatenate(values)
     return Terms(together[:, :-2], together[:, -2], together[:, -1])
 
 
 def _determination(measured: Values, predicted: Values) -> float:
     """Return R2; minus infinity where a model diverges."""
     with np.errstate(all="ignore"):
-        left = float(np.mean((measured - predicted) ** 2))
-    return 1.0 - left / float(np.var(measured)) if np.isfinite(left) else -np.inf
+        residual = float(np.mean((measured - predicted) ** 2))
+    return 1.0 - residual / float(np.var(measured)) if np.isfinite(residual) else -np.inf
 
 
 def _in_words(names: Sequence[str], values: Values) -> str:

@@ -81,8 +81,8 @@ def determinations(machine: Study) -> list[str]:
     if not gaps:
         return ["", ""]
     power = terms_of(finding, "held_out", ()).power
-    left = float(np.mean([gap.after**2 for gap in gaps]))
-    return [f"{1.0 - left / power:.5f}", f"{explained(machine)[1]:.5f}"]
+    residual = float(np.mean([gap.after**2 for gap in gaps]))
+    return [f"{1.0 - residual / power:.5f}", f"{explained(machine)[1]:.5f}"]
 
 
 def explained(machine: Study) -> tuple[float, float]:
@@ -91,11 +91,13 @@ def explained(machine: Study) -> tuple[float, float]:
     if not gaps:
         return np.nan, np.nan
     power = np.concatenate([gap.measured - gap.measured.mean() for gap in gaps])
-    left = (
+    residuals = (
         np.concatenate([gap.measured - getattr(gap, side) for gap in gaps])
         for side in ("predicted_before", "predicted_after")
     )
-    before, after = (1.0 - float(np.mean(residual**2) / np.mean(power**2)) for residual in left)
+    before, after = (
+        1.0 - float(np.mean(residual**2) / np.mean(power**2)) for residual in residuals
+    )
     return before, after
 
 
@@ -112,11 +114,11 @@ def pooled(machine: Study, kind: str, side: int) -> float | None:
 
 def farthest(rig: KnownRig, machine: Study) -> float | None:
     """Return the largest deviation from a known value or from the curve of friction, in %."""
-    found = fitted_values(machine)
+    fitted = fitted_values(machine)
     off = [
-        abs(found[name.replace("_", " ")]["value"] / value - 1.0)
+        abs(fitted[name.replace("_", " ")]["value"] / value - 1.0)
         for name, value in rig.values
-        if name.replace("_", " ") in found
+        if name.replace("_", " ") in fitted
     ]
     if rig.friction is not None:
         speed = _speeds(machine)
@@ -240,26 +242,26 @@ def run(context: Context) -> Result:
     if context.full and not MEASURED.is_dir():
         sentence = f"Skipped: there are no measurements in {MEASURED}."
         return Result("Verdicts on real machines", context.command(NAME), sentence)
-    found = _examined(context) if context.full else _committed()
-    order = [FALLS_SHORT.index(row[1]) for row in found[0]]
-    first = [row for _, row in sorted(zip(order, found[0], strict=True), key=lambda pair: pair[0])]
+    tables = _examined(context) if context.full else _committed()
+    order = [FALLS_SHORT.index(row[1]) for row in tables[0]]
+    rows = [row for _, row in sorted(zip(order, tables[0], strict=True), key=lambda pair: pair[0])]
     return Result(
         title="Verdicts on real machines",
         command=context.command(NAME),
-        answer=_in_one_sentence(first),
-        paragraphs=(*stored_outcome(context, NAME), *shortfalls(first), SETTING),
+        answer=_in_one_sentence(rows),
+        paragraphs=(*stored_outcome(context, NAME), *shortfalls(rows), SETTING),
         tables=(
             Table(
                 "verdicts",
                 "Verdicts",
                 VERDICTS,
-                _cells([[*row[:2], STATUSES[row[2]], *row[3:]] for row in first]),
+                _cells([[*row[:2], STATUSES[row[2]], *row[3:]] for row in rows]),
                 note=NOTE,
-                findings=_findings(first),
+                findings=_findings(rows),
             ),
             allowances_table(),
-            Table("tools", "Beside other tools", TOOLS, _cells(found[1]), note=TOOLS_NOTE),
-            cpu_table(found[2]),
+            Table("tools", "Beside other tools", TOOLS, _cells(tables[1]), note=TOOLS_NOTE),
+            cpu_table(tables[2]),
         ),
     )
 
@@ -304,20 +306,20 @@ def verdict_row(rig: KnownRig, machine: Study) -> list[str]:
     numbers = [off, order, rig.order, *rms, min(extents, default=None)]
     shown = ["" if number is None else f"{number:.4g}" for number in numbers]
     by_simulation = [f"{value:.5f}" for value in explained(machine)]
-    told = rig.name, judgement, machine.status, words, rig.answer
-    return [*told, *shown, *by_simulation, *torsion_errors(machine)]
+    words_of = rig.name, judgement, machine.status, words, rig.answer
+    return [*words_of, *shown, *by_simulation, *torsion_errors(machine)]
 
 
 def shortfalls(rows: Sequence[Sequence[str]]) -> tuple[str, ...]:
     """Return what falls short, in sentences, the worst first."""
     short = [row for row in rows if row[1] not in (RIGHT, UNKNOWN)]
-    told = [f"{row[0]} ({row[1]}): {row[3]}, where {row[4]} is known" for row in short]
+    sentences = [f"{row[0]} ({row[1]}): {row[3]}, where {row[4]} is known" for row in short]
     right = [row for row in rows if row[1] == RIGHT]
     known = sum(row[1] != UNKNOWN for row in rows)
     helped = [f"{row[0]} ({_beside(row)})" for row in right if _beside(row)]
     extra = f", with a further effect that is allowed there: {', '.join(helped)}" if helped else ""
     count = f"Right: {len(right)} of {known} whose answer is known{extra}."
-    return (f"What falls short. {'; '.join(told)}. {count}",) if told else (count,)
+    return (f"What falls short. {'; '.join(sentences)}. {count}",) if sentences else (count,)
 
 
 def _beside(row: Sequence[str]) -> str:
@@ -362,15 +364,15 @@ def _any_of(effects: frozenset[str]) -> str:
 def _in_one_sentence(rows: Sequence[Sequence[str]]) -> str:
     """Count the judgements, those that fall short first."""
     counts = [(judgement, sum(row[1] == judgement for row in rows)) for judgement in FALLS_SHORT]
-    told = ", ".join(
+    counted = ", ".join(
         f"{count} with {word}" if word == UNKNOWN else f"{count} {word}"
         for word, count in counts
         if count
     )
     helped = sum(row[1] == RIGHT and bool(_beside(row)) for row in rows)
-    told += f" ({helped} of them with a further effect that is allowed)" if helped else ""
+    counted += f" ({helped} of them with a further effect that is allowed)" if helped else ""
     none = "" if counts[0][1] else f", none {CONFIDENT}"
-    return f"Verdicts on {len(rows)} machines that others measured: {told}{none}."
+    return f"Verdicts on {len(rows)} machines that others measured: {counted}{none}."
 
 
 def _said(rig: KnownRig, machine: Study) -> tuple[str, str]:

@@ -54,8 +54,8 @@ def study(name: str, folder: str) -> Study | None:
     if joint is None:
         finding = examine_mechanism(rig.mechanism, *believed)
         return Study(rig, finding, prove_measured(finding))
-    both = examine_joint(joint, *believed)
-    return Study(torques_of(rig), both.torque, prove_measured(both.torque), both)
+    halves = examine_joint(joint, *believed)
+    return Study(torques_of(rig), halves.torque, prove_measured(halves.torque), halves)
 
 
 def torques_of(rig: MeasuredMechanism) -> MeasuredMechanism:
@@ -69,8 +69,8 @@ def torques_of(rig: MeasuredMechanism) -> MeasuredMechanism:
 
 def fitted_values(machine: Study) -> dict[str, Any]:
     """Return values with intervals by parameter, those of effects with the effect's name."""
-    found = dict(quantities(machine.finding))
+    values = dict(quantities(machine.finding))
     for effect in effects(machine.finding):
         for name, value in effect["parameters"].items():
-            found[f"{effect['name'].replace('_', ' ')}: {name.replace('_', ' ')}"] = value
-    return found
+            values[f"{effect['name'].replace('_', ' ')}: {name.replace('_', ' ')}"] = value
+    return values

@@ -65,17 +65,17 @@ def run(context: Context) -> Result:
         sentence = f"Skipped: there are no campaigns in {RIGS}."
         return Result("Verdicts on sealed rigs", context.command(NAME), sentence)
     if context.full:
-        found, seconds = _analysed(context)
+        rows, seconds = _analysed(context)
     else:
-        found, seconds = (_committed(name) for name in (f"{NAME}.csv", f"{NAME}_seconds.csv"))
+        rows, seconds = (_committed(name) for name in (f"{NAME}.csv", f"{NAME}_seconds.csv"))
     return Result(
         title="Verdicts on sealed rigs",
         command=context.command(NAME),
-        answer=_counted([row[1] for row in found]),
+        answer=_counted([row[1] for row in rows]),
         paragraphs=(*stored_outcome(context, NAME), SETTING),
         tables=(
             Table(
-                "verdicts", "What is said to be missing", COLUMNS, _cells(_told(found)), note=NOTE
+                "verdicts", "What is said to be missing", COLUMNS, _cells(_told(rows)), note=NOTE
             ),
             Table("seconds", "CPU time", SECONDS, _cells(seconds), wall_times=True),
         ),
@@ -85,8 +85,8 @@ def run(context: Context) -> Result:
 def _counted(statuses: Sequence[str]) -> str:
     """Say how many rigs end with each status."""
     counts = Counter(statuses).most_common()
-    told = ", ".join(f"{SHOWN[status]} in {n}" for status, n in counts)
-    return f"Verdicts on {len(statuses)} rigs: {told}."
+    counted = ", ".join(f"{SHOWN[status]} in {n}" for status, n in counts)
+    return f"Verdicts on {len(statuses)} rigs: {counted}."
 
 
 def verdict_row(name: str, analysis: DriveAnalysis) -> list[str]:
@@ -113,18 +113,18 @@ def _labels(candidates: Sequence[Candidate]) -> str:
 
 
 def _analysed(context: Context) -> tuple[Rows, Rows]:
-    found, seconds = [], []
+    rows, seconds = [], []
     for folder in tqdm(sorted(RIGS.glob("rig-*")), desc="sealed rigs", leave=False):
         started = time.process_time()
         analysis = analyse(read_campaign(folder))
         judged = time.process_time()
-        found.append(verdict_row(folder.name, analysis))
+        rows.append(verdict_row(folder.name, analysis))
         ended = time.process_time()
         seconds.append([folder.name, f"{judged - started:.3g}", f"{ended - judged:.3g}"])
-    texts = table_with_origin(_headings(COLUMNS), found), csv_text(_headings(SECONDS), seconds)
+    texts = table_with_origin(_headings(COLUMNS), rows), csv_text(_headings(SECONDS), seconds)
     write_atomically(context.out / NAME / f"{NAME}.csv", texts[0].encode())
     write_atomically(context.out / TIMES / NAME / f"{NAME}_seconds.csv", texts[1].encode())
-    return found, seconds
+    return rows, seconds
 
 
 def _headings(columns: Sequence[Column]) -> list[str]:

@@ -71,8 +71,8 @@ def links() -> Iterator[bool]:
         (folder / ".out.in-use").symlink_to(thesis)
         command = ["-m", "pymoo_hdte.cli", "simulate", "hs_20_100", "--out", str(folder / "out")]
         done = _run(command)
-        told = done.returncode == 2 and "Traceback" not in done.stderr
-        yield told and thesis.read_text() == "years of work" and not (folder / "out").exists()
+        refused = done.returncode == 2 and "Traceback" not in done.stderr
+        yield refused and thesis.read_text() == "years of work" and not (folder / "out").exists()
 
 
 def encodings() -> Iterator[bool]:
@@ -166,12 +166,12 @@ def _matlab_bomb() -> bytes:
     return b"MATLAB 5.0 MAT-file".ljust(124) + b"\0\1IM" + tag + packed
 
 
-def _stating(path: Path, shape: bytes, other: bytes) -> None:
+def _stating(path: Path, shape: bytes, second: bytes) -> None:
     """Let the array of an npz file state another shape in its head, which has room for it."""
     with zipfile.ZipFile(path) as packed:
         content = packed.read("q.npy")
-    spare = b" " * (len(other) - len(shape))
-    content = content.replace(shape + b", }" + spare, other + b", }", 1)
+    spare = b" " * (len(second) - len(shape))
+    content = content.replace(shape + b", }" + spare, second + b", }", 1)
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as packed:
         packed.writestr("q.npy", content)
 
@@ -191,13 +191,13 @@ def _refused(path: Path) -> bool:
         command = [sys.executable, "-c", f"from pathlib import Path\n{read}"]
         process = subprocess.Popen(command, cwd=ROOT, stderr=file)
         _, status, usage = os.wait4(process.pid, 0)
-    told = f"InvalidInput: {path.name}" in errors.read_text(encoding="utf-8") or (
+    refused = f"InvalidInput: {path.name}" in errors.read_text(encoding="utf-8") or (
         path.suffix == ".toml" and "InvalidInput" in errors.read_text(encoding="utf-8")
     )
     ended = os.waitstatus_to_exitcode(status) == 1
     # Linux counts kB.
     little = 1024 * usage.ru_maxrss < MOST_MEMORY and usage.ru_utime < MOST_SECONDS
-    return told and ended and little
+    return refused and ended and little
 
 
 def _run(arguments: list[str]) -> subprocess.CompletedProcess[str]:

@@ -167,9 +167,9 @@ def _read_no_load(folder: Path) -> None:
 
 
 def _read_errors(folder: Path) -> None:
-    found = error_statistics(*read_error_measurements(folder / "errors.csv"))
-    _finite("a mean", found.values)
-    found.advice()
+    statistics = error_statistics(*read_error_measurements(folder / "errors.csv"))
+    _finite("a mean", statistics.values)
+    statistics.advice()
 
 
 def _read_surrogate(folder: Path) -> None:

@@ -130,8 +130,8 @@ class Outcome:
 
     def functions(self) -> list[str]:
         """Names of the functions, in the order of `FUNCTIONS`."""
-        found = {function for function, _, _ in self.curves}
-        return [function.name for function in FUNCTIONS if function.name in found]
+        names = {function for function, _, _ in self.curves}
+        return [function.name for function in FUNCTIONS if function.name in names]
 
     def needed(self, function: str, method: str, column: int = 1) -> int | None:
         """Return the least runs that a method needs by its best way, None if above the budget."""
@@ -171,10 +171,12 @@ def outcome_for(context: Context) -> Outcome:
         for method in METHODS
         if method != OURS
     ]
-    found = gathered(grown, dict(zip(rivals, context.campaign.run(rivals, "rivals"), strict=True)))
-    for name, text in ((NAME, curves_text(found)), (STOPS, stops_text(found))):
+    outcome = gathered(
+        grown, dict(zip(rivals, context.campaign.run(rivals, "rivals"), strict=True))
+    )
+    for name, text in ((NAME, curves_text(outcome)), (STOPS, stops_text(outcome))):
         write_atomically(context.out / NAME / f"{name}.csv", text.encode())
-    return found
+    return outcome
 
 
 def gathered(grown: dict[Grown, Run], rivals: dict[Curve, Run]) -> Outcome:

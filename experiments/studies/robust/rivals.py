@@ -127,10 +127,10 @@ def openturns_trace(task: Task, most: int) -> Iterator[Step]:
                     ot.LeastSquaresStrategy(select),
                 )
                 chaos.run()
-                found = chaos.getResult()
-                error = float(np.min(np.array(found.getErrorHistory())))
+                result = chaos.getResult()
+                error = float(np.min(np.array(result.getErrorHistory())))
                 if error < least:
-                    best, least = found.getMetaModel(), error
+                    best, least = result.getMetaModel(), error
         if best is None:
             continue
         judged = task.judged[0].reshape(-1, len(laws))
@@ -173,8 +173,8 @@ def _law(task: Task) -> Any:
 
 def _errors(task: Task, expansion: Any) -> tuple[float, float]:
     points, true = task.judged
-    found = expansion(*points.reshape(-1, len(task.names)).T)
-    return task.errors(np.broadcast_to(found, (true.size,)).reshape(true.shape))
+    values = expansion(*points.reshape(-1, len(task.names)).T)
+    return task.errors(np.broadcast_to(values, (true.size,)).reshape(true.shape))
 
 
 def _projected(

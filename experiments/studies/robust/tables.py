@@ -86,17 +86,17 @@ def stops_table(outcome: Outcome) -> Table:
     """Say where ours stops by itself, with the worst of the seeds."""
     rows: list[tuple[Cell, ...]] = []
     for name in outcome.functions():
-        found = [outcome.stops[name, seed] for seed in SEEDS if (name, seed) in outcome.stops]
-        if not found:
+        stops = [outcome.stops[name, seed] for seed in SEEDS if (name, seed) in outcome.stops]
+        if not stops:
             continue
-        stopped = [finding for finding in found if np.isfinite(finding["runs"])]
+        stopped = [finding for finding in stops if np.isfinite(finding["runs"])]
         rows.append(
             (
                 name,
-                len(found),
+                len(stops),
                 int(np.median([stop["runs"] for stop in stopped])) if stopped else None,
-                len(found) - len(stopped),
-                *(100.0 * max(finding[key] for finding in found) for key in _ERRORS),
+                len(stops) - len(stopped),
+                *(100.0 * max(finding[key] for finding in stops) for key in _ERRORS),
                 *(
                     100.0 * min(stop[key] for stop in stopped) if stopped else None
                     for key in _COVERED

@@ -74,8 +74,8 @@ def reached_shares(outcome: Outcome, dimension: int, evaluations: int) -> list[f
 
 def reached(outcome: Outcome, dimension: int, evaluations: int) -> float | None:
     """Return the mean of `reached_shares`; None if it was not run."""
-    found = reached_shares(outcome, dimension, evaluations)
-    return float(np.mean(found)) if found else None
+    shares = reached_shares(outcome, dimension, evaluations)
+    return float(np.mean(shares)) if shares else None
 
 
 class Duel(NamedTuple):
@@ -99,19 +99,19 @@ def duels(
 
     Ours and a rival that move alike whatever their budget may have been told more.
     """
-    found = []
+    duels_of = []
     for rival in rivals:
         pairs = _pairs(outcome, control, rival, evaluations)
         if rival != control and len(pairs):
-            found.append((rival, pairs))
+            duels_of.append((rival, pairs))
     # Each rival has problems of its own: its differences are padded with problems without any.
-    most = max((len(pairs) for _, pairs in found), default=0)
-    values = np.zeros((most, 1 + len(found)))
-    for column, (_, pairs) in enumerate(found, start=1):
+    most = max((len(pairs) for _, pairs in duels_of), default=0)
+    values = np.zeros((most, 1 + len(duels_of)))
+    for column, (_, pairs) in enumerate(duels_of, start=1):
         values[: len(pairs), column] = pairs[:, 1] - pairs[:, 0]
-    if not found:
+    if not duels_of:
         return []
-    names = [control, *(rival for rival, _ in found)]
+    names = [control, *(rival for rival, _ in duels_of)]
     tests = holm_against(control, names, values, smaller_is_better=False)
     return [
         Duel(
@@ -122,7 +122,7 @@ def duels(
             float(pairs[:, 1].mean()),
             test,
         )
-        for (rival, pairs), test in zip(found, tests, strict=True)
+        for (rival, pairs), test in zip(duels_of, tests, strict=True)
     ]
 
 

@@ -28,8 +28,8 @@ def main() -> None:
             problem = member.make()
             algorithms = CompactSwarm(), NSGA2(pop_size=100)
             runs = [minimize(problem, a, ("n_eval", EVALUATIONS), seed=SEED) for a in algorithms]
-            found = [np.atleast_2d(run.F) for run in runs if run.F is not None]
-            front = front_among(np.concatenate(found))
+            fronts = [np.atleast_2d(run.F) for run in runs if run.F is not None]
+            front = front_among(np.concatenate(fronts))
             ends = zip(front.min(axis=0), front.max(axis=0), strict=True)
             rows += [
                 [member.name, 1 + number, f"{low:.6g}", f"{high:.6g}"]

@@ -65,9 +65,9 @@ class Outcome:
             if isinstance(job, BbobRun):
                 self.bbob[job] = {int(mark): rounded(share, DIGITS) for mark, share in run.values}
                 continue
-            for budget, *rest in run.values.tolist():
+            for budget, *numbers in run.values.tolist():
                 key = job.problem, job.algorithm, int(budget), job.seed
-                self.suites[key] = tuple(rounded(number, DIGITS) for number in rest)
+                self.suites[key] = tuple(rounded(number, DIGITS) for number in numbers)
 
     def has(self, job: SuiteRun | BbobRun) -> bool:
         """Say whether a job's run is there, at all its budgets."""

@@ -45,13 +45,13 @@ class PartTest(NamedTuple):
 
 def part_tests(outcome: Outcome) -> list[PartTest]:
     """Return the tests of all parts left out alone; p after Holm over all of them."""
-    found = [
+    tests = [
         test for part in ALONE for test in (*on_bbob(outcome, part), *_on_suites(outcome, part))
     ]
-    corrected = holm([finding.test.p for finding in found])
+    corrected = holm([finding.test.p for finding in tests])
     return [
         test._replace(test=test.test._replace(p=float(p)))
-        for test, p in zip(found, corrected, strict=True)
+        for test, p in zip(tests, corrected, strict=True)
     ]
 
 

@@ -133,10 +133,10 @@ class BbobPart:
         """Return what is stored together or not at all: all functions of an instance."""
         for seed in range(1, self.seeds + 1):
             for dimension in self.dimensions:
-                for told in self.told:
+                for budget in self.told:
                     for instance in self.instances:
                         yield [
-                            BbobRun(function, dimension, instance, self.algorithm, told, seed)
+                            BbobRun(function, dimension, instance, self.algorithm, budget, seed)
                             for function in self.functions
                         ]
 

@@ -77,8 +77,8 @@ class _Whole(CompactSwarm):
         # A callback may have left few particles: not all of them are guests.
         invited = guests(points, min(int(self.INVITED * self.pop_size), len(points) - 1))
         others = np.delete(np.arange(len(points)), invited)
-        kept = survivors(points[others], self.pop_size - len(invited), self._truncation)
-        return np.sort(np.concatenate([invited, others[kept]]))
+        rows = survivors(points[others], self.pop_size - len(invited), self._truncation)
+        return np.sort(np.concatenate([invited, others[rows]]))
 
     def _level(self, swarm: Points) -> float:
         """Return the violation that is tolerated: none once more than half is feasible."""

@@ -59,9 +59,9 @@ def kept_table(outcome: Outcome) -> Table:
         else:
             name, budgets = f"{part.suite}, {part.seeds} seeds", part.budgets
         who = (part.algorithm,) if isinstance(part, BbobPart) else part.algorithms
-        told = ", ".join(f"{budget:,}" for budget in budgets)
+        budgets_of = ", ".join(f"{budget:,}" for budget in budgets)
         algorithms = ", ".join(who) if len(who) < 4 else f"{len(who)} algorithms"
-        rows.append((name, algorithms, told, whole, len(groups)))
+        rows.append((name, algorithms, budgets_of, whole, len(groups)))
     columns = ("part", "algorithms", "evaluations", "kept", "of groups")
     return Table(
         "kept",

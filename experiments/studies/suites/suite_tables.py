@@ -136,7 +136,7 @@ def _ranks_table(outcome: Outcome, suite: str) -> Table:
     constrained = suite in CONSTRAINED
     rows: list[tuple[Cell, ...]] = []
     for name in order:
-        row: list[Cell] = [name, *(found.get(name) for found in by_place.values())]
+        row: list[Cell] = [name, *(entry.get(name) for entry in by_place.values())]
         if constrained:
             row.append("{} of {}".format(*feasible_runs(outcome, suite, budgets[-1], name)))
         rows.append(tuple(row))
@@ -240,10 +240,10 @@ def _ranks_in_short(outcome: Outcome, suite: str, measure: str) -> tuple[str | N
         if budget not in budgets:
             cells.append(None)
             continue
-        found = ranks(outcome, suite, budget, measure)
-        ours = " / ".join(f"{found.pop(name):.2f}" for name in SWARMS if name in found)
-        best = min(found, key=lambda name: found[name])
-        cells.append(f"{ours} ({best} {found[best]:.2f})")
+        by_rank = ranks(outcome, suite, budget, measure)
+        ours = " / ".join(f"{by_rank.pop(name):.2f}" for name in SWARMS if name in by_rank)
+        best = min(by_rank, key=lambda name: by_rank[name])
+        cells.append(f"{ours} ({best} {by_rank[best]:.2f})")
     return tuple(cells)
 
 
@@ -282,24 +282,24 @@ def signs_together(outcome: Outcome, budget: int) -> list[RivalTest]:
     names = entrants(outcome, budget)
     if not names:
         return []
-    found = missing_as_ours(values(outcome, budget, names), names)
-    return signs_against(OURS, names, found, smaller_is_better=False)
+    medians = missing_as_ours(values(outcome, budget, names), names)
+    return signs_against(OURS, names, medians, smaller_is_better=False)
 
 
 def _shares(outcome: Outcome, name: str, budget: int) -> list[float] | None:
     """Return the share on each problem after a budget, None if one was not run."""
     anew = BBOB_PEERS[name].starts_anew
-    found = []
+    shares = []
     for dimension in DIMENSIONS:
         for function in FUNCTIONS:
             for told in (budget,) if anew else (budget, *BUDGETS[::-1]):
                 run = BbobRun(function, dimension, BESIDE_PEERS, name, told)
                 if budget in outcome.bbob.get(run, ()):
-                    found.append(outcome.bbob[run][budget])
+                    shares.append(outcome.bbob[run][budget])
                     break
             else:
                 return None
-    return found
+    return shares
 
 
 def together_table(outcome: Outcome) -> Table:
@@ -307,12 +307,12 @@ def together_table(outcome: Outcome) -> Table:
     rows: list[tuple[Cell, ...]] = []
     for budget in BUDGETS:
         tests = {test.rival: test for test in signs_together(outcome, budget)}
-        found = ranks_together(outcome, budget)
-        for name in sorted(found, key=lambda name: found[name]):
+        by_rank = ranks_together(outcome, budget)
+        for name in sorted(by_rank, key=lambda name: by_rank[name]):
             cells: tuple[Cell, ...] = (None, None, None)
             if name in tests:
                 cells = tests[name].better, tests[name].worse, tests[name].p
-            rows.append((budget, name, found[name], *cells))
+            rows.append((budget, name, by_rank[name], *cells))
     problems = len(DIMENSIONS) * len(FUNCTIONS)
     return Table(
         "together",

@@ -72,9 +72,9 @@ def seen_of(about: Circumstances, effect: Drawn, session: Shown, clean: Shown) -
     return visibility(about, changes, orders, bend)
 
 
-def restricted(about: Circumstances, kept: Sequence[int]) -> Circumstances:
+def restricted(about: Circumstances, conditions: Sequence[int]) -> Circumstances:
     """Return a session with some of its records only."""
-    rows = list(kept)
+    rows = list(conditions)
     return replace(
         about,
         conditions=tuple(about.conditions[row] for row in rows),

@@ -317,8 +317,8 @@ def thermal_drift(rng: Generator, form: int) -> Drawn:
     time, sign = rng.uniform(300.0, 2000.0), float(rng.choice([-1.0, 1.0]))
 
     def build(size: float) -> Hidden:
-        found = {"rate": sign * size / time, "time": time} if form == 0 else {}
-        return Hidden(drift=(Drift(sign * size, time, form),), quantities=found)
+        values = {"rate": sign * size / time, "time": time} if form == 0 else {}
+        return Hidden(drift=(Drift(sign * size, time, form),), quantities=values)
 
     words = ("one time constant", "two time constants", "hyperbola", "diffusion")
     size = rng.uniform(2.0, 10.0) * ARCSEC

@@ -214,8 +214,8 @@ def sweep(machine: Machine, sensors: Sensors) -> Matrix:
 
 def row_times(condition: Condition, rows: int) -> Values:
     """Return the middle times of rows, s, shape (rows,)."""
-    first = 0.5 * (1.0 - 1.0 / condition.averaged)
-    return (np.arange(float(rows)) + first) * (condition.averaged / condition.rate)
+    weight = 0.5 * (1.0 - 1.0 / condition.averaged)
+    return (np.arange(float(rows)) + weight) * (condition.averaged / condition.rate)
 
 
 def averaged_rows(condition: Condition, shown: Matrix) -> Matrix:

@@ -175,7 +175,7 @@ def elastic_torque(
     angle: float,
     speed: float,
     time: float,
-    kept: Values,
+    memory: Values,
     before: Values,
     moved: Values,
 ) -> float:
@@ -191,7 +191,7 @@ def elastic_torque(
             half_width = max(row[1] + row[2] * height * (1.0 - row[6]), 0.0)
             d = beyond_gap(row[5], d - row[2] * height * row[6], half_width)
         elif row[0] == el.CREEP:
-            d -= kept[e]
+            d -= memory[e]
     for e in range(len(plant.rows)):
         row = plant.rows[e]
         kind = row[0]
@@ -205,8 +205,8 @@ def elastic_torque(
         elif kind == el.OVERLOAD:
             x = size - row[2]
             pressed = 0.5 * (x + math.sqrt(x * x + row[3] * row[3]))
-            rest = 0.5 * (-row[2] + math.sqrt(row[2] * row[2] + row[3] * row[3]))
-            further += row[1] * math.copysign(pressed - rest, d)
+            resting = 0.5 * (-row[2] + math.sqrt(row[2] * row[2] + row[3] * row[3]))
+            further += row[1] * math.copysign(pressed - resting, d)
         elif kind == el.SOFT_ROOT:
             further -= row[1] * d / math.sqrt(1.0 + (d / row[2]) ** 2)
         elif kind == el.SOFT_PIECES:
@@ -217,11 +217,11 @@ def elastic_torque(
             reach = 2.0 * row[2] / math.pi
             further -= row[1] * reach * math.atan(d / reach)
         elif kind == el.SLIP:
-            stuck = kept[e] + row[1] * (torsion - before[e])
+            stuck = memory[e] + row[1] * (torsion - before[e])
             moved[e] = min(max(stuck, -row[2]), row[2])
             further += moved[e]
         elif kind == el.BOUC_WEN:
-            moved[e] = bouc_wen(kept[e], (torsion - before[e]) / row[2], row[3], row[4])
+            moved[e] = bouc_wen(memory[e], (torsion - before[e]) / row[2], row[3], row[4])
             further += row[1] * moved[e]
         elif kind == el.STIFFNESS_WAVE:
             factor += row[1] * wave(row[4], row[2] * angle + row[3])[0]
@@ -276,7 +276,7 @@ def torques(
     plant: Plant,
     time: float,
     y: Values,
-    kept: Values,
+    memory: Values,
     before: Values,
     since: float,
     moved: Values,
@@ -296,10 +296,10 @@ def torques(
     value, slope = static_error(plant, angle)
     d = y[0] / plant.ratio - y[1] - value
     rate = y[2] / plant.ratio - y[3] - slope * speed
-    copy_into(moved, kept)
+    copy_into(moved, memory)
     for e in range(len(now)):
         now[e] = d
-    spring = elastic_torque(plant, d, angle, speed, time, kept, before, moved)
+    spring = elastic_torque(plant, d, angle, speed, time, memory, before, moved)
     dashpot = plant.damping * rate
     motor, on_input, on_output, load = plant.motor, 0.0, 0.0, plant.load
     for row in plant.rows:
@@ -311,11 +311,11 @@ def torques(
         row = plant.rows[e]
         kind = row[0]
         if kind == el.CREEP:
-            moved[e] = relaxed(kept[e], row[1] * d, (time - since) / row[2])
+            moved[e] = relaxed(memory[e], row[1] * d, (time - since) / row[2])
         elif kind == el.REACTION:
             aim = slope * (spring if row[2] == 1.0 else mesh)
             if row[3] > 0.0:
-                moved[e] = relaxed(kept[e], aim, (time - since) / row[3])
+                moved[e] = relaxed(memory[e], aim, (time - since) / row[3])
                 aim = moved[e]
             on_input += row[1] * aim
         elif kind == el.BRISTLES:
@@ -323,7 +323,7 @@ def torques(
             now[e] = out_angle if out else angle
             w = out_speed if out else speed
             way = now[e] - before[e]
-            moved[e] = relaxed(kept[e], math.copysign(1.0, way), abs(way) / row[4])
+            moved[e] = relaxed(memory[e], math.copysign(1.0, way), abs(way) / row[4])
             torque = (row[1] + row[2] * decay(row[5], w / row[3])) * moved[e]
             if out:
                 on_output -= torque
@@ -337,7 +337,7 @@ def torques(
             load += plant.load * row[1] * wave(row[4], row[2] * out_angle + row[3])[0]
         elif kind >= el.DRY:
             if kind == el.MESH_FRICTION:
-                moved[e] = relaxed(kept[e], mesh, (time - since) / row[2])
+                moved[e] = relaxed(memory[e], mesh, (time - since) / row[2])
             if row[7] == el.OUTPUT:
                 on_output -= friction_torque(plant, row, out_speed, out_angle, clock, moved[e])
             else:

@@ -59,8 +59,8 @@ def imop_front(number: int) -> Array:
         return _discs(axis)
     if number == 7:
         return _ribbons(axis[::2])
-    first, second = (grid.ravel() for grid in np.meshgrid(axis, axis))
-    points = FRONTS[number](np.zeros_like(first), first, second)
+    x, second = (grid.ravel() for grid in np.meshgrid(axis, axis))
+    points = FRONTS[number](np.zeros_like(x), x, second)
     return points[is_nondominated(points)]
 
 
@@ -77,8 +77,8 @@ def _discs(parameter: Array) -> Array:
 
 def _ribbons(parameter: Array) -> Array:
     """Return the parts of the unit sphere where two objectives differ by no more than 0.1."""
-    first, second = (grid.ravel() for grid in np.meshgrid(parameter, parameter))
-    points = FRONTS[7](np.zeros_like(first), first, second)
+    x, second = (grid.ravel() for grid in np.meshgrid(parameter, parameter))
+    points = FRONTS[7](np.zeros_like(x), x, second)
     return points[np.linalg.norm(points, axis=1) <= 1.0 + 1e-9]
 
 
@@ -87,9 +87,9 @@ def _objectives(number: int, X: Array) -> Array:
     if number <= 4:
         y = X[:, :N_PLACES].mean(axis=1) ** CROWDED
         return FRONTS[number](distance, y, y)
-    first = X[:, 0:N_PLACES:2].mean(axis=1) ** CROWDED
+    position = X[:, 0:N_PLACES:2].mean(axis=1) ** CROWDED
     second = X[:, 1:N_PLACES:2].mean(axis=1) ** SPARSE
-    return FRONTS[number](distance, first, second)
+    return FRONTS[number](distance, position, second)
 
 
 def _steep(exponent: float, g: Array, y: Array, _: Array) -> Array:
