@@ -337,12 +337,8 @@ def _statistic_findings(
     )
 
 
-def _holds(interval: AngleRange, angle: float) -> bool:
-    return (
-        interval.low is not None
-        and interval.high is not None
-        and interval.low <= angle <= interval.high
-    )
+def _holds(arc: AngleRange, angle: float) -> bool:
+    return arc.low is not None and arc.high is not None and arc.low <= angle <= arc.high
 
 
 def _cells(interval: AngleRange) -> tuple[Cell, ...]:
