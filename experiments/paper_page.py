@@ -16,11 +16,10 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from experiments.comparing.runs import AS_PRINTED, FIRST_STEP, VELOCITIES
 from experiments.paper import later_prototypes, published, table2, table5, table8
 from experiments.paper.anytime.data import OF_TABLE_7, Case, Contested, Scores, committed_scores
-from experiments.paper.anytime.leads import RIVALS, totals_of, who_finds
 from experiments.paper.anytime.measures import RETURNED
 from experiments.paper.anytime.moments import COMMON, EXACT, FRESH
 from experiments.paper.anytime.readings import readings
-from experiments.paper.anytime.sentences import closest_sentence
+from experiments.paper.anytime.sentences import EVERY_RIVAL, closest_sentence, totals_of, who_finds
 from experiments.paper.anytime.tables import SCALE, STATED
 from experiments.paper.calibrating import experiment as calibration
 from experiments.paper.calibrating.data import Outcome, read_outcomes
@@ -114,7 +113,7 @@ def values() -> dict[str, Any]:
             moments: who_finds(scores, Contested(MODEL, moments, AS_PRINTED))
             for moments in (EXACT, COMMON, FRESH)
         },
-        "rivals": RIVALS,
+        "rivals": EVERY_RIVAL,
         "laws": {law: totals_of(scores, law) for law in VELOCITIES},
         "n_seeds": len(scores.values[_case(Contested(MODEL, EXACT, AS_PRINTED), OF_TABLE_7[0])]),
         "closest": closest_sentence(readings(scores)),

@@ -13,9 +13,9 @@ from scipy.stats import gaussian_kde, norm, skew
 
 from experiments.comparing.figures import BLUE, GREEN, GREY, ORANGE, grid
 from experiments.comparing.runs import robust_problem
+from experiments.paper.choices import scatter_indices
 from experiments.paper.models import FITTED, models_of
 from experiments.paper.scatter import dte_samples
-from experiments.paper.shares import scatter_indices
 from experiments.published_values import TABLE_8, Moments
 from experiments.runner.registry import Context
 from experiments.runner.result import Column, Finding, Picture, Result, Table, significant

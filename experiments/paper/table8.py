@@ -17,6 +17,7 @@ from experiments.paper.choices import (
     MODEL,
     TRUE_FRONT,
     Choice,
+    design_indices,
     dominating_shares,
     dte_at,
     initial_choices,
@@ -24,7 +25,6 @@ from experiments.paper.choices import (
     preferred_choices,
 )
 from experiments.paper.models import FITTED, models_of
-from experiments.paper.shares import design_indices
 from experiments.published_values import (
     BATCH_MODEL_SECONDS,
     BATCH_SIZE,

@@ -28,12 +28,12 @@ from experiments.paper.anytime.data import (
     scores_for,
 )
 from experiments.paper.anytime.duels import COMPARED, Duel, duels
-from experiments.paper.anytime.leads import leads_table
 from experiments.paper.anytime.readings import Reading, readings
 from experiments.paper.anytime.sentences import (
     SPOKEN_OF,
     advantage_findings,
     first_page,
+    leads_table,
     number_of_designs,
     opening,
     readings_findings,

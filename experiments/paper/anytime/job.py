@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from pymoo.core.problem import Problem
 
 from experiments.comparing.indicators import front_among
-from experiments.comparing.offers import at_budgets
+from experiments.comparing.peers_pymoo import at_budgets
 from experiments.comparing.runs import (
     ALGORITHMS,
     AS_PRINTED,

@@ -8,10 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
-from experiments.paper.calibrating.fitting import Bootstrap, Fit
+from experiments.paper.calibrating.fitting import TRAITS, Bootstrap, Fit
 from experiments.paper.calibrating.ladder import EFFECTS, Candidate, ladder_rungs
 from experiments.paper.calibrating.predictions import PUBLISHED
-from experiments.paper.calibrating.trade_off import TRAITS
 from experiments.runner.campaign import Run
 from experiments.runner.committed import read_rows, table_with_origin
 

@@ -15,6 +15,7 @@ from experiments.paper.calibrating.data import (
     information_criteria,
     largest_gap,
 )
+from experiments.paper.calibrating.fitting import WIDTHS
 from experiments.paper.calibrating.ladder import NARROW, WIDE, ladder_rungs
 from experiments.paper.calibrating.predictions import (
     FITS,
@@ -25,7 +26,6 @@ from experiments.paper.calibrating.predictions import (
     surrogate_moments,
 )
 from experiments.paper.calibrating.rigid import N_PARAMETERS, RigidDrive, fit_rigid, simplest
-from experiments.paper.calibrating.trade_off import WIDTHS
 from experiments.runner.result import Cell, Column, Finding, Table, significant
 from pymoo_hdte.drive import preset
 

@@ -260,8 +260,8 @@ def _findings(fits: Sequence[Fit]) -> list[Finding]:
             f"Fitted as {PRESET} was, each number with its own sampling error, the model of "
             f"{PRESET} has a chi-square of {significant(evaluation.chi_square('independent'), 2)}, "
             f"and of {significant(evaluation.chi_square('common'), 3)} with the covariance; from "
-            f"the balanced to the robust design it changes by {ours[1]:+.3f} and {ours[3]:+.3f} arcsec "
-            f"(paper {paper[1]:+.3f} and {paper[3]:+.3f}).",
+            f"the balanced to the robust design it changes by {ours[1]:+.3f} and {ours[3]:+.3f} "
+            f"arcsec (paper {paper[1]:+.3f} and {paper[3]:+.3f}).",
             fitted=True,
         ),
         _reversal(evaluation),

@@ -14,8 +14,7 @@ from pymoo.util.ref_dirs import get_reference_directions
 
 from experiments.comparing.contestants import CONTESTANTS, Contestant, of_jmetal
 from experiments.comparing.indicators import front_among
-from experiments.comparing.offers import POPULATION, Offer
-from experiments.comparing.peers_pymoo import OWN, PYMOO, run_pymoo
+from experiments.comparing.peers_pymoo import OWN, POPULATION, PYMOO, Offer, run_pymoo
 from experiments.studies.suites.coco import StartBox
 from experiments.studies.suites.reduced import LESS
 from pymoo_hdte.algorithms import CompactSwarm

@@ -10,7 +10,15 @@ from scipy.signal import butter, sosfreqz
 
 from experiments.comparing.runs import robust_problem
 from experiments.paper import fig12, published, table8
-from experiments.paper.choices import BAND, initial_choices, paper_choices
+from experiments.paper.choices import (
+    BAND,
+    design_indices,
+    falls_when_halved,
+    initial_choices,
+    paper_choices,
+    scatter_indices,
+    study_designs,
+)
 from experiments.paper.models import FITTED
 from experiments.paper.prototypes.consistency import Prediction, best_case_table, consistency_table
 from experiments.paper.prototypes.printed_validation import (
@@ -28,12 +36,6 @@ from experiments.paper.prototypes.printed_validation import (
     nearest_assignment,
 )
 from experiments.paper.scatter import exact_moments
-from experiments.paper.shares import (
-    design_indices,
-    falls_when_halved,
-    scatter_indices,
-    study_designs,
-)
 from experiments.paper.table6 import record
 from experiments.paper.table8 import _idle_sweep, deviation_table
 from experiments.published_values import TABLE_6, Moments
@@ -41,16 +43,17 @@ from experiments.runner.campaign import Campaign
 from experiments.runner.registry import Context
 from experiments.runner.store import load, png_bytes, save
 from experiments.studies import dte_map, sensitivity
-from experiments.studies.accuracy_per_run import (
+from experiments.studies.crosscheck import (
     FAMILIES,
     SCREENED,
     TENSOR,
     Trial,
+    chaos,
+    compare,
     fit_grid,
     needed_table,
     rivals,
 )
-from experiments.studies.crosscheck import chaos, compare
 from pymoo_hdte.decision import deviation_degree
 from pymoo_hdte.drive import (
     PARAMETERS,
