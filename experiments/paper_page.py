@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from experiments.comparing.runs import AS_PRINTED, FIRST_STEP, VELOCITIES
 from experiments.paper import later_prototypes, published, table2, table5, table8
@@ -33,6 +32,7 @@ from experiments.published_values import TABLE_5, TABLE_7, TABLE_8, TABLE_9, Mom
 from experiments.runner.committed import committed_file
 from experiments.runner.result import WITHIN_PAPER, significant
 from experiments.runner.store import write_atomically
+from experiments.runner.texts import filled
 from experiments.studies import cost
 from pymoo_hdte.decision import PREFERENCES, WeightedUtopia
 from pymoo_hdte.problems import RobustDTE
@@ -45,15 +45,7 @@ ORDER = 3
 
 def page() -> str:
     """Return the text of the page."""
-    environment = Environment(
-        loader=FileSystemLoader(Path(__file__).parent / "templates"),
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        keep_trailing_newline=True,
-        autoescape=False,
-    )
-    return environment.get_template("paper.md").render(values())
+    return filled("paper.md", **values())
 
 
 def in_three_sentences() -> tuple[str, str, str]:
