@@ -56,7 +56,7 @@ LOST = -10.0
 
 def named(machine: Study) -> list[dict[str, Any]]:
     """Return what a verdict names with its values, ripple beyond the band included."""
-    beyond = (effect for ripple in machine.finding.ripples.found for effect in ripple.as_dicts())
+    beyond = (effect for ripple in machine.finding.ripples.lines for effect in ripple.as_dicts())
     twist = torsion_document(machine.joint)["effects"] if machine.joint else []
     return [*effects(machine.finding), *beyond, *twist]
 

@@ -11,12 +11,11 @@ from pymoo_hdte.discrepancy._report.words import doubts
 from pymoo_hdte.discrepancy._selection.hypothesis import (
     Hypothesis,
     adequate,
+    contradicted_parts,
     explains,
-    unexplained,
 )
 from pymoo_hdte.discrepancy._selection.verdict import Verdict
 from pymoo_hdte.discrepancy._verdicts.drive_finding import DriveFinding
-from pymoo_hdte.discrepancy._verdicts.mechanism_finding import MechanismFinding
 from pymoo_hdte.effects.sentence_blanks import in_words, listed
 
 
@@ -53,13 +52,12 @@ def how_sure(finding: DriveFinding) -> str:
     return " ".join(_evidence(finding, verdict.chosen, share))
 
 
-def how_sure_of_records(finding: MechanismFinding) -> str:
+def how_sure_of_records(verdict: Verdict) -> str:
     """Return how sure the verdict on measured records is, in words.
 
     Without a probability: what a model of a real machine leaves is no noise, so that its evidence
     counts for more than it is worth.
     """
-    verdict = finding.verdict
     chosen = verdict.chosen
     if verdict.status == "adequate":
         return "An effect too small for these records may still be there."
@@ -103,7 +101,7 @@ def _next_best(best: Hypothesis, chosen: Hypothesis, error_orders: Sequence[floa
 
 def _too_little(finding: DriveFinding, nearest: Hypothesis) -> str:
     """Return why the nearest effect is not named."""
-    residual = unexplained(finding.data, finding.verdict.base, nearest.fit)
+    residual = contradicted_parts(finding.data, finding.verdict.base, nearest.fit)
     if residual.any():
         parts = [
             part.replace("_", " ") for part, missed in zip(PARTS, residual, strict=True) if missed

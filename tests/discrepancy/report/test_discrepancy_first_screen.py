@@ -59,8 +59,7 @@ def test_a_gap_that_shrinks_everywhere_is_not_called_worse():
 @pytest.mark.parametrize(
     ("changes", "words", "names"),
     [
-        ({"transmission_error": 9.0}, "worse there: do not use it", ("transmission_error",)),
-        ({"overall": (4.7, 4.9)}, "worse in all channels together: do not use it", ("overall",)),
+        ({"overall": (4.7, 4.9)}, "Worse than before: all channels together", ("overall",)),
         ({"output_torque": 23.0}, "Worse than before: output torque 19.4 before, 23 after",
          ("output_torque",)),
         ({"input_torque": 0.23}, "Worse than before: input torque 0.21 before, 0.23 after",
@@ -73,8 +72,6 @@ def test_what_gets_worse_is_said(changes, words, names):
     found = proof(**changes)
     assert words in gap_sentence(NAMED, found)
     assert found.worse == names
-    # One channel that is worse does not condemn a model that is better.
-    assert ("do not use it" in gap_sentence(NAMED, found)) == ("do not use it" in words)
 
 
 def test_a_gap_of_thousands_has_no_exponent():
@@ -232,7 +229,7 @@ def test_a_line_of_the_error_is_told_by_its_order():
 def test_an_effect_that_explains_less_than_half_is_not_called_near(share, told):
     """A frequency that is fixed was said to be nearest to a friction that explained 0 %."""
     chosen = SimpleNamespace(
-        candidates=(SimpleNamespace(sentence="Dry friction."),),
+        candidates=(SimpleNamespace(sentence="Dry friction.", released=""),),
         listed=True,
         explained=share,
         label="coulomb_friction:input",
@@ -267,7 +264,7 @@ def test_what_all_members_of_a_class_share_is_said_once(sets, words):
 
     def one(name):
         label = f"parameter:{name}" if name == "stiffness" else f"{name}:mesh"
-        return SimpleNamespace(label=label, sentence=f"The {name} is off.")
+        return SimpleNamespace(label=label, sentence=f"The {name} is off.", released="")
 
     def together(names):
         candidates = [one(name) for name in names]
