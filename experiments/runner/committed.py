@@ -54,10 +54,10 @@ def read_origin(path: Path) -> dict[str, Any]:
         If there is no such line.
     """
     with path.open(encoding="utf-8") as file:
-        first = file.readline()
-    if not first.startswith(_ORIGIN):
+        line = file.readline()
+    if not line.startswith(_ORIGIN):
         raise OSError(f"{path} does not say in its first line when and by what it was made")
-    return dict(json.loads(first.removeprefix("#")))
+    return dict(json.loads(line.removeprefix("#")))
 
 
 def stored_outcome(context: Context, experiment: str) -> tuple[str, ...]:

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from pymoo_hdte._io.array_files import READERS, format_of, read_arrays, vector_names
 from pymoo_hdte._io.budget import refused_if_too_large
+from pymoo_hdte._io.csv_table import read_text_table
 from pymoo_hdte._io.layout import CHANNEL_UNITS, COUNTS
 from pymoo_hdte._io.text_header import (
     AROUND,
@@ -27,7 +28,6 @@ from pymoo_hdte._io.text_header import (
     numbered,
 )
 from pymoo_hdte._io.text_lines import FIRST_LINES, line_blocks
-from pymoo_hdte._io.text_table import read_text_table
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.units import usual_spelling
 
