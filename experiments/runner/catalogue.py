@@ -130,18 +130,6 @@ EXPERIMENTS = (
         reads_outcome=True,
     ),
     Experiment(
-        "emps",
-        "studies.measured.emps",
-        "EMPS: friction of a positioning system, measured by others",
-        "Does it find the friction of a positioning system, and are the values those published?",
-    ),
-    Experiment(
-        "kinova",
-        "studies.measured.kinova",
-        "Kinova Gen3: friction and ripple of a robot joint, measured by others",
-        "Does it find friction and ripple of a robot joint?",
-    ),
-    Experiment(
         "peers",
         "studies.contest.peers",
         "The elitist swarm against the best algorithms of other libraries",
@@ -190,10 +178,10 @@ EXPERIMENTS = (
         has_small_version=True,
     ),
     Experiment(
-        "benchmark",
-        "studies.benchmark",
-        "Speed ratios and agreement with integration",
-        "How fast is it, and does it agree with integration in time?",
+        "workers",
+        "studies.workers",
+        "How busy 64 workers are, by generations and asynchronously",
+        "How much time does asynchronous optimisation save?",
         by_default=False,
     ),
     Experiment(

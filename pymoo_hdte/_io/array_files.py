@@ -304,3 +304,118 @@ READERS: dict[str, tuple[tuple[str, ...], Callable[[Path, Sequence[str]], Arrays
     **{form: (endings, _read_ros) for form, endings in ros_logs.ENDINGS.items()},
 }
 """The endings of file names and the reader of each format."""
+
+
+def vector_names(path: Path, form: str) -> list[str]:
+    """Return names of vectors of numbers of one length, of those of which a file has most numbers.
+
+    Parameters
+    ----------
+    path : Path
+    form : str
+        One of `READERS`.
+
+    Raises
+    ------
+    InvalidInput
+        As `read_arrays`.
+    OSError
+        If it cannot be read.
+    """
+    Budget.now().check("bytes", regular_file(path), path.name)
+    if form in ("json_lines", "xlsx"):
+        return _names_of_json_lines(path) if form == "json_lines" else _names_of_xlsx(path)
+    lengths = {"matlab": _lengths_of_matlab, "npz": _lengths_of_npz, "hdf5": _lengths_of_hdf5}
+    by_length: dict[int, list[str]] = {}
+    for name, length in lengths[form](path).items():
+        by_length.setdefault(length, []).append(name)
+    most = max(by_length, key=lambda length: length * len(by_length[length]), default=0)
+    return by_length[most] if most > 1 else []
+
+
+def _length(shape: Sequence[int], kind: str) -> int:
+    """Return the length of an array if it is a vector of numbers, else 0."""
+    length = max(shape, default=0)
+    return length if kind in "iuf" and math.prod(shape) == length else 0
+
+
+def _lengths_of_matlab(path: Path) -> dict[str, int]:
+    with path.open("rb") as file:
+        start = file.read(_USER_BLOCK + len(_HDF5))
+    if start.startswith(_HDF5) or start[_USER_BLOCK:] == _HDF5:
+        return _lengths_of_hdf5(path)
+    return matlab.vector_lengths(path)
+
+
+def _lengths_of_npz(path: Path) -> dict[str, int]:
+    try:
+        names = [name for name in _check_zip(path, lambda _: False) if name.endswith(".npy")]
+        with np.load(path, allow_pickle=False) as file:
+            members = [_member(file, name.removesuffix(".npy")) for name in names]
+            return {member.name: _length(member.shape, member.dtype.kind) for member in members}
+    except _DAMAGED as error:
+        if isinstance(error, OSError) and not path.is_file():
+            raise
+        raise InvalidInput(path.name, str(error)[:200], "an intact npz file of numbers") from None
+
+
+def _lengths_of_hdf5(path: Path) -> dict[str, int]:
+    h5py = _library("h5py", path)
+    lengths: dict[str, int] = {}
+
+    def note(name: str, data: Any) -> None:
+        if isinstance(data, h5py.Dataset):
+            lengths[name] = _length(data.shape or (), data.dtype.kind)
+
+    try:
+        with h5py.File(path, "r") as file:
+            file.visititems(note)
+    except (OSError, ValueError, KeyError, RuntimeError, TypeError) as error:
+        allowed = "an intact HDF5 file, or a MATLAB file saved as v5 or v7"
+        raise InvalidInput(path.name, str(error)[:200], allowed) from None
+    return lengths
+
+
+def _names_of_json_lines(path: Path) -> list[str]:
+    _, lines = next(line_blocks(path, "JSON lines"), (range(0), []))
+    try:
+        row = json.loads(lines[0]) if lines else {}
+    except (ValueError, RecursionError) as error:
+        allowed = "one JSON object in each line"
+        raise InvalidInput(f"{path.name}, line 1", str(error), allowed) from None
+    pairs = row.items() if isinstance(row, dict) else ()
+    return [
+        name
+        for name, value in pairs
+        if isinstance(value, int | float) and not isinstance(value, bool)
+    ]
+
+
+def _names_of_xlsx(path: Path) -> list[str]:
+    openpyxl = _library("openpyxl", path)
+    try:
+        _check_zip(path, lambda _: True)
+        book = openpyxl.load_workbook(path, read_only=True, data_only=True)
+        try:
+            sheet = book.worksheets[0]
+            sheet.reset_dimensions()
+            titles: list[str] = []
+            for row in sheet.iter_rows(values_only=True, max_row=MOST_LINES_ABOVE):
+                numbers = [isinstance(cell, int | float) and cell is not True for cell in row]
+                if titles and any(numbers):
+                    return [
+                        title
+                        for title, number in zip(titles, numbers, strict=False)
+                        if title and number and titles.count(title) == 1
+                    ]
+                words = ["" if cell is None else str(cell).strip() for cell in row]
+                # Units below the titles have no more cells than these.
+                if sum(map(bool, words)) > sum(map(bool, titles)):
+                    titles = words
+        finally:
+            book.close()
+    except _DAMAGED as error:
+        if isinstance(error, OSError) and not path.is_file():
+            raise
+        raise InvalidInput(path.name, str(error)[:200], "an intact xlsx file") from None
+    return []

@@ -10,11 +10,11 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+from pymoo_hdte._io.csv_table import LARGEST
 from pymoo_hdte._io.encodings import ENCODINGS
 from pymoo_hdte._io.fields import Fields
 from pymoo_hdte._io.text_columns import DECIMALS
 from pymoo_hdte._io.text_header import DELIMITERS
-from pymoo_hdte._io.text_table import LARGEST
 from pymoo_hdte.checks import InvalidInput, one_of, real_number
 from pymoo_hdte.units import ORIGINS, UNITS, suggestion, usual_spelling
 

@@ -16,13 +16,13 @@ from scipy.interpolate import make_interp_spline
 
 from pymoo_hdte._io.array_files import READERS, format_of, read_arrays
 from pymoo_hdte._io.budget import refused_if_too_large, regular_file
+from pymoo_hdte._io.csv_table import LARGEST, read_text_table
 from pymoo_hdte._io.even_steps import LONGEST_STEP, even_steps, is_even
 from pymoo_hdte._io.layout import CHANNEL_UNITS, Channel, TableLayout, layout_from_fields
 from pymoo_hdte._io.parts import Part
 from pymoo_hdte._io.text_columns import TextTable, column_label
 from pymoo_hdte._io.text_header import numbered
 from pymoo_hdte._io.text_lines import Seen
-from pymoo_hdte._io.text_table import LARGEST, read_text_table
 from pymoo_hdte.checks import InvalidInput, real_number
 from pymoo_hdte.units import ORIGINS, usual_spelling
 

@@ -66,8 +66,8 @@ class Command:
         Takes the parsed options and `Say`. Heavy modules are imported there, not before, so that
         ``--help`` need not wait for them. It raises `InvalidInput`, `ArithmeticError` (such as
         `UnstableDrive`) or OSError for what a user can mend, and then leaves nothing half-written.
-    out : (str, str)
-        Placeholder of ``--out`` in the help, and what it is.
+    out : (str, str) or None
+        Placeholder of ``--out`` in the help, and what it is; None for a command without output.
     """
 
     name: str
@@ -75,4 +75,4 @@ class Command:
     details: str
     add_arguments: Callable[[argparse.ArgumentParser], None]
     run: Callable[[argparse.Namespace, Say], Outcome]
-    out: tuple[str, str] = ("DIR", "folder for the report")
+    out: tuple[str, str] | None = ("DIR", "folder for the report")

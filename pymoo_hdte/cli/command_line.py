@@ -15,12 +15,13 @@ from pymoo_hdte.cli.command import MISTAKE, OneLineParser
 from pymoo_hdte.cli.discrepancy import DISCREPANCY
 from pymoo_hdte.cli.export import EXPORT
 from pymoo_hdte.cli.identify import IDENTIFY
+from pymoo_hdte.cli.init import INIT
 from pymoo_hdte.cli.optimise import OPTIMISE
 from pymoo_hdte.cli.plan import PLAN
 from pymoo_hdte.cli.simulate import SIMULATE
 
-COMMANDS = (OPTIMISE, SIMULATE, IDENTIFY, PLAN, DISCREPANCY, EXPORT)
-"""In the order of the help."""
+COMMANDS = (OPTIMISE, SIMULATE, IDENTIFY, PLAN, INIT, DISCREPANCY, EXPORT)
+"""Commands in the order of the help."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -66,8 +67,9 @@ def _parser() -> argparse.ArgumentParser:
         )
         subparser.set_defaults(command=command)
         command.add_arguments(subparser)
-        metavar, words = command.out
-        subparser.add_argument("--out", type=Path, required=True, metavar=metavar, help=words)
+        if command.out is not None:
+            metavar, words = command.out
+            subparser.add_argument("--out", type=Path, required=True, metavar=metavar, help=words)
         output = subparser.add_mutually_exclusive_group()
         output.add_argument("--json", action="store_true", help="print the result as JSON")
         output.add_argument("--quiet", action="store_true", help="print nothing but errors")

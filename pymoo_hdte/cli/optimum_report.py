@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from pymoo_hdte._io.text_table import csv_text
+from pymoo_hdte._io.csv_table import csv_text
 from pymoo_hdte._reports.folder import ReportFolder
 from pymoo_hdte._reports.front import Front, design_rows, front_svg
 from pymoo_hdte._reports.html import change, number, page, with_error

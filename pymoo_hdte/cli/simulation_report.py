@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from pymoo_hdte._io.text_table import csv_text
+from pymoo_hdte._io.csv_table import csv_text
 from pymoo_hdte._reports.figures import AFTER, BEFORE, GREY, data_uri
 from pymoo_hdte._reports.folder import ReportFolder
 from pymoo_hdte._reports.html import change, number, page

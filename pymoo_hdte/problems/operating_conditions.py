@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from pymoo_hdte._io.text_table import read_text_table
+from pymoo_hdte._io.csv_table import read_text_table
 from pymoo_hdte.checks import InvalidInput, real_number
 from pymoo_hdte.drive import DriveModel, UnstableDrive
 from pymoo_hdte.units import REVOLUTION_PER_MINUTE

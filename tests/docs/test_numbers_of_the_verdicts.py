@@ -8,9 +8,8 @@ from places import DOCS, README, ROOT
 
 from experiments.runner.committed import DATA
 from experiments.studies.blind.data import read_outcomes
-from experiments.studies.blind.experiment import OUTCOMES, SECONDS
+from experiments.studies.blind.experiment import OUTCOMES, SECONDS, found
 from experiments.studies.blind.runs import RUNS, read_runs, recent, total
-from experiments.studies.blind.sentences import found
 from experiments.studies.blind.targets import MOST_SECONDS, pooled_demands
 
 PAGE = (DOCS / "model_and_measurements.md").read_text(encoding="utf-8")

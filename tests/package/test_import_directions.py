@@ -43,7 +43,7 @@ LOWEST_EXPERIMENTS_FIRST = (
     *("paper.bench", "paper.static_error", "paper.prototypes", "paper.anytime", "paper"),
     *("paper.calibrating", "paper.inference"),
     *("studies.virtual_rig", "studies.fronts", "studies.contest"),
-    *("studies.suites.formulas", "studies.suites.bbob", "studies.suites", "studies.cards"),
+    *("studies.suites.formulas", "studies.suites", "studies.cards"),
     *("studies.robust", "studies.blind.rig", "studies.blind", "studies.measured"),
     *("studies.reliability", "studies", "paper_page"),
 )

@@ -169,7 +169,7 @@ def torsion_after_held_out_test(
     ----------
     finding : MechanismFinding
     errors : sequence of MechanismPredictionError
-        From `torsion_gaps`.
+        From `torsion_errors`.
     """
     verdict = finding.verdict
     if verdict.accepted is verdict.base or not errors:

@@ -8,7 +8,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from made_verdicts import made_verdict
-from pymoo_hdte.discrepancy._verdicts.prediction_error import PredictionError
 
 from pymoo_hdte.discrepancy._answers.where.relevance import Relevance, largest_change, relevance
 from pymoo_hdte.discrepancy._report.document import sentence
@@ -16,6 +15,7 @@ from pymoo_hdte.discrepancy._report.optimum import Choice
 from pymoo_hdte.discrepancy._report.tables import EffectRow, effect_rows, hypothesis_rows
 from pymoo_hdte.discrepancy._report.write import validation_sentence
 from pymoo_hdte.discrepancy._selection.rules import RULES
+from pymoo_hdte.discrepancy._verdicts.prediction_error import PredictionError
 from pymoo_hdte.discrepancy._verdicts.validation_drive import Validation
 from pymoo_hdte.units import ARCSEC
 
