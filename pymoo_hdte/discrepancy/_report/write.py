@@ -41,6 +41,7 @@ from pymoo_hdte.discrepancy._report.tables import (
     record_rows,
     rows_sentence,
 )
+from pymoo_hdte.discrepancy._report.words import limit_sentence
 from pymoo_hdte.discrepancy._verdicts.drive_finding import DriveFinding
 from pymoo_hdte.discrepancy._verdicts.validation_drive import Validation
 from pymoo_hdte.drive import DriveModel
@@ -91,7 +92,9 @@ def write_report(
     document = verdict_document(
         finding, location, None if validation is None else validation.as_dict(), proposal
     )
-    document["limits"] = campaign_limits(finding)
+    limits = campaign_limits(finding)
+    document["limits"] = [limit_sentence(limit) for limit in limits]
+    document["limit_codes"] = [limit.as_dict() for limit in limits]
     model_files, shift = _revision(finding, optimum_shift)
     document["revised_model"] = {"file": MODEL_FILE if model_files else None}
     document["robust_optimum"] = _shift_document(shift)

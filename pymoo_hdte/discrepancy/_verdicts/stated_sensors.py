@@ -8,8 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pymoo_hdte._reports.html import number
-from pymoo_hdte.discrepancy._evidence.order_lines.parameters import READING, base_unit
+from pymoo_hdte.discrepancy._evidence.order_lines.parameters import READING
 from pymoo_hdte.discrepancy._selection.fitted_sets import from_stated
 from pymoo_hdte.discrepancy._selection.fitting import Fit
 from pymoo_hdte.discrepancy._selection.rules import Rules
@@ -41,23 +40,6 @@ def shares_scale(unit: str) -> bool:
     [True, True, False, False]
     """
     return unit.startswith(_OF_TORQUES)
-
-
-def sensor_caveats(fitted: Fit, rules: Rules) -> list[str]:
-    """Return a sentence for each sensor whose gain or zero contradicts what is stated of it."""
-    return [_caveat(parameter, value) for parameter, value in beyond_limits(fitted, rules)]
-
-
-def _caveat(sensor: Parameter, value: float) -> str:
-    place, _, kind = sensor.name.rpartition("_torque_")
-    size, unit, shares = 1.0, base_unit(sensor.name), "the mean torques share"
-    if _is_gain(sensor):
-        size, unit, shares = 100.0, "%", "torques, stiffness and inertias share"
-    off, stated = (f"{number(size * share, 2)} {unit}" for share in (value, sensor.prior))
-    return (
-        f"The fitted {kind} of the {place} torque sensor is off by {off} (you stated +-{stated}): "
-        f"check the sensor; {shares} this error."
-    )
 
 
 def _is_gain(sensor: Parameter) -> bool:
