@@ -178,10 +178,10 @@ EXPERIMENTS = (
         has_small_version=True,
     ),
     Experiment(
-        "workers",
-        "studies.workers",
-        "How busy 64 workers are, by generations and asynchronously",
-        "How much time does asynchronous optimisation save?",
+        "benchmark",
+        "studies.benchmark",
+        "Speed ratios and agreement with integration",
+        "How fast is it, and does it agree with integration in time?",
         by_default=False,
     ),
     Experiment(

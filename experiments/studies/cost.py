@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,8 +24,9 @@ from experiments.runner.machine import machine_table, processor
 from experiments.runner.registry import Context
 from experiments.runner.result import OF_MODELS, Column, Finding, Result, Table, significant
 from experiments.runner.texts import paragraphs
+from experiments.studies.timing import best_time, integration_time
 from pymoo_hdte._one_thread import ONE_THREAD
-from pymoo_hdte.drive import PRESETS, DriveModel, harmonic_balance, simulate_drive
+from pymoo_hdte.drive import PRESETS, DriveModel, harmonic_balance
 from pymoo_hdte.problems import RobustDTEDirect
 from pymoo_hdte.problems.drive_response import PAPERS_ORDER
 from pymoo_hdte.surrogate import latin_hypercube
@@ -102,24 +102,6 @@ def _direct_seconds() -> float:
     rng = np.random.default_rng(SEED)
     designs = rng.uniform(problem.xl, problem.xu, (DIRECT_DESIGNS, problem.n_var))
     return best_time(lambda: problem.evaluate(designs), 1) / DIRECT_DESIGNS
-
-
-def best_time(function: Callable[[], object], repeats: int) -> float:
-    """Return the least wall time in seconds of several calls."""
-    times = []
-    for _ in range(repeats):
-        begin = time.perf_counter()
-        function()
-        times.append(time.perf_counter() - begin)
-    return min(times)
-
-
-def integration_time(model: DriveModel, designs: NDArray[np.float64], method: str) -> float:
-    """Return the wall time in seconds of integrating designs, shape (n, 5), one after the other."""
-    begin = time.perf_counter()
-    for design in designs:
-        simulate_drive(model, design, method=method)
-    return time.perf_counter() - begin
 
 
 def verdict(*, quick: bool) -> str:

@@ -257,7 +257,7 @@ def run(context: Context) -> Result:
                 "verdicts",
                 "Verdicts",
                 VERDICTS,
-                _cells([[*row[:2], row[2], *row[3:]] for row in rows]),
+                _cells(rows),
                 note=NOTE,
                 findings=_findings(rows),
             ),

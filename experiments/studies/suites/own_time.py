@@ -12,7 +12,6 @@ from collections.abc import Callable
 
 from pymoo.algorithms.moo.nsga2 import NSGA2
 from pymoo.core.algorithm import Algorithm
-from pymoo.core.evaluator import Evaluator
 from pymoo.problems import get_problem
 
 from experiments.runner.committed import (
@@ -23,6 +22,7 @@ from experiments.runner.committed import (
     table_with_origin,
 )
 from experiments.runner.machine import machine_table
+from experiments.runner.own_time import seconds_of_run
 from experiments.runner.result import Cell, Column, Table
 from experiments.runner.store import write_atomically
 from experiments.studies.suites.peers import OURS
@@ -40,29 +40,12 @@ MADE: dict[str, Callable[[], Algorithm]] = {
 }
 
 
-class _TimedEvaluator(Evaluator):
-    """Adds up the seconds of the core that go into evaluations."""
-
-    seconds = 0.0
-
-    def eval(self, *args: object, **kwargs: object) -> object:
-        """Evaluate as pymoo does, with the clock running."""
-        begin = time.process_time()
-        try:
-            return super().eval(*args, **kwargs)
-        finally:
-            self.seconds += time.process_time() - begin
-
-
 def own_seconds(problem: str, make: Callable[[], Algorithm]) -> tuple[int, float]:
     """Return the generations of a run and the seconds of the core without evaluations."""
     algorithm = make()
     algorithm.setup(get_problem(problem), termination=("n_eval", EVALUATIONS), seed=1)
-    algorithm.evaluator = _TimedEvaluator()
-    begin = time.process_time()
-    algorithm.run()
-    total = time.process_time() - begin
-    return algorithm.n_iter - 1, total - algorithm.evaluator.seconds
+    own, _ = seconds_of_run(algorithm, time.process_time)
+    return algorithm.n_iter - 1, own
 
 
 def own_time_table() -> Table:

@@ -1,7 +1,8 @@
-"""How busy workers are when evaluations take unequal times: 64 of them on a virtual clock."""
+"""How busy workers are: measured on a simulator that sleeps, and on 64 of them in virtual time."""
 
 from __future__ import annotations
 
+import time
 import warnings
 from collections.abc import Callable, Iterator
 from typing import Any
@@ -11,11 +12,14 @@ from pymoo.core.problem import ElementwiseProblem
 from pymoo.indicators.hv import HV
 from pymoo.optimize import minimize
 
-from experiments.runner.registry import Context
-from experiments.runner.result import Column, Result, Table
+from experiments.runner.result import Column, Table
+from experiments.studies.timing import Ratio
 from pymoo_hdte.algorithms import ElitistSwarm
 from pymoo_hdte.parallel import ExecutorParallelization, VirtualWorkers, minimize_asynchronously
 
+MEASURED = (2, 4)
+EVALUATIONS, SECONDS, SWARM = 96, 0.1, 16
+"""Of the simulator that sleeps; the swarm is a multiple of every number of workers."""
 MANY, LONG = 64, 20
 """Workers in virtual time, and evaluations that each of them makes."""
 SEEDS = range(2)
@@ -26,30 +30,48 @@ Optimise = Callable[..., Any]
 MODES: dict[str, Optimise] = {"generations": minimize, "asynchronous": minimize_asynchronously}
 
 
-class Elementwise(ElementwiseProblem):
-    """ZDT1 in six variables, one design at a time."""
+class Sleeping(ElementwiseProblem):
+    """ZDT1 in six variables, by a simulator that takes its time on no core."""
 
-    def __init__(self, **kwargs: Any) -> None:
+    def __init__(self, seconds: float = 0.0, **kwargs: Any) -> None:
         super().__init__(n_var=6, n_obj=2, xl=0.0, xu=1.0, **kwargs)
+        self.seconds = seconds
 
     def _evaluate(self, x: Any, out: dict[str, Any], *args: Any, **kwargs: Any) -> None:
+        if self.seconds:
+            time.sleep(self.seconds)
         g = 1.0 + 9.0 * x[1:].mean()
         out["F"] = [x[0], g * (1.0 - np.sqrt(x[0] / g))]
 
 
-def run(context: Context) -> Result:
-    """Show how busy workers are by generations and one by one."""
-    table = virtual_table()
-    gains = [row[3] for row in table.rows if isinstance(row[3], float)]
-    return Result(
-        title="How busy workers are",
-        command="python -m experiments workers",
-        answer=(
-            "Where the times of evaluations differ, `minimize_asynchronously` takes up to "
-            f"{max(gains):.2g} times less than generations do."
-        ),
-        tables=(table,),
-    )
+def ratios_of_workers() -> Iterator[Ratio]:
+    """Measure two and four workers against one, in both modes."""
+    for mode, optimise in MODES.items():
+        alone = _seconds(1, optimise)
+        for number in MEASURED:
+            together = _seconds(number, optimise)
+            yield Ratio(
+                f"{EVALUATIONS} evaluations of {SECONDS:g} s, {mode}",
+                "1 worker",
+                alone,
+                f"{number} workers",
+                together,
+                f"at least {0.9 * number:g}: 90 % efficiency",
+                alone >= 0.9 * number * together,
+            )
+
+
+def _seconds(number: int, optimise: Optimise) -> float:
+    with ExecutorParallelization(number) as runner:
+        problem = Sleeping(SECONDS, elementwise_runner=runner)
+        # Processes are started, and have imported what they need, before the clock runs; so has
+        # the swarm, whose first run in a process would count for one worker alone.
+        problem.evaluate(np.random.default_rng(1).random((4 * number, 6)))
+        awake = Sleeping(elementwise_runner=runner)
+        optimise(awake, ElitistSwarm(SWARM), ("n_eval", 2 * SWARM), seed=1)
+        begin = time.perf_counter()
+        optimise(problem, ElitistSwarm(SWARM), ("n_eval", EVALUATIONS), seed=1)
+        return time.perf_counter() - begin
 
 
 def virtual_table() -> Table:
@@ -96,7 +118,7 @@ def _virtual(
     """Return virtual seconds, share of busy workers and hypervolume of a run."""
     rng = np.random.default_rng(seed)
     queue = VirtualWorkers(MANY, lambda: times(rng), limit)
-    problem = Elementwise(elementwise_runner=ExecutorParallelization(queue))
+    problem = Sleeping(elementwise_runner=ExecutorParallelization(queue))
     # Designs that are lost are what the last row is about.
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)
