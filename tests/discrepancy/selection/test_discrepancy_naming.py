@@ -336,7 +336,7 @@ NOWHERE = (0.0, 1e-3, 100.0)
         {CUBIC: (2e9,)},
         # A drift was named a new zero: from the only start it had ended at another minimum.
         {CORNER: NOWHERE},
-        {CUBIC: (2e9,), CORNER: NOWHERE},
+        pytest.param({CUBIC: (2e9,), CORNER: NOWHERE}, marks=pytest.mark.nightly),
     ],
 )
 def test_a_law_is_compared_in_each_form_and_from_each_start(tried):
