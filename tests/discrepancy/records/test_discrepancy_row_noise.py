@@ -167,7 +167,11 @@ def test_a_clean_drive_in_records_that_begin_unsettled_is_adequate(clean):
 
 
 @pytest.mark.parametrize(
-    "constant", [lambda record: 0.15, lambda record: 15.0 / abs(record.input_speed)]
+    "constant",
+    [
+        pytest.param(lambda record: 0.15, marks=pytest.mark.nightly),
+        lambda record: 15.0 / abs(record.input_speed),
+    ],
 )
 def test_where_several_records_begin_unsettled_all_are_fitted_so(clean, constant):
     """Of a decay below the noise a slow line of a short record takes the most."""
@@ -237,7 +241,7 @@ def test_a_drift_over_the_session_is_no_new_zero(clean, course):
 @pytest.mark.parametrize(
     ("case", "faults", "replaced"),
     [
-        ("nothing-encoder-spikes", ["spike"] * 3, 0),
+        pytest.param("nothing-encoder-spikes", ["spike"] * 3, 0, marks=pytest.mark.nightly),
         pytest.param("nothing-encoder-jump", ["jump"], 0, marks=pytest.mark.nightly),
         pytest.param("coulomb-gap", ["gap"], 0, marks=pytest.mark.nightly),
         ("coulomb-noise-x3", [], 4),
@@ -391,7 +395,12 @@ def test_a_session_with_one_zero_is_left_as_it_is(twice):
 
 @pytest.mark.parametrize(
     ("channel", "size"),
-    [("input_torque", 0.03), ("output_torque", 1.0), ("output_angle", 1e-4), ("input_angle", 0.1)],
+    [
+        ("input_torque", 0.03),
+        pytest.param("output_torque", 1.0, marks=pytest.mark.nightly),
+        ("output_angle", 1e-4),
+        pytest.param("input_angle", 0.1, marks=pytest.mark.nightly),
+    ],
 )
 def test_a_zero_that_differs_in_one_record_is_told_and_taken_out(twice, channel, size):
     """It was called a thermal drift, or friction that grows with the load."""
@@ -455,7 +464,7 @@ def test_steps_finer_than_the_noise_need_nothing(clean):
     assert examined(rows)[0].rig is clean.rig
 
 
-@pytest.mark.parametrize("step", [0.006, 0.008, 0.012, 0.02])
+@pytest.mark.parametrize("step", others_at_night([0.006, 0.008, 0.012, 0.02], 0.008, 0.02))
 def test_lines_of_a_coarse_torque_scatter_as_their_covariance_says(clean, step):
     believed, orders = clean.believed, [1.0, 2.0, 3.0]
     rows = reading(clean, "input_torque", lambda one: coarse(one.input_torque, step))

@@ -181,6 +181,7 @@ def test_a_number_that_no_fit_follows_costs_what_it_was_chosen_from(ripple):
     assert one_of_12.evidence == pytest.approx(fitted.evidence + 2.0 * np.log(12.0))
 
 
+@pytest.mark.nightly
 def test_the_same_data_give_the_same_verdict_to_the_last_bit(ripple):
     data, verdict = ripple
     again = verdict_on(data)
@@ -472,7 +473,7 @@ def test_no_value_is_freed_for_what_another_form_of_the_law_explains(monkeypatch
 @pytest.mark.parametrize(
     ("label", "value", "beside"),
     [
-        (INERTIA, 0.02, {}),
+        pytest.param(INERTIA, 0.02, {}, marks=pytest.mark.nightly),
         pytest.param(INERTIA, 0.02, {RIPPLE: (0.003, 0.001)}, marks=pytest.mark.nightly),
         ("damping_reference:mesh", 3.0, {}),
         pytest.param(
