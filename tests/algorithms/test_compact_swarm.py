@@ -70,6 +70,7 @@ def test_models_learn_every_evaluated_point_once_and_in_its_turn(kwargs):
 # --- result and archive ---------------------------------------------------------------------------
 
 
+@pytest.mark.nightly
 def test_few_evaluations_are_spent_better_than_by_a_large_swarm():
     problem = MovedZDT("zdt1", rotated=True, seed=1)
     distance = IGDPlus(problem.pareto_front(1000))
@@ -303,7 +304,7 @@ def test_pymoo_s_default_termination_ends_a_small_swarm():
 
 
 @pytest.mark.parametrize("clone", [copy.deepcopy, lambda thing: pickle.loads(pickle.dumps(thing))])
-@pytest.mark.parametrize("problem", ["zdt1", "tnk"])
+@pytest.mark.parametrize("problem", others_at_night(["zdt1", "tnk"], "tnk"))
 def test_a_copy_taken_anywhere_goes_on_alike(problem, clone):
     uninterrupted = run(problem, 600, seed=3)
     swarm = CompactSwarm().setup(get_problem(problem), termination=("n_eval", 600), seed=3)

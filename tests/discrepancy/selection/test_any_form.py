@@ -100,6 +100,7 @@ def test_what_another_form_of_a_law_leaves_is_none_of_a_second_effect(label):
     assert forms.explains(left)
 
 
+@pytest.mark.nightly
 def test_a_small_effect_shows_beside_a_law_of_another_form():
     data = planted(FOREIGN[SPRING], *small_drift())
     found = judge(data, fit(data), of_labels(SPRING, DRIFT))
