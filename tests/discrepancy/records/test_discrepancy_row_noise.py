@@ -156,6 +156,7 @@ def unsettled(campaign, sizes, constant=lambda record: 0.15):
     return replace(campaign, running=tuple(running))
 
 
+@pytest.mark.nightly
 def test_a_clean_drive_in_records_that_begin_unsettled_is_adequate(clean):
     loads = np.array([one.load_torque for one in clean.running])
     campaign = unsettled(clean, 2e-4 * loads)
@@ -357,6 +358,7 @@ def test_no_friction_is_named_for_a_drift(clean, power):
     assert analyse(drift).verdict.status == "adequate"
 
 
+@pytest.mark.nightly
 def test_friction_beside_a_drift_is_named_where_the_drive_turns_both_ways():
     rng = np.random.default_rng(1)
     rig = draw_rig(BELIEVED, (effect("input", coulomb=0.03),), rng)

@@ -471,6 +471,7 @@ def test_a_parameter_that_an_effect_covers_is_told_as_that_effect(moved):
 IN_A_CLUTCH = "load_inertia/coupled:output"
 
 
+@pytest.mark.nightly
 def test_an_inertia_in_a_clutch_is_named_as_such():
     """Not as a rigid one beside a damping of the torsion that imitates what the clutch loses."""
     data = measured((CoupledInertia(0.05, 3e-4),), np.random.default_rng(1), DATA)[0]
@@ -508,6 +509,7 @@ def test_no_parameter_is_freed_beside_the_effect_that_covers_it():
     assert {one.label for one in found.chosen.candidates} == BOTH
 
 
+@pytest.mark.nightly
 def test_two_covered_parameters_that_are_both_needed_stay(moved, monkeypatch):
     """No one effect covers both."""
     monkeypatch.setattr(Search, "_needless", lambda self, one, fewer: False)

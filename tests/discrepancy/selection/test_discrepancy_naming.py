@@ -118,7 +118,7 @@ def test_a_clean_drive_within_its_tolerances_misses_nothing(seed):
     [
         (SOFT, (0.3, 3e-4, 3.0), FEW),
         # Straight pieces, as in catalogues: a corner sharper than any that points can resolve.
-        (SOFT, (0.3, 8e-4, 300.0), FEW),
+        pytest.param(SOFT, (0.3, 8e-4, 300.0), FEW, marks=pytest.mark.nightly),
         pytest.param(SOFT, (0.3, 3e-4, 3.0), None, marks=pytest.mark.nightly),
         pytest.param(REACTION, (1.0,), FEW, marks=pytest.mark.nightly),
         pytest.param(INERTIA, (0.03,), FEW, marks=pytest.mark.nightly),
@@ -194,7 +194,9 @@ def test_the_same_data_give_the_same_verdict_to_the_last_bit(ripple):
     ("label", "values"),
     [
         ("stribeck_friction:input", (0.0, 0.05, 80.0)),
-        ("position_dependent_friction:input@2", (0.01, 0.0, 0.0)),
+        pytest.param(
+            "position_dependent_friction:input@2", (0.01, 0.0, 0.0), marks=pytest.mark.nightly
+        ),
     ],
 )
 def test_a_part_that_an_effect_does_not_have_speaks_not_against_it(label, values):
@@ -336,7 +338,7 @@ NOWHERE = (0.0, 1e-3, 100.0)
         # A second spring beyond a torsion was named a soft wind-up: only a cubic was tried there.
         {CUBIC: (2e9,)},
         # A drift was named a new zero: from the only start it had ended at another minimum.
-        {CORNER: NOWHERE},
+        pytest.param({CORNER: NOWHERE}, marks=pytest.mark.nightly),
         pytest.param({CUBIC: (2e9,), CORNER: NOWHERE}, marks=pytest.mark.nightly),
     ],
 )
@@ -391,6 +393,7 @@ def test_no_interval_of_a_torsion_holds_what_is_below_zero():
     assert effect["parameters"]["softening"]["interval95"][0] < 0.0
 
 
+@pytest.mark.nightly
 def test_an_inertia_is_as_certain_as_the_interval_that_is_told_of_it():
     """The believed one may be at the end of its tolerance, which no record tells from the rest."""
     verdict = verdict_on(planted({INERTIA: (0.015,)}), [INERTIA, LINE])
@@ -412,10 +415,8 @@ def test_a_second_effect_shows_where_no_single_part_contradicts_the_first():
     assert labels_of(verdict) == {SOFT, friction}
 
 
-@pytest.mark.parametrize(
-    ("listed", "status"),
-    [((), "partial"), pytest.param(("backlash:mesh",), "class", marks=pytest.mark.nightly)],
-)
+@pytest.mark.nightly
+@pytest.mark.parametrize(("listed", "status"), [((), "partial"), (("backlash:mesh",), "class")])
 def test_a_play_is_no_wind_up_of_straight_pieces(listed, status):
     """Such a wind-up that loses all its stiffness is a play: its softening ends at a bound."""
     (play,) = of_labels(["backlash:mesh"], empty=WITH_LOADS)
@@ -488,6 +489,7 @@ def test_an_effect_has_no_rival_in_the_base_parameter_that_it_changes(label, val
     assert verdict.probability == pytest.approx(RULES.named_right, abs=0.01)
 
 
+@pytest.mark.nightly
 def test_friction_that_hardly_falls_is_in_one_class_with_dry_friction():
     """Another rounding of dry friction looks like that; far more fall is Stribeck's alone."""
     labels = ["coulomb_friction:input", "stribeck_friction:input"]
@@ -677,6 +679,7 @@ def test_rivals_are_compared_by_their_evidence():
         assert hypothesis.alike(other, chosen, 1000, RULES) == equal
 
 
+@pytest.mark.nightly
 def test_a_second_effect_that_leaves_only_noise_is_earned():
     """A drift beside an eccentricity of another form took four fifths of what this one left."""
     data = disturbed(planted({RIPPLE: (3e-3, 0.0), LINE: (0.04 * ARCSEC, 0.0)}), 40.0)
