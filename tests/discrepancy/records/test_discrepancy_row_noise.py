@@ -238,13 +238,14 @@ def test_a_drift_over_the_session_is_no_new_zero(clean, course):
     assert found.faults == ()
 
 
+@pytest.mark.nightly
 @pytest.mark.skipif(not CASES.is_dir(), reason="the shared cases are not here")
 @pytest.mark.parametrize(
     ("case", "faults", "replaced"),
     [
-        pytest.param("nothing-encoder-spikes", ["spike"] * 3, 0, marks=pytest.mark.nightly),
-        pytest.param("nothing-encoder-jump", ["jump"], 0, marks=pytest.mark.nightly),
-        pytest.param("coulomb-gap", ["gap"], 0, marks=pytest.mark.nightly),
+        ("nothing-encoder-spikes", ["spike"] * 3, 0),
+        ("nothing-encoder-jump", ["jump"], 0),
+        ("coulomb-gap", ["gap"], 0),
         ("coulomb-noise-x3", [], 4),
     ],
 )
@@ -422,6 +423,7 @@ def test_a_zero_that_differs_in_one_record_is_told_and_taken_out(twice, channel,
     assert np.sqrt(lines.covariance[place, 0, 0]) == pytest.approx(size / scale, rel=0.1)
 
 
+@pytest.mark.nightly
 def test_a_drift_over_the_session_is_no_zero_of_one_record(twice):
     warming = reading(twice, "output_angle", lambda one: one.output_angle - 1e-8 * one.elapsed)
     first = twice.running[0].elapsed

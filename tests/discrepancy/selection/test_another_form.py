@@ -549,6 +549,7 @@ def test_a_parameter_out_of_tolerance_removes_more_than_the_misfit_lets_it(moved
     assert needless(freedom, 3.0 * cost)
 
 
+@pytest.mark.nightly
 def test_the_force_of_uneven_springs_lies_in_the_interval_that_is_told_of_it():
     """On a bench written apart two of nine did: the error of a form counted as noise."""
     rng = np.random.default_rng(1)

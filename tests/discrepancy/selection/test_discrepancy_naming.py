@@ -332,14 +332,15 @@ NOWHERE = (0.0, 1e-3, 100.0)
 """A spring that is not stiffer beyond a torsion that no record reaches: no slope leads away."""
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     "tried",
     [
         # A second spring beyond a torsion was named a soft wind-up: only a cubic was tried there.
         {CUBIC: (2e9,)},
         # A drift was named a new zero: from the only start it had ended at another minimum.
-        pytest.param({CORNER: NOWHERE}, marks=pytest.mark.nightly),
-        pytest.param({CUBIC: (2e9,), CORNER: NOWHERE}, marks=pytest.mark.nightly),
+        {CORNER: NOWHERE},
+        {CUBIC: (2e9,), CORNER: NOWHERE},
     ],
 )
 def test_a_law_is_compared_in_each_form_and_from_each_start(tried):

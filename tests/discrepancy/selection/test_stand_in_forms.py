@@ -38,6 +38,7 @@ def laws_of(data):
     return [one for one in library(data) if one.name in ("hysteresis", "kinematic_reaction")]
 
 
+@pytest.mark.nightly
 def test_a_loop_that_forgets_is_named_with_what_stands_beside_it(data):
     found = judge(data, fit(data), laws_of(data))
     labels = [one.label for one in found.chosen.candidates]
