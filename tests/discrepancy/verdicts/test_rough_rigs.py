@@ -40,6 +40,7 @@ def test_a_stiffness_stated_far_too_high_hides_no_discrepancy():
     assert finding.verdict.status == "named"
 
 
+@pytest.mark.nightly
 def test_a_stiffness_outside_its_tolerance_makes_no_torsion_of_its_own():
     joint = roughly_stiff(5.0 * STIFFNESS, 2.0)
     half = torsion_half(joint, [record(Hidden(), "train")], ())

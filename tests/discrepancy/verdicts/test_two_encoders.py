@@ -84,6 +84,7 @@ def resting(seconds, seed):
     return time, position, speed, np.gradient(speed, made_joint.STEP)
 
 
+@pytest.mark.nightly
 def test_rests_that_are_left_out_are_told_and_count_as_no_prediction(monkeypatch):
     """Dry friction ahead of the gear is known: what it holds at rest is in no force balance."""
     monkeypatch.setattr(made_joint, "motion", resting)
