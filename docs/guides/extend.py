@@ -2,8 +2,8 @@
 Extend the package
 ==================
 
-Four things that people add: an effect, a port, a part of an algorithm and an experiment. Each is a
-small class or function of your own that the package accepts; none needs a change in it.
+Five things that people add: an effect, a port, a kind of machine, a part of an algorithm and an
+experiment. Each is a small class or function of your own; none needs a change in the package.
 """
 
 import sys
@@ -67,6 +67,7 @@ sys.path[:0] = [str(HERE.parents[1]), str(HERE.parent / "examples")]
 
 import virtual_campaign
 from eyring_drag import EYRING_DRAG, EyringDrag
+from ring_down import Oscillator, RingDown
 
 from experiments.studies.virtual_rig.own_effects import with_effects
 from experiments.studies.virtual_rig.rig import draw_rig, run_campaign
@@ -209,6 +210,37 @@ ringing = stretch[(time >= 0.1) & (time < 0.6)]
 ringing = ringing - ringing.mean()
 crossings = np.count_nonzero(ringing[1:] * ringing[:-1] < 0.0)
 print(f"belt: expected {frequency:.1f} Hz, {crossings / 2 / 0.5:.0f} Hz counted in half a second")
+
+# %%
+# A kind of machine
+# -----------------
+#
+# Where measurements are neither order lines nor force balances, a class with ``records`` and
+# ``evidence`` is enough. ``evidence(records)`` returns a ``ModelEvidence`` with three things: the
+# unknowns of the model, ``residuals(values, effects)`` that compares predictions with records, and
+# the ``sizes`` of the ports at which effects may be. Search, verdict, validation, next test, report
+# and revised model come with it. Ring-down tests, of which only turning points are recorded, are
+# one such kind, all of it in ``docs/examples/ring_down.py``:
+#
+# .. literalinclude:: ../examples/ring_down.py
+#    :language: python
+#
+# Turning points of an oscillator with viscous and dry friction are known in closed form
+# (Den Hartog, Transactions of the ASME 53, 1931). Nothing is told of the dry friction.
+
+stiffness, frequency, damping, friction, noise = 4e3, 63.0, 0.8, 0.03, 2e-6
+shrink = np.exp(-0.5 * np.pi * damping * frequency / stiffness)
+tests = []
+for name, deflection in (("wide", 4e-3), ("less", 3e-3), ("narrow", 1.5e-3), ("held", 2e-3)):
+    points = [deflection]
+    while len(points) < 90 and points[-1] > 5.0 * friction / stiffness:
+        points.append((points[-1] - friction / stiffness) * shrink - friction / stiffness)
+    points = np.array(points) + noise * generator.standard_normal(len(points))
+    tests.append(RingDown(name, "held_out" if name == "held" else "train", points))
+analysis = analyse(Oscillator(stiffness, frequency, 0.85, 0.2, noise, tests))
+print(f"{analysis.verdict.status}: {analysis.revised_model().effects[0]}, {friction} N is hidden")
+print(analysis.locate().sentence)
+print(f"error of prediction, in deviations of the noise: {analysis.prove().overall.after:.2f}")
 
 # %%
 # A part of an algorithm

@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from functools import cached_property
 from pathlib import Path
-from typing import Any, overload
+from typing import Any, cast, overload
 
 from pymoo_hdte._one_thread import ONE_THREAD
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy._answers.next_test_drive import Proposal, next_experiment
+from pymoo_hdte.discrepancy._answers.next_test_machine import Repetition, next_repetition
 from pymoo_hdte.discrepancy._answers.next_test_mechanism import NextTest, next_test
 from pymoo_hdte.discrepancy._answers.revision_drive import revised_model
+from pymoo_hdte.discrepancy._answers.revision_machine import RevisedValues, revised_values
 from pymoo_hdte.discrepancy._answers.revision_mechanism import revised_mechanism
 from pymoo_hdte.discrepancy._answers.where.balances import MechanismLocation, locate_in_mechanism
 from pymoo_hdte.discrepancy._answers.where.location import Location, locate
+from pymoo_hdte.discrepancy._answers.where.parts import PartLocation, locate_in_parts
 from pymoo_hdte.discrepancy._evidence.force_balances.joint_halves import joint_of
 from pymoo_hdte.discrepancy._records.campaign import Campaign
 from pymoo_hdte.discrepancy._records.rig_files import MeasuredMechanism
@@ -27,6 +31,13 @@ from pymoo_hdte.discrepancy._verdicts.drive import examine_drive
 from pymoo_hdte.discrepancy._verdicts.drive_finding import DriveFinding
 from pymoo_hdte.discrepancy._verdicts.held_out import Progress
 from pymoo_hdte.discrepancy._verdicts.joint import JointFinding, examine_joint, revised_joint
+from pymoo_hdte.discrepancy._verdicts.machine import (
+    HeldOutErrors,
+    Machine,
+    MachineFinding,
+    examine_machine,
+    held_out_errors,
+)
 from pymoo_hdte.discrepancy._verdicts.mechanism import examine_mechanism
 from pymoo_hdte.discrepancy._verdicts.mechanism_finding import MechanismFinding
 from pymoo_hdte.discrepancy._verdicts.validation_drive import Proof, prove
@@ -49,13 +60,20 @@ def analyse(
     rules: Rules = RULES,
     progress: Progress | None = None,
 ) -> MechanismAnalysis: ...
-@ONE_THREAD
+@overload
 def analyse(
-    measured: Campaign | MeasuredMechanism,
+    measured: Machine,
     effects: Sequence[Effect] = (),
     rules: Rules = RULES,
     progress: Progress | None = None,
-) -> DriveAnalysis | MechanismAnalysis:
+) -> MachineAnalysis: ...
+@ONE_THREAD
+def analyse(
+    measured: Campaign | MeasuredMechanism | Machine,
+    effects: Sequence[Effect] = (),
+    rules: Rules = RULES,
+    progress: Progress | None = None,
+) -> Analysis:
     """Return which effects the believed model lacks, by comparison with measurements.
 
     The believed model is fitted within its tolerances; if that is not enough, candidate effects are
@@ -65,9 +83,10 @@ def analyse(
 
     Parameters
     ----------
-    measured : Campaign or MeasuredMechanism
-        From `read_campaign`, of a harmonic drive; from `read_rig` or made in Python, of any other
-        machine.
+    measured : Campaign, MeasuredMechanism or Machine
+        From `read_campaign`, of a harmonic drive; from `read_rig` or made in Python, of a
+        mechanism; or of a kind of machine of your own: any object with ``records`` and
+        ``evidence``, see `Machine`.
     effects : sequence of Effect, optional
         Effects of your own that may be missing, beside those of the library. They are registered
         if they are not yet, so that reports and model files know them.
@@ -79,7 +98,8 @@ def analyse(
 
     Returns
     -------
-    DriveAnalysis or MechanismAnalysis
+    Analysis
+        A `DriveAnalysis`, `MechanismAnalysis`, `JointAnalysis` or `MachineAnalysis`.
 
     Raises
     ------
@@ -97,12 +117,15 @@ def analyse(
     ['torque_ripple:input@2']
     >>> problem = RobustDTE(model=analysis.revised_model())  # doctest: +SKIP
     """
-    if not isinstance(measured, Campaign | MeasuredMechanism):
-        raise InvalidInput("measured", type(measured).__name__, "a Campaign or a MeasuredMechanism")
+    if not isinstance(measured, Campaign | MeasuredMechanism | Machine):
+        allowed = "a Campaign, a MeasuredMechanism or an object with records and evidence"
+        raise InvalidInput("measured", type(measured).__name__, allowed)
     for effect in effects:
         register(effect)
     if isinstance(measured, Campaign):
         return DriveAnalysis(examine_drive(measured, rules))
+    if not isinstance(measured, MeasuredMechanism):
+        return MachineAnalysis(measured, examine_machine(measured, rules))
     believed = measured.records, measured.cutoff, measured.effects
     joint = joint_of(measured.mechanism)
     if joint is not None:
@@ -112,15 +135,15 @@ def analyse(
     )
 
 
-class DriveAnalysis:
-    """The analysis of a campaign of a harmonic drive; made by `analyse`.
+class Analysis(ABC):
+    """What `analyse` returns, whatever the kind of machine.
 
     Each result is computed when it is first used.
 
     Attributes
     ----------
-    finding : DriveFinding
-        Campaign, features of its records and verdict.
+    finding
+        The evidence and the verdict on it.
 
     Examples
     --------
@@ -128,6 +151,74 @@ class DriveAnalysis:
     >>> analysis.verdict.status, analysis.locate().sentence  # doctest: +SKIP
     >>> analysis.report("report")  # doctest: +SKIP
     """
+
+    finding: Any
+
+    @property
+    def verdict(self) -> Verdict:
+        """What is missing: ``status``, the ``chosen`` effects, and ``alternatives``."""
+        return cast(Verdict, self.finding.verdict)
+
+    @property
+    def doubts(self) -> tuple[str, ...]:
+        """The reasons of the verdict in words: what forbids to name its effects plainly."""
+        return tuple(doubts(self.verdict))
+
+    @ONE_THREAD
+    def report(self, out: str | Path) -> dict[str, Any]:
+        """Write ``report.html``, ``verdict.json`` and the revised model; return the verdict.
+
+        Parameters
+        ----------
+        out : str or Path
+            A folder that is new, empty, or an earlier report, which is replaced.
+
+        Returns
+        -------
+        dict
+            What ``verdict.json`` holds.
+
+        Raises
+        ------
+        InvalidInput
+            If the folder holds anything else.
+        OSError
+            If it cannot be written.
+        """
+        check_report_folder(out)
+        return self._write(out)
+
+    @abstractmethod
+    def locate(self) -> Any:
+        """Return where the model is wrong, in words as well."""
+
+    @abstractmethod
+    def prove(self) -> Any:
+        """Return the errors on held-out records before and after the correction."""
+
+    @abstractmethod
+    def next_experiment(self) -> Any:
+        """Return the test that best resolves what is still uncertain."""
+
+    @abstractmethod
+    def revised_model(self) -> Any:
+        """Return the model with fitted values and named effects."""
+
+    @abstractmethod
+    def _write(self, out: str | Path) -> dict[str, Any]:
+        """Write the report; return the verdict's document."""
+
+
+class DriveAnalysis(Analysis):
+    """The analysis of a campaign of a harmonic drive.
+
+    Attributes
+    ----------
+    finding : DriveFinding
+        Campaign, features of its records and verdict.
+    """
+
+    finding: DriveFinding
 
     def __init__(self, finding: DriveFinding) -> None:
         self.finding = finding
@@ -138,13 +229,8 @@ class DriveAnalysis:
         return self.finding.campaign
 
     @property
-    def verdict(self) -> Verdict:
-        """What is missing: ``status``, the ``chosen`` effects, and ``alternatives``."""
-        return self.finding.verdict
-
-    @property
     def doubts(self) -> tuple[str, ...]:
-        """The reasons of the verdict in words: what forbids to name its effects plainly."""
+        """The reasons of the verdict in words, lines of the static error by their orders."""
         return tuple(doubts(self.verdict, self.campaign.believed.error_orders))
 
     def locate(self) -> Location:
@@ -169,34 +255,13 @@ class DriveAnalysis:
         """
         return revised_model(self.finding)
 
-    @ONE_THREAD
-    def report(self, out: str | Path) -> dict[str, Any]:
-        """Write ``report.html``, ``verdict.json`` and the revised model; return the verdict.
-
-        Parameters
-        ----------
-        out : str or Path
-            A folder that is new, empty, or an earlier report, which is replaced.
-
-        Returns
-        -------
-        dict
-            What ``verdict.json`` holds.
-
-        Raises
-        ------
-        InvalidInput
-            If the folder holds anything else.
-        OSError
-            If it cannot be written.
-        """
+    def _write(self, out: str | Path) -> dict[str, Any]:
         # Plotting and optimisation are slow to import, and only a report needs them.
         from pymoo_hdte.discrepancy._report.write import write_report
         from pymoo_hdte.discrepancy._robust_optimum import optimum_shift
 
-        check_report_folder(out)
-        found = self.locate(), self.prove(), self.next_experiment()
-        return write_report(self.finding, *found, optimum_shift, out)
+        answers = self.locate(), self.prove(), self.next_experiment()
+        return write_report(self.finding, *answers, optimum_shift, out)
 
     @cached_property
     @ONE_THREAD
@@ -214,10 +279,8 @@ class DriveAnalysis:
         return next_experiment(self.finding)
 
 
-class MechanismAnalysis:
-    """The analysis of the records of a mechanism; made by `analyse`.
-
-    Each result is computed when it is first used.
+class MechanismAnalysis(Analysis):
+    """The analysis of the records of a mechanism.
 
     Attributes
     ----------
@@ -225,25 +288,12 @@ class MechanismAnalysis:
         The mechanism as it is believed, and its records.
     finding : MechanismFinding
         Force balances of the records, verdict, and unexplained residual.
-
-    Examples
-    --------
-    >>> analysis = analyse(read_rig("my_rig"))  # doctest: +SKIP
-    >>> analysis.verdict.status, analysis.report("report")  # doctest: +SKIP
     """
+
+    finding: MechanismFinding
 
     def __init__(self, measured: MeasuredMechanism, finding: MechanismFinding) -> None:
         self.measured, self.finding = measured, finding
-
-    @property
-    def verdict(self) -> Verdict:
-        """What is missing: ``status``, the ``chosen`` effects, and ``alternatives``."""
-        return self.finding.verdict
-
-    @property
-    def doubts(self) -> tuple[str, ...]:
-        """The reasons of the verdict in words: what forbids to name its effects plainly."""
-        return tuple(doubts(self.verdict))
 
     def locate(self) -> MechanismLocation:
         """Return in which force balance the believed model is wrong, and by how much."""
@@ -261,34 +311,13 @@ class MechanismAnalysis:
         """Return the mechanism with fitted values, and the effects that it has."""
         return revised_mechanism(self.measured.title, self.finding)
 
-    @ONE_THREAD
-    def report(self, out: str | Path) -> dict[str, Any]:
-        """Write ``report.html``, ``verdict.json`` and the revised model; return the verdict.
-
-        Parameters
-        ----------
-        out : str or Path
-            A folder that is new, empty, or an earlier report, which is replaced.
-
-        Returns
-        -------
-        dict
-            What ``verdict.json`` holds.
-
-        Raises
-        ------
-        InvalidInput
-            If the folder holds anything else.
-        OSError
-            If it cannot be written.
-        """
+    def _write(self, out: str | Path) -> dict[str, Any]:
         # Plotting is slow to import, and only a report needs it.
         from pymoo_hdte.discrepancy._report.mechanism import write_mechanism_report
 
-        check_report_folder(out)
-        found = self.prove(), self.next_experiment()
+        answers = self.prove(), self.next_experiment()
         return write_mechanism_report(
-            self.measured.title, self.finding, *found, out, joint=self._beside
+            self.measured.title, self.finding, *answers, out, joint=self._beside
         )
 
     @property
@@ -341,3 +370,41 @@ class JointAnalysis(MechanismAnalysis):
     @property
     def _beside(self) -> JointFinding:
         return self.joint
+
+
+class MachineAnalysis(Analysis):
+    """The analysis of the records of a machine of your own kind.
+
+    Attributes
+    ----------
+    machine : Machine
+    finding : MachineFinding
+        Evidence and verdict.
+    """
+
+    finding: MachineFinding
+
+    def __init__(self, machine: Machine, finding: MachineFinding) -> None:
+        self.machine, self.finding = machine, finding
+
+    def locate(self) -> PartLocation:
+        """Return in which channels and records the model is wrong, and by how much."""
+        return locate_in_parts(self.finding)
+
+    def prove(self) -> HeldOutErrors | None:
+        """Return the errors on the held-out records; None without such records."""
+        return held_out_errors(self.finding)
+
+    def next_experiment(self) -> Repetition:
+        """Return the record whose repetition best separates what still competes."""
+        return next_repetition(self.finding)
+
+    def revised_model(self) -> RevisedValues:
+        """Return the fitted values, and the effects that the machine has."""
+        return revised_values(self.finding)
+
+    def _write(self, out: str | Path) -> dict[str, Any]:
+        from pymoo_hdte.discrepancy._report.machine import write_machine_report
+
+        answers = self.locate(), self.prove(), self.next_experiment()
+        return write_machine_report(self.finding, *answers, out)

@@ -57,7 +57,7 @@ def unit_at(mechanism: Mechanism, name: str, unit: str) -> str:
     turning = _turning(mechanism, name)
     if turning is None:
         return unit if unit in ("1", "K") else "SI"
-    return unit if turning else _of_a_length(unit)
+    return unit if turning else unit_at_length(unit)
 
 
 def unit_of_number(mechanism: Mechanism, name: str, number: str, unit: str) -> str:
@@ -120,7 +120,8 @@ def base_unit(mechanism: Mechanism, quantity: str) -> str:
     return unit_at(mechanism, name, si_unit(kind)) if kind in _BASE else "SI"
 
 
-def _of_a_length(unit: str) -> str:
+def unit_at_length(unit: str) -> str:
+    """Return the unit at a length of what has a unit at a shaft: ``"N"`` for ``"N.m"``."""
     return unit.replace("kg.m2", "kg").replace("N.m", "N").replace("rad", "m")
 
 

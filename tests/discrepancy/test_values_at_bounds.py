@@ -6,6 +6,7 @@ from itertools import product
 import numpy as np
 import pytest
 from analysed_campaigns import ripple_analysis
+from made_verdicts import made_verdict
 from measured_oscillator import nothing, with_held_out
 from night import others_at_night
 
@@ -16,7 +17,6 @@ from pymoo_hdte.discrepancy._evidence.force_balances.evidence import measured_da
 from pymoo_hdte.discrepancy._evidence.order_lines.parameters import base_parameters
 from pymoo_hdte.discrepancy._report.mechanism import write_mechanism_report
 from pymoo_hdte.discrepancy._selection.fitting import fit
-from pymoo_hdte.discrepancy._selection.verdict import Verdict
 from pymoo_hdte.discrepancy._verdicts.held_out import simulate_held_out
 from pymoo_hdte.discrepancy._verdicts.mechanism_finding import MechanismFinding
 from pymoo_hdte.discrepancy._verdicts.validation_drive import prove
@@ -59,7 +59,7 @@ def test_a_mechanism_is_proved_reported_and_believed_again(case, tmp_path):
     base = fit(data, (), start, steps=0)
     assert base.values.tolist() == start.tolist()
     assert quantity in base.at_bounds
-    verdict = Verdict("unlisted", base, None, (), (), len(base.residuals) - len(base.values))
+    verdict = made_verdict("unlisted", base, freedom=len(base.residuals) - len(base.values))
     simulated = simulate_held_out(mechanism, records, data, (base, base))
     finding = MechanismFinding(mechanism, records, CUTOFF, data, verdict, simulated=simulated)
     out = tmp_path / "report"

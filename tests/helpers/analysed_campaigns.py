@@ -2,6 +2,7 @@
 
 import numpy as np
 from kept_results import kept
+from made_verdicts import made_verdict
 from planted_features import SCALES
 from virtual_rig_cases import BELIEVED, RIG, effect, true_rig
 
@@ -13,7 +14,6 @@ from pymoo_hdte.discrepancy._evidence.order_lines.features import measure
 from pymoo_hdte.discrepancy._evidence.order_lines.sizes import port_sizes
 from pymoo_hdte.discrepancy._selection.fitting import fit
 from pymoo_hdte.discrepancy._selection.hypothesis import Hypothesis
-from pymoo_hdte.discrepancy._selection.verdict import Verdict
 from pymoo_hdte.discrepancy._verdicts.drive_finding import DriveFinding
 
 ORDERS = [1.0, 2.0, 2.02, 3.0, 4.0, 6.0]
@@ -44,7 +44,7 @@ def analysed(campaign, label=None, status="named"):
         chosen = Hypothesis(fit(data, (candidate,), start), 0.0, 1.0)
     degrees_of_freedom = len(base.residuals) - len(base.values)
     return DriveFinding(
-        campaign, data, Verdict(status, base, chosen, (), (), degrees_of_freedom), ()
+        campaign, data, made_verdict(status, base, chosen, freedom=degrees_of_freedom), ()
     )
 
 

@@ -5,6 +5,7 @@ from itertools import pairwise
 from types import SimpleNamespace
 
 import numpy as np
+from made_verdicts import made_verdict
 from virtual_rig_cases import BELIEVED, PHASES, RIG
 
 from pymoo_hdte.discrepancy._evidence.order_lines.candidates import drive_candidates
@@ -17,7 +18,6 @@ from pymoo_hdte.discrepancy._evidence.order_lines.torsion_curve import TorsionPo
 from pymoo_hdte.discrepancy._selection.candidate import Layout
 from pymoo_hdte.discrepancy._selection.fitting import fit
 from pymoo_hdte.discrepancy._selection.hypothesis import Hypothesis
-from pymoo_hdte.discrepancy._selection.verdict import Verdict
 from pymoo_hdte.discrepancy._verdicts.drive_finding import DriveFinding
 from pymoo_hdte.drive import mean_torsion
 from pymoo_hdte.units import ARCSEC, REVOLUTION_PER_MINUTE
@@ -123,5 +123,5 @@ def analysed(data, status="unlisted", candidate=None, start=()):
     chosen = None
     if candidate is not None:
         chosen = Hypothesis(fit(data, (candidate,), np.concatenate([base.values, start])), 0.0, 1.0)
-    verdict = Verdict(status, base, chosen, (), (), len(base.residuals) - len(base.values))
+    verdict = made_verdict(status, base, chosen, freedom=len(base.residuals) - len(base.values))
     return DriveFinding(data.campaign, data, verdict, ())

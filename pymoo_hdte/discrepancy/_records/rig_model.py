@@ -13,7 +13,7 @@ from pymoo_hdte.checks import InvalidInput, one_of, real_number
 from pymoo_hdte.effects.effect import effect_named
 from pymoo_hdte.mechanism import BelievedValue, ErrorLine, Input, LawAt, Loop, Mechanism, Port
 from pymoo_hdte.mechanism.believed import LARGEST_FACTOR, NOTHING
-from pymoo_hdte.mechanism.effects import law_effects
+from pymoo_hdte.mechanism.effects import read_law, table_of
 from pymoo_hdte.mechanism.gear import KINDS, Gear
 
 
@@ -98,10 +98,7 @@ def model_text(model: MechanismModel) -> str:
         {name: one for name, one in vars(loop).items() if one != float("inf")}
         for loop in mechanism.loops
     ]
-    rows = [
-        {"name": one.name, "port": one.port, **effect_named(one.name).numbers_of(one.law)}
-        for one in model.effects
-    ]
+    rows = [table_of(effect) for effect in model.effects]
     # The reader takes no empty array of tables.
     top |= {name: array for name, array in (("loops", loops), ("effects", rows)) if array}
     # Refuse now a text that could not be read back later.
@@ -263,18 +260,12 @@ def _loop(row: Fields, inputs: Collection[str], coordinates: Collection[str]) ->
 
 
 def _effect(row: Fields, place: str, mechanism: Mechanism) -> LawAt:
-    name = row.choice("name", [one.name for one in law_effects()])
-    effect, port = effect_named(name), row.choice("port", mechanism.port_names)
+    standing = read_law(row, place, mechanism.port_names)
+    name, port, effect = standing.name, standing.port, effect_named(standing.name)
     if effect.of_reading and not mechanism.port(port).read:
         allowed = f"a port with read = true: {name} is what its force sensor shows"
         raise InvalidInput(f"{place}.port", port, allowed)
-    if getattr(effect.law, "loaded", False) and not mechanism.port(port).load:
+    if effect.loaded and not mechanism.port(port).load:
         allowed = f"a port with load = {{ input = share }}, on which {name} depends"
         raise InvalidInput(f"{place}.port", port, allowed)
-    numbers = {one: row.number(one) for one in effect.quantities if row.has(one)}
-    row.finish()
-    try:
-        return LawAt(name, port, effect.law_of(numbers))
-    except InvalidInput as error:
-        field = error.field.removeprefix(f"{name}.")
-        raise InvalidInput(f"{place}.{field}", error.value, error.allowed) from None
+    return standing

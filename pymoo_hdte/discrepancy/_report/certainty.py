@@ -16,7 +16,6 @@ from pymoo_hdte.discrepancy._selection.hypothesis import (
 )
 from pymoo_hdte.discrepancy._selection.verdict import Verdict
 from pymoo_hdte.discrepancy._verdicts.drive_finding import DriveFinding
-from pymoo_hdte.discrepancy._verdicts.mechanism_finding import MechanismFinding
 from pymoo_hdte.effects.sentence_blanks import in_words, listed
 
 
@@ -53,13 +52,12 @@ def how_sure(finding: DriveFinding) -> str:
     return " ".join(_evidence(finding, verdict.chosen, share))
 
 
-def how_sure_of_records(finding: MechanismFinding) -> str:
+def how_sure_of_records(verdict: Verdict) -> str:
     """Return how sure the verdict on measured records is, in words.
 
     Without a probability: what a model of a real machine leaves is no noise, so that its evidence
     counts for more than it is worth.
     """
-    verdict = finding.verdict
     chosen = verdict.chosen
     if verdict.status == "adequate":
         return "An effect too small for these records may still be there."

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import platform
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from importlib.metadata import version
 from typing import Any
 
@@ -34,6 +34,8 @@ from pymoo_hdte.effects.unknowns import HARMONIC_NAMES, Parameter, line_with_var
 SCHEMA_VERSION = 1
 """Version of ``verdict.json``: raised when a field is removed or changes name, type or meaning."""
 
+UnitOf = Callable[[str], str]
+"""From the name of an unknown of a base to its SI unit."""
 _DEVIATIONS = 1.959964
 """Half-width of a central 95 % interval of a normal value, in standard deviations."""
 
@@ -68,7 +70,7 @@ def verdict_document(
         "reasons": [reason.as_dict() for reason in verdict.reasons],
         "effects": effects_of(verdict),
         "relevance": None if matters is None else matters.as_dict(),
-        "alternatives": _alternatives(verdict),
+        "alternatives": alternatives_of(verdict),
         "base": {
             "chi_square": verdict.base.chi_square,
             "degrees_of_freedom": verdict.degrees_of_freedom,
@@ -165,8 +167,15 @@ def residual_of_parts(finding: DriveFinding) -> dict[str, dict[str, float]]:
     return found
 
 
-def effects_of(verdict: Verdict) -> list[dict[str, Any]]:
-    """Return the accepted effects; none unless the verdict names or classes them."""
+def effects_of(verdict: Verdict, unit_of: UnitOf = base_unit) -> list[dict[str, Any]]:
+    """Return the accepted effects; none unless the verdict names or classes them.
+
+    Parameters
+    ----------
+    verdict : Verdict
+    unit_of : callable
+        From an unknown of the base to its SI unit.
+    """
     fitted, found = verdict.accepted, []
     for candidate, place in fitted.places:
         rows, accuracy = range(place.start, place.stop), _accuracy(candidate, verdict)
@@ -177,7 +186,9 @@ def effects_of(verdict: Verdict) -> list[dict[str, Any]]:
                 "port": candidate.port,
                 "order": candidate.order,
                 "sentence": candidate.sentence,
-                "parameters": _parameters(candidate, fitted, rows, verdict.rules, accuracy),
+                "parameters": _parameters(
+                    candidate, fitted, rows, verdict.rules, accuracy, unit_of
+                ),
                 "at_bound": bounded,
                 "explained": verdict.chosen.explained if verdict.chosen else None,
             }
@@ -203,7 +214,12 @@ def _accuracy(candidate: Candidate, verdict: Verdict) -> float:
 
 
 def _parameters(
-    candidate: Candidate, fitted: Fit, rows: Sequence[int], rules: Rules, accuracy: float
+    candidate: Candidate,
+    fitted: Fit,
+    rows: Sequence[int],
+    rules: Rules,
+    accuracy: float,
+    unit_of: UnitOf,
 ) -> dict[str, Any]:
     """Return values with intervals; cosine and sine part as amplitude and phase.
 
@@ -221,36 +237,41 @@ def _parameters(
     values, scale = expected_values(fitted, rules), scale_error(fitted, rules)
     for row in rows:
         one = fitted.parameters[row]
-        shared = scale if shares_scale(_unit(candidate, one.line or one.name)) else 0.0
+        shared = scale if shares_scale(_unit(candidate, one.line or one.name, unit_of)) else 0.0
         if one.begins_line:
             pair = np.array([row, row + 1])
             own = (accuracy * np.hypot(*values[pair]) / _DEVIATIONS) ** 2 * np.eye(2)
             own += (shared / _DEVIATIONS) ** 2 * np.outer(values[pair], values[pair])
             covariance = fitted.covariance[np.ix_(pair, pair)] + own
-            found |= _line(one.line, candidate, values[pair], covariance)
+            found |= _line(one.line, candidate, values[pair], covariance, unit_of)
         elif not one.line:
             own = float(np.hypot(accuracy, shared) * values[row] / _DEVIATIONS) ** 2
             variance = fitted.covariance[row, row] + own
             # A time or a torsion of a law is above zero, however little the data say of it.
             least = 0.0 if one.lower > 0.0 else -np.inf
-            found[one.name] = quantity(values[row], variance, _unit(candidate, one.name), least)
+            unit = _unit(candidate, one.name, unit_of)
+            found[one.name] = quantity(values[row], variance, unit, least)
     return found
 
 
-def _unit(candidate: Candidate, name: str) -> str:
-    return base_unit(name) if candidate.unit is None else candidate.unit(name)
+def _unit(candidate: Candidate, name: str, unit_of: UnitOf) -> str:
+    return unit_of(name) if candidate.unit is None else candidate.unit(name)
 
 
 def _line(
-    name: str, candidate: Candidate, parts: NDArray[np.float64], covariance: NDArray[np.float64]
+    name: str,
+    candidate: Candidate,
+    parts: NDArray[np.float64],
+    covariance: NDArray[np.float64],
+    unit_of: UnitOf,
 ) -> dict[str, Any]:
     """Return amplitude and phase of a line, with intervals, from its cosine and sine parts."""
     cosine, sine = parts
     amplitude, phase = line_with_variance(cosine, sine, covariance)
     prefix = next(one for one in reversed(HARMONIC_NAMES) if name.startswith(one))
     return {
-        name: quantity(*amplitude, _unit(candidate, name)),
-        f"{prefix}phase": quantity(*phase, _unit(candidate, "phase")),
+        name: quantity(*amplitude, _unit(candidate, name, unit_of)),
+        f"{prefix}phase": quantity(*phase, _unit(candidate, "phase", unit_of)),
     }
 
 
@@ -264,11 +285,11 @@ def quantity(value: float, variance: float, unit: str, least: float = -np.inf) -
     }
 
 
-def base_parameters(fitted: Fit, rules: Rules) -> dict[str, Any]:
+def base_parameters(fitted: Fit, rules: Rules, unit_of: UnitOf = base_unit) -> dict[str, Any]:
     """Return the base values of a fit with units, intervals and whether they ended at a bound."""
     found, scale = {}, scale_error(fitted, rules)
     for row, parameter in enumerate(fitted.parameters[: fitted.n_base]):
-        value, unit = fitted.values[row], base_unit(parameter.name)
+        value, unit = fitted.values[row], unit_of(parameter.name)
         shared = scale * value / _DEVIATIONS if shares_scale(unit) else 0.0
         entry = quantity(value, fitted.covariance[row, row] + shared**2, unit)
         entry["interval95"] = _within_bounds(parameter, entry["interval95"], rules)
@@ -284,7 +305,7 @@ def _within_bounds(parameter: Parameter, interval: list[float], rules: Rules) ->
     return [max(interval[0], lower), min(interval[1], upper)]
 
 
-def _alternatives(verdict: Verdict) -> list[dict[str, Any]]:
+def alternatives_of(verdict: Verdict) -> list[dict[str, Any]]:
     """Return the other sets of effects with their evidence, by rising BIC."""
     chosen = verdict.chosen
 

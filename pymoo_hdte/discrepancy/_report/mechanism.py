@@ -114,7 +114,7 @@ def _page(
         gaps=gaps,
         shown=shown,
         pictures=pictures,
-        certainty=how_sure_of_records(finding),
+        certainty=how_sure_of_records(finding.verdict),
         compared=[*compared, *document["alternatives"]],
         extent_sentence=extent_sentence(gaps),
         believed_effects=believed_in_words(document),

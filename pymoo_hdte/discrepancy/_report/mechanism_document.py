@@ -23,8 +23,8 @@ from pymoo_hdte.discrepancy._verdicts.validation_mechanism import (
     MeasuredGap,
     rests_told,
 )
-from pymoo_hdte.effects.effect import effect_named
 from pymoo_hdte.effects.sentence_blanks import in_words
+from pymoo_hdte.mechanism.effects import table_of
 from pymoo_hdte.mechanism.quantity_units import unit_of
 from pymoo_hdte.mechanism.resampling import share_beyond
 
@@ -55,12 +55,7 @@ def mechanism_verdict_document(
             evidence(finding, one) for one in sorted(verdict.alternatives, key=_by_bic)
         ],
         "base": quantities(finding),
-        **with_believed_effects(
-            [
-                {"name": one.name, "port": one.port, **effect_named(one.name).numbers_of(one.law)}
-                for one in finding.believed
-            ]
-        ),
+        **with_believed_effects([table_of(effect) for effect in finding.believed]),
         "band": band(finding),
         "location": locate_in_mechanism(finding).summary(),
         "remainder": remainder(finding),

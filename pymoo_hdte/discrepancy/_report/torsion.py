@@ -102,7 +102,7 @@ def torsion_sentence(finding: JointFinding) -> str:
     if verdict.chosen is None and verdict.status == "named":
         return lines
     words = sentence(verdict)
-    if verdict.status == "class" and not verdict.equivalent:
+    if verdict.rivals_beyond:
         words = f"{' '.join(one.sentence for one in verdict.accepted.candidates)} Or, which these "
         words += "data cannot tell from it: the readings of the two encoders are apart in time."
     return f"{words} {lines}".strip()

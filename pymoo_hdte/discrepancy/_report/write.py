@@ -201,9 +201,6 @@ def gap_sentence(finding: DriveFinding, proof: Proof | None) -> str:
     if not finding.verdict.accepted.candidates:
         return f"Nothing was added. On {where}: off by {number(gap.before)} {gap.unit}, {noise}."
     words = f"On {where}: off by {number(gap.before)} before, {number(gap.after)} after, {noise}"
-    if proof.condemns:
-        where = "there" if gap.worse else "in all channels together"
-        return f"{words}. The revised model is worse {where}: do not use it.{_worse(proof)}"
     if gap.shrinkage is not None:
         words += f"; {percent(min(gap.shrinkage, 1.0))} of what the noise does not explain is gone"
     error = proof.channels["transmission_error"]

@@ -49,15 +49,16 @@ EXPLAINED = ("named", "class", "parameter", "partial")
 
 @dataclass(frozen=True, eq=False)
 class Verdict:
-    """What is missing.
+    """What is missing: its content, from which its ``status`` follows.
 
     Attributes
     ----------
-    status : str
-        One of `STATUSES`.
     base : Fit
         Without any effect.
     chosen : Hypothesis or None
+    certain : bool
+        Whether the data show that the chosen effects are missing; without a chosen set, that
+        nothing is.
     alternatives : tuple of Hypothesis
         Other sets that were fitted.
     equivalent : tuple of Hypothesis
@@ -77,11 +78,15 @@ class Verdict:
         explains it.
     renewed : Evidence or None
         The data as they were judged, where their noise is not the one that they came with.
+    seen_beyond : tuple of str
+        Names of effects that are seen in what no fit holds, as ripple beyond the band of a motion.
+    rivals_beyond : tuple of str
+        What would explain as much and is in no fit, as the delay of an encoder.
     """
 
-    status: str
     base: Fit
     chosen: Hypothesis | None
+    certain: bool
     alternatives: tuple[Hypothesis, ...]
     equivalent: tuple[Hypothesis, ...]
     degrees_of_freedom: int
@@ -91,6 +96,25 @@ class Verdict:
     probability: float | None = None
     in_another_form: float | None = None
     renewed: Evidence | None = None
+    seen_beyond: tuple[str, ...] = ()
+    rivals_beyond: tuple[str, ...] = ()
+
+    @property
+    def status(self) -> str:
+        """One of `STATUSES`, as the content of the verdict allows."""
+        chosen = self.chosen
+        if chosen is None:
+            if not self.certain:
+                return "unlisted"
+            return "named" if self.seen_beyond else "adequate"
+        if not (self.certain and chosen.listed) or self.has_reason(NOT_VALIDATED):
+            return "unlisted"
+        if self.equivalent or self.rivals_beyond:
+            return "class"
+        if self.reasons:
+            return "partial"
+        out = all(candidate.name == "parameter" for candidate in chosen.candidates)
+        return "parameter" if out else "named"
 
     @property
     def accepted(self) -> Fit:
@@ -148,9 +172,7 @@ class Verdict:
         """
         if condemned or (vote and vote.denies(self.rules, self.accepted.misfit)):
             reasons = (*self.reasons, Reason(NOT_VALIDATED))
-            return replace(
-                self, status="unlisted", equivalent=(), reasons=reasons, probability=None
-            )
+            return replace(self, equivalent=(), reasons=reasons, probability=None)
         shown = self.shown_in_held_out and (vote is None or vote.counts(self.rules))
         verdict = replace(self, shown_in_held_out=shown)
         if not worse:
@@ -159,13 +181,11 @@ class Verdict:
 
     def doubted(self, reasons: Sequence[Reason]) -> Verdict:
         """Return it with further reasons, with which no status is unqualified."""
-        if not reasons:
-            return self
-        status, sure = self.status, self.probability
-        if status in ("named", "parameter"):
-            status, shares = "partial", probability.experience_of(self.rules)
-            sure = sure and sure * shares["partial"] / shares[self.status]
-        return replace(self, status=status, reasons=(*self.reasons, *reasons), probability=sure)
+        sure, shares = self.probability, probability.experience_of(self.rules)
+        doubted = replace(self, reasons=(*self.reasons, *reasons))
+        if sure and doubted.status != self.status:
+            sure *= shares[doubted.status] / shares[self.status]
+        return replace(doubted, probability=sure)
 
 
 def judge(
@@ -192,9 +212,9 @@ def judge(
     gain = max((one.reduction for one in screened), default=0.0)
     if quiet and gain < rules.single_effect_gain:
         clean = probability.of_nothing(screened, len(base.residuals), rules)
-        return Verdict("adequate", base, None, (), (), degrees_of_freedom, rules, probability=clean)
+        return Verdict(base, None, True, (), (), degrees_of_freedom, rules, probability=clean)
     if not screened and not known:
-        return Verdict("unlisted", base, None, (), (), degrees_of_freedom, rules)
+        return Verdict(base, None, False, (), (), degrees_of_freedom, rules)
     forms = [one for one in candidates if one.only_as_form]
     search = Search(data, base, searched, screened, forms)
     if known:
@@ -271,39 +291,23 @@ def _verdict(search: Search, answer: Answer) -> Verdict:
         equivalent += probability.likelier(chosen, equivalent, search.found, degrees_of_freedom)
     equivalent = distinct(chosen, equivalent)
     known = (certain or in_part) and not search.lacks_evident(chosen)
-    status = _status(chosen, known, equivalent, reasons)
-    others = tuple(equivalent) if status == "class" else ()
-    compared = (chosen, *others) if foreign else search.found
-    # A class that is not all is no more certain than a name in part.
-    like = "partial" if in_part and status == "class" else status
-    sure = probability.of_names(like, chosen, others, compared, degrees_of_freedom, rules)
-    return Verdict(
-        status,
+    verdict = Verdict(
         search.base,
         chosen,
+        known,
         tuple(one for one in search.found if one is not chosen),
-        others,
+        tuple(equivalent),
         degrees_of_freedom,
         rules,
         tuple(reasons),
         shown,
-        sure,
-        search.forms.share_in_another(chosen) if foreign else None,
+        in_another_form=search.forms.share_in_another(chosen) if foreign else None,
     )
-
-
-def _status(
-    chosen: Hypothesis,
-    certain: bool,
-    equivalent: Sequence[Hypothesis],
-    reasons: Sequence[Reason],
-) -> str:
-    """Return the status of the best set: what it may be called."""
-    if not chosen.listed or not certain or Reason(NOT_VALIDATED) in reasons:
-        return "unlisted"
-    if equivalent:
-        return "class"
-    if reasons:
-        return "partial"
-    out = all(candidate.name == "parameter" for candidate in chosen.candidates)
-    return "parameter" if out else "named"
+    if verdict.status == "unlisted":
+        verdict = replace(verdict, equivalent=())
+    others = verdict.equivalent
+    compared = (chosen, *others) if foreign else search.found
+    # A class that is not all is no more certain than a name in part.
+    like = "partial" if in_part and others else verdict.status
+    sure = probability.of_names(like, chosen, others, compared, degrees_of_freedom, rules)
+    return replace(verdict, probability=sure)

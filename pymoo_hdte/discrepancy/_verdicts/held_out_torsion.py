@@ -195,7 +195,7 @@ def without_unproved_lines(verdict: Verdict, fitted: Fit, gaps: Sequence[Measure
     others = [one for one in sets if not denied & label_of(one.candidates)]
     return replace(
         verdict,
-        status="unlisted",
+        certain=False,
         chosen=others[0] if others else None,
         alternatives=tuple(others[1:]),
         equivalent=(),

@@ -107,8 +107,7 @@ def examine_joint(
     verdict = voted(torsion, gaps)
     slows = any(one.effect and one.effect.slows for one in verdict.accepted.candidates)
     if verdict.status == "named" and slows:
-        # The delay of one encoder behind the other explains as much.
-        verdict = replace(verdict, status="class")
+        verdict = replace(verdict, rivals_beyond=("encoder_delay",))
     verdict = without_unproved_lines(verdict, torsion.accepted, gaps)
     told = replace(torsion, verdict=verdict)
     if told.accepted is not torsion.accepted:

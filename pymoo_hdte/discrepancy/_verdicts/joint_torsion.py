@@ -91,8 +91,7 @@ def examine_torsion(
         # While the shafts turn slowly, they are within the band as well.
         again = examined(replace(sensors, known=(*half.known, *lines)), _candidates)
         data, verdict = (data, verdict) if again[1].status == "unlisted" else again
-    if lines and verdict.status == "adequate":
-        verdict = replace(verdict, status="named")
+    verdict = replace(verdict, seen_beyond=tuple(dict.fromkeys(one.name for one in lines)))
     return MechanismFinding(half.mechanism, records, cutoff, data, verdict, ripples)
 
 

@@ -101,8 +101,7 @@ def examine_mechanism(
     ripples = _beyond(sensors, sampled, cutoff, verdict)
     if ripples.found and verdict.status == "unlisted":
         data, verdict, ripples = _beside(sensors, sampled, cutoff, data, verdict, ripples)
-    if ripples.found and verdict.status == "adequate":
-        verdict = replace(verdict, status="named")
+    verdict = replace(verdict, seen_beyond=ripples.names)
     # A ripple beyond the band moves nothing that could be measured, and takes a solver many steps.
     fits = verdict.base, verdict.accepted
     simulated = simulate_held_out(mechanism, records, data, fits, known, progress)

@@ -268,9 +268,7 @@ def _with_rivals(verdict: Verdict, equivalent: Iterable[Hypothesis]) -> Verdict:
 
     Without any, reasons against it make it partial.
     """
-    rivals = tuple(equivalent)
-    status = "class" if rivals else "partial" if verdict.reasons else "named"
-    return replace(verdict, status=status, equivalent=rivals)
+    return replace(verdict, certain=True, equivalent=tuple(equivalent))
 
 
 def _reasons(data: MeasuredData, base: Fit, chosen: Hypothesis) -> list[Reason]:
@@ -306,4 +304,4 @@ def _unknowns(one: Hypothesis) -> int:
 
 
 def _as_unlisted(verdict: Verdict, nearest: Hypothesis | None) -> Verdict:
-    return replace(verdict, status="unlisted", chosen=nearest, equivalent=())
+    return replace(verdict, certain=False, chosen=nearest, equivalent=())

@@ -6,12 +6,12 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from made_verdicts import made_verdict
 from quick_campaigns import quick_campaign
 
 from pymoo_hdte.discrepancy._answers.where.coverage import campaign_limits
 from pymoo_hdte.discrepancy._evidence.order_lines.evidence import Data
 from pymoo_hdte.discrepancy._evidence.order_lines.features import measure
-from pymoo_hdte.discrepancy._selection.verdict import Verdict
 from pymoo_hdte.discrepancy._verdicts.drive_finding import DriveFinding
 from pymoo_hdte.effects import effect_named
 
@@ -34,7 +34,7 @@ def said(campaign, fitted=None, orders=ORDERS, chosen=None, status="named", **of
     features = measure(campaign, fitted or campaign.train, orders)
     data = Data(campaign, features, (), campaign.torsion, **of_data)
     return campaign_limits(
-        DriveFinding(campaign, data, Verdict(status, UNFITTED, chosen, (), (), FREEDOM), ())
+        DriveFinding(campaign, data, made_verdict(status, UNFITTED, chosen, freedom=FREEDOM), ())
     )
 
 

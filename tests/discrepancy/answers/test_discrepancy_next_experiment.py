@@ -6,6 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from made_verdicts import made_verdict
 from planted_features import analysed, known_data, listed, measured
 
 from pymoo_hdte.discrepancy._answers.next_test_drive import nearest_rivals, next_experiment
@@ -14,14 +15,13 @@ from pymoo_hdte.discrepancy._answers.where.location import locate
 from pymoo_hdte.discrepancy._report.document import verdict_document
 from pymoo_hdte.discrepancy._selection.fitting import fit
 from pymoo_hdte.discrepancy._selection.hypothesis import Hypothesis
-from pymoo_hdte.discrepancy._selection.verdict import Verdict
 from pymoo_hdte.discrepancy._verdicts.drive_finding import DriveFinding
 from pymoo_hdte.units import ARCSEC
 
 
 def judged(data, chosen, *others, equivalent=()):
     base = fit(data)
-    verdict = Verdict("named", base, chosen, others, equivalent, 1)
+    verdict = made_verdict("class" if equivalent else "named", base, chosen, others, equivalent)
     return DriveFinding(data.campaign, data, verdict, ())
 
 
@@ -182,11 +182,17 @@ def test_a_record_that_the_campaign_has_is_called_a_repeat():
 
 
 def fake(*names):
-    return SimpleNamespace(names=frozenset(names), candidates=(), bic=0.0, fit=names)
+    return SimpleNamespace(
+        names=frozenset(names),
+        candidates=(SimpleNamespace(name="law"),),
+        listed=True,
+        bic=0.0,
+        fit=names,
+    )
 
 
 def test_a_superset_of_the_named_effects_is_no_rival():
-    verdict = Verdict("named", None, fake("a"), (fake("a", "b"), fake("c"), fake("c", "a")), (), 1)
+    verdict = made_verdict("named", None, fake("a"), (fake("a", "b"), fake("c"), fake("c", "a")))
     assert nearest_rivals(verdict) == [("c",)]
 
 
@@ -195,13 +201,13 @@ def test_the_same_effect_beside_other_values_is_a_rival():
     a, values = ("a", "mesh"), [("parameter", one) for one in ("K", "J", "B")]
     one, other = fake(a, *values[:2]), fake(a, *values[1:])
     rejected = fake(a, ("c", "mesh"))
-    verdict = Verdict("class", None, one, (other, rejected), (other,), 1)
+    verdict = made_verdict("class", None, one, (other, rejected), (other,))
     assert nearest_rivals(verdict) == [other.fit, rejected.fit]
 
 
 def test_what_contains_the_chosen_effects_is_a_rival_in_their_class():
     one, more = fake(("a", "mesh")), fake(("a", "mesh"), ("b", "mesh"))
-    assert nearest_rivals(Verdict("class", None, one, (more,), (more,), 1)) == [more.fit]
+    assert nearest_rivals(made_verdict("class", None, one, (more,), (more,))) == [more.fit]
 
 
 def test_a_record_in_which_a_clearance_would_rattle_separates_nothing():
@@ -218,7 +224,7 @@ def test_a_record_in_which_a_clearance_would_rattle_separates_nothing():
 
 
 def test_no_test_is_made_up_between_effects_that_explain_nothing():
-    verdict = Verdict("unlisted", None, fake("a"), (fake("c"),), (), 1)
+    verdict = made_verdict("unlisted", None, fake("a"), (fake("c"),))
     verdict.chosen.explained = 0.3
     data, _ = measured(data=known_data())
     finding = DriveFinding(data.campaign, data, replace(verdict, base=fit(data)), ())

@@ -5,6 +5,7 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 from analysed_campaigns import LISTED, ORDERS, clean_analysis, ripple_analysis
+from made_verdicts import with_status
 from virtual_rig_cases import BELIEVED, RIG
 
 from pymoo_hdte.checks import InvalidInput
@@ -82,7 +83,7 @@ def test_revised_model_predicts_the_fit_s_transmission_error(ripple):
 
 
 def test_model_without_a_name_has_no_effect_and_says_so(ripple, clean):
-    unlisted = replace(ripple, verdict=replace(ripple.verdict, status="unlisted"))
+    unlisted = replace(ripple, verdict=with_status(ripple.verdict, "unlisted"))
     for analysis, words in ((unlisted, "none added"), (clean, "nothing was found")):
         model = revised_model(analysis)
         assert [one.name for one in model.effects] == ["load_inertia", "damping_reference"]

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from made_verdicts import made_verdict
 
 from pymoo_hdte.discrepancy._answers.where.relevance import Relevance, largest_change, relevance
 from pymoo_hdte.discrepancy._report.document import sentence
@@ -14,7 +15,6 @@ from pymoo_hdte.discrepancy._report.optimum import Choice
 from pymoo_hdte.discrepancy._report.tables import EffectRow, effect_rows, hypothesis_rows
 from pymoo_hdte.discrepancy._report.write import gap_sentence
 from pymoo_hdte.discrepancy._selection.rules import RULES
-from pymoo_hdte.discrepancy._selection.verdict import Verdict
 from pymoo_hdte.discrepancy._verdicts.gap import Gap
 from pymoo_hdte.discrepancy._verdicts.validation_drive import Proof
 from pymoo_hdte.units import ARCSEC
@@ -59,8 +59,7 @@ def test_a_gap_that_shrinks_everywhere_is_not_called_worse():
 @pytest.mark.parametrize(
     ("changes", "words", "names"),
     [
-        ({"transmission_error": 9.0}, "worse there: do not use it", ("transmission_error",)),
-        ({"overall": (4.7, 4.9)}, "worse in all channels together: do not use it", ("overall",)),
+        ({"overall": (4.7, 4.9)}, "Worse than before: all channels together", ("overall",)),
         ({"output_torque": 23.0}, "Worse than before: output torque 19.4 before, 23 after",
          ("output_torque",)),
         ({"input_torque": 0.23}, "Worse than before: input torque 0.21 before, 0.23 after",
@@ -73,8 +72,6 @@ def test_what_gets_worse_is_said(changes, words, names):
     found = proof(**changes)
     assert words in gap_sentence(NAMED, found)
     assert found.worse == names
-    # One channel that is worse does not condemn a model that is better.
-    assert ("do not use it" in gap_sentence(NAMED, found)) == ("do not use it" in words)
 
 
 def test_a_gap_of_thousands_has_no_exponent():
@@ -237,7 +234,7 @@ def test_an_effect_that_explains_less_than_half_is_not_called_near(share, told):
         explained=share,
         label="coulomb_friction:input",
     )
-    verdict = Verdict("unlisted", None, chosen, (), (), 1)
+    verdict = made_verdict("unlisted", None, chosen)
     assert ("coulomb friction" in sentence(verdict)) == told
 
 
@@ -302,11 +299,13 @@ def test_what_is_as_likely_at_another_order_was_not_rejected(bic, role, of_class
         line = SimpleNamespace(name="error_amplitude_1")
         fit = SimpleNamespace(chi_square=1.0, parameters=[line], bound_sides=[1.0], n_base=1)
         label = f"{name}:mesh@{order}"
-        return SimpleNamespace(names=names, label=label, fit=fit, explained=1.0, bic=bic)
+        return SimpleNamespace(
+            names=names, label=label, fit=fit, explained=1.0, bic=bic, listed=True
+        )
 
     chosen, member = fitted("mesh_stiffness_variation", 1), fitted("clearance_variation", 2)
     twin = fitted("clearance_variation" if of_class else "mesh_stiffness_variation", 3, bic)
-    verdict = Verdict("class", None, chosen, (member, twin), (member,), 1)
+    verdict = made_verdict("class", None, chosen, (member, twin), (member,))
     rows = hypothesis_rows(verdict, (1.0, 2.0))
     assert [row.role for row in rows] == ["chosen", "cannot be told apart", role]
     assert rows[0].at_bounds == "error amplitude of order 2"

@@ -13,7 +13,6 @@ from pymoo_hdte.discrepancy._report.document import effects_of, sentence
 from pymoo_hdte.discrepancy._report.words import doubts
 from pymoo_hdte.discrepancy._selection import fitted_sets, hypothesis, search
 from pymoo_hdte.discrepancy._selection import fitted_sets as membership
-from pymoo_hdte.discrepancy._selection import verdict as naming
 from pymoo_hdte.discrepancy._selection.any_form import AnyForm
 from pymoo_hdte.discrepancy._selection.candidate import Layout
 from pymoo_hdte.discrepancy._selection.equivalents import complete
@@ -434,16 +433,6 @@ def test_a_stiffness_out_of_tolerance_is_a_parameter_and_no_effect():
     deviation = np.sqrt(verdict.chosen.fit.covariance[place, place])
     wanted = 1.2 * EMPTY.base[place].start
     assert verdict.chosen.fit.values[place] == pytest.approx(wanted, abs=4.0 * deviation)
-
-
-def test_a_parameter_out_of_tolerance_does_not_hide_an_effect_beside_it():
-    def status(*names):
-        candidates = [SimpleNamespace(name=name) for name in names]
-        return naming._status(SimpleNamespace(listed=True, candidates=candidates), True, (), ())
-
-    assert status("parameter") == "parameter"
-    assert status("parameter", "parameter") == "parameter"
-    assert status("parameter", "torque_ripple") == "named"
 
 
 @pytest.mark.parametrize(

@@ -6,6 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from made_verdicts import made_verdict
 
 from pymoo_hdte.discrepancy._selection import choice
 from pymoo_hdte.discrepancy._selection.candidate import Candidate, Layout
@@ -15,7 +16,6 @@ from pymoo_hdte.discrepancy._selection.fitted_sets import FittedSets
 from pymoo_hdte.discrepancy._selection.hypothesis import Hypothesis, alike, contains, label_of
 from pymoo_hdte.discrepancy._selection.rules import RULES
 from pymoo_hdte.discrepancy._selection.search import Search
-from pymoo_hdte.discrepancy._selection.verdict import Verdict
 from pymoo_hdte.discrepancy._verdicts import mechanism_choice as measured
 from pymoo_hdte.effects.unknowns import Parameter, unknown
 
@@ -460,7 +460,9 @@ def test_another_choice_keeps_the_rivals_that_name_as_much(monkeypatch):
     simpler = set_of(a_law("play"), *freed("a"), left=1.0)
     rival = set_of(a_law("soft"), *freed("a", "b"), left=1.0)
     larger = set_of(a_law("soft"), a_law("play"), *freed("a"), left=1.0)
-    verdict = Verdict("class", None, chosen, (simpler, rival, larger), (rival, larger), FREEDOM)
+    verdict = made_verdict(
+        "class", None, chosen, (simpler, rival, larger), (rival, larger), FREEDOM
+    )
     found = measured._choosing(None, verdict, simpler)
     assert (found.status, found.chosen, found.equivalent) == ("class", simpler, (rival,))
 

@@ -4,21 +4,21 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from made_verdicts import made_set, made_verdict
 
 from pymoo_hdte.discrepancy._evidence.order_lines.candidates import out_of_tolerance
 from pymoo_hdte.discrepancy._selection.excess import Vote
 from pymoo_hdte.discrepancy._selection.reason import HELD_OUT_ERROR_GROWS, NOT_VALIDATED, Reason
 from pymoo_hdte.discrepancy._selection.rules import RULES
-from pymoo_hdte.discrepancy._selection.verdict import Verdict
 from pymoo_hdte.discrepancy._verdicts.gap import Gap, grows
 from pymoo_hdte.discrepancy._verdicts.held_out_torsion import without_unproved_lines
 
 FIT = SimpleNamespace(misfit=1.0)
-CHOSEN = SimpleNamespace(fit=FIT)
 
 
 def verdict(status, probability=RULES.named_right):
-    return Verdict(status, FIT, CHOSEN, (), (), 100, probability=probability)
+    chosen = made_set(FIT, *(["parameter"] if status == "parameter" else []))
+    return made_verdict(status, FIT, chosen, freedom=100, probability=probability)
 
 
 @pytest.mark.parametrize("status", ["named", "parameter"])
@@ -87,11 +87,11 @@ def test_a_value_out_of_tolerance_and_its_effect_are_one_answer():
 def line(order, side):
     parameter = SimpleNamespace(name="amplitude", linear=True, lower=-1.0, limited_at=bool)
     label = f"kinematic_error:gear@{order}"
-    law = SimpleNamespace(label=label, order=order, parameters=(parameter,))
+    law = SimpleNamespace(name="kinematic_error", label=label, order=order, parameters=(parameter,))
     fitted = SimpleNamespace(
         places=[(law, slice(0, 1))], bound_sides=np.array([side]), values=np.ones(1)
     )
-    return SimpleNamespace(candidates=(law,), fit=fitted)
+    return SimpleNamespace(candidates=(law,), fit=fitted, listed=True)
 
 
 @pytest.mark.parametrize(
@@ -106,7 +106,7 @@ def line(order, side):
 )
 def test_an_order_at_its_bound_or_without_proof_is_not_named(order, side, after, named):
     chosen, other = line(order, side), line(2.0, 0.0)
-    found = Verdict("partial", FIT, chosen, (other,), (), 100)
+    found = made_verdict("partial", FIT, chosen, (other,), freedom=100)
     gap = SimpleNamespace(before=1.0, after=after)
     found = without_unproved_lines(found, chosen.fit, [gap])
     assert (found.chosen is chosen) == named

@@ -11,6 +11,7 @@ from functools import cache, partial
 import numpy as np
 import places
 import pytest
+from made_verdicts import with_status
 from planted_features import analysed, known_data, listed, measured
 
 from experiments.command_line import FAILED, main
@@ -237,7 +238,7 @@ def test_a_verdict_survives_the_way_through_numbers():
     chosen = Hypothesis(replace(base, candidates=(line, friction)), 0.0, 1.0)
     drift = listed(data, "thermal_drift")
     alike = Hypothesis(replace(base, candidates=(friction, drift)), 0.0, 1.0)
-    verdict = replace(analysed(data).verdict, status="class", chosen=chosen, equivalent=(alike,))
+    verdict = with_status(analysed(data).verdict, "class", chosen=chosen, equivalent=(alike,))
     pairs = (one for one in all_cases(ROOT) if one.kind == "pair")
     case = next(one for one in pairs if set(one.names) == {"thermal_drift", "coulomb_friction"})
     found = as_outcome(case, verdict_scores(case, verdict))
@@ -259,7 +260,7 @@ def test_all_that_is_named_is_kept():
              ("stiffness", "input_damping", "load_inertia", "error_amplitude_2")]  # fmt: skip
     candidates = (*freed, listed(data, "thermal_drift"))
     chosen = Hypothesis(replace(base, candidates=candidates), 0.0, 1.0)
-    verdict = replace(analysed(data).verdict, status="named", chosen=chosen, equivalent=())
+    verdict = with_status(analysed(data).verdict, "named", chosen=chosen, equivalent=())
     found = as_outcome(ECCENTRIC, verdict_scores(ECCENTRIC, verdict))
     assert found.chosen == tuple(one.label for one in candidates)
     expected = ("parameter", "parameter", "load_inertia", "parameter", "thermal_drift")
@@ -370,8 +371,7 @@ def test_an_interval_covers_a_value_that_the_hidden_form_has():
     friction = listed(data, "coulomb_friction")
     base = fit(data)
     fitted = fit(data, (friction,))
-    verdict = replace(analysed(data).verdict, status="named",
-                      chosen=Hypothesis(fitted, 0.0, 1.0))  # fmt: skip
+    verdict = with_status(analysed(data).verdict, "named", chosen=Hypothesis(fitted, 0.0, 1.0))
     level = float(fitted.values[-1])
     spread = float(np.sqrt(fitted.covariance[-1, -1]))
     assert len(base.values) == len(fitted.values) - 1

@@ -179,6 +179,11 @@ class Ripples:
         return tuple(part.law for one in self.found for part in one.parts)
 
     @property
+    def names(self) -> tuple[str, ...]:
+        """Names of their effects."""
+        return tuple(dict.fromkeys(one.name for one in self.laws))
+
+    @property
     def sentence(self) -> str:
         """What was found, in words; empty for nothing."""
         ports = dict.fromkeys(one.port for one in self.found)

@@ -1,0 +1,120 @@
+"""The report on a machine of any kind: verdict, revised model and a page, all or nothing."""
+
+from __future__ import annotations
+
+import platform
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from pymoo_hdte._reports.html import number, page, percent
+from pymoo_hdte.discrepancy._answers.next_test_machine import Repetition
+from pymoo_hdte.discrepancy._answers.revision_machine import MODEL_FILE, revised_values
+from pymoo_hdte.discrepancy._answers.where.parts import PartLocation
+from pymoo_hdte.discrepancy._report.certainty import how_sure_of_records
+from pymoo_hdte.discrepancy._report.document import (
+    SCHEMA_VERSION,
+    alternatives_of,
+    base_parameters,
+    believed_in_words,
+    effects_of,
+    sentence,
+    with_believed_effects,
+)
+from pymoo_hdte.discrepancy._report.folder import FOLDER
+from pymoo_hdte.discrepancy._report.tables import STATUSES, effect_rows, hypothesis_rows
+from pymoo_hdte.discrepancy._report.words import doubts
+from pymoo_hdte.discrepancy._verdicts.machine import HeldOutErrors, MachineFinding
+from pymoo_hdte.mechanism.effects import table_of
+
+
+def write_machine_report(
+    finding: MachineFinding,
+    location: PartLocation,
+    errors: HeldOutErrors | None,
+    test: Repetition,
+    out: str | Path,
+) -> dict[str, Any]:
+    """Write a report with verdict and revised model; return the verdict's document.
+
+    Parameters
+    ----------
+    finding : MachineFinding
+    location : PartLocation
+    errors : HeldOutErrors or None
+        None where no record was held out.
+    test : Repetition
+    out : str or Path
+        New, empty, or an earlier report, which is replaced.
+
+    Raises
+    ------
+    InvalidInput
+        If ``out`` holds anything else.
+    OSError
+        If it cannot be written.
+    """
+    FOLDER.check(Path(out))
+    verdict, unit_of = finding.verdict, lambda name: finding.data.units.get(name, "1")
+    document = {
+        "schema_version": SCHEMA_VERSION,
+        "campaign": finding.title,
+        "status": verdict.status,
+        "sentence": _sentence(finding),
+        "probability": verdict.probability,
+        "doubts": doubts(verdict),
+        "reasons": [reason.as_dict() for reason in verdict.reasons],
+        "effects": effects_of(verdict, unit_of),
+        "alternatives": alternatives_of(verdict),
+        "base": {
+            "chi_square": verdict.base.chi_square,
+            "degrees_of_freedom": verdict.degrees_of_freedom,
+            "parameters": base_parameters(verdict.accepted, verdict.rules, unit_of),
+        },
+        **with_believed_effects([table_of(effect) for effect in finding.data.known]),
+        "location": location.summary(),
+        "held_out": {"reason": "no record was held out"} if errors is None else errors.as_dict(),
+        "gap_sentence": error_sentence(finding, errors),
+        "next_experiment": test.as_dict(),
+        "revised_model": {"file": MODEL_FILE},
+        "versions": {
+            "python": platform.python_version(),
+            **{name: version(name) for name in ("pymoo-hdte", "numpy", "scipy")},
+        },
+    }
+    html = page(
+        "pymoo_hdte.discrepancy._report",
+        "machine.html.j2",
+        document=document,
+        status=STATUSES[verdict.status],
+        rows=effect_rows(document["effects"], ()),
+        hypotheses=hypothesis_rows(verdict, ()),
+        nominal={parameter.name: parameter.start for parameter in finding.data.base},
+        errors=errors,
+        certainty=how_sure_of_records(verdict),
+        known=believed_in_words(document),
+    )
+    FOLDER.write(Path(out), html, document, {MODEL_FILE: revised_values(finding).to_toml()})
+    return document
+
+
+def _sentence(finding: MachineFinding) -> str:
+    if finding.verdict.status == "adequate":
+        return "Nothing is missing: the model explains the records within its tolerances."
+    return sentence(finding.verdict)
+
+
+def error_sentence(finding: MachineFinding, errors: HeldOutErrors | None) -> str:
+    """Return in words how the error of prediction on held-out records changed."""
+    if errors is None:
+        return "No record was held out, so nothing can be said about conditions not fitted."
+    gap = errors.overall
+    before, after = f"{number(gap.before)} times the noise", number(gap.after)
+    if not finding.verdict.accepted.candidates:
+        return f"Nothing was added; the model is off by {before} on held-out records."
+    words = f"On held-out records the model was off by {before}; with the correction by {after}."
+    if gap.shrinkage is not None:
+        words += f" {percent(min(gap.shrinkage, 1.0))} of what noise does not explain is gone."
+    if errors.growths:
+        words += f" Worse than before: {', '.join(errors.growths)}."
+    return words

@@ -1,0 +1,153 @@
+"""From records of a machine of any kind to a verdict, with its errors on held-out records."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Protocol, runtime_checkable
+
+import numpy as np
+
+from pymoo_hdte.checks import InvalidInput, one_of
+from pymoo_hdte.discrepancy._evidence.model_evidence import ModelEvidence
+from pymoo_hdte.discrepancy._selection.fitting import fit
+from pymoo_hdte.discrepancy._selection.rules import RULES, Rules
+from pymoo_hdte.discrepancy._selection.verdict import Verdict, judge
+from pymoo_hdte.discrepancy._verdicts.gap import DEVIATIONS, Gap
+
+_ROLES = ("train", "held_out")
+
+
+@runtime_checkable
+class Machine(Protocol):
+    """A kind of machine of your own: its records, and how they are compared with its model.
+
+    Where it has a ``title``, reports begin with it.
+    """
+
+    @property
+    def records(self) -> Sequence[Any]:
+        """All records, each with a ``name`` and a ``role``, ``"train"`` or ``"held_out"``."""
+        ...
+
+    def evidence(self, records: Sequence[Any]) -> ModelEvidence:
+        """Return some of the records as evidence."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class MachineFinding:
+    """The result of the analysis of the records of a machine.
+
+    Attributes
+    ----------
+    title : str
+    names, held_out_names : tuple of str
+        Of the training records, and of those that were held out.
+    data : ModelEvidence
+        Training records; those held out are its ``held_out``.
+    verdict : Verdict
+    """
+
+    title: str
+    names: tuple[str, ...]
+    held_out_names: tuple[str, ...]
+    data: ModelEvidence
+    verdict: Verdict
+
+
+@dataclass(frozen=True)
+class HeldOutErrors:
+    """Errors of prediction on held-out records, before and after the correction.
+
+    Attributes
+    ----------
+    parts, records : dict of str to Gap
+        By channel, and by record.
+    overall : Gap
+    """
+
+    parts: dict[str, Gap]
+    records: dict[str, Gap]
+    overall: Gap
+
+    @property
+    def growths(self) -> dict[str, float]:
+        """What grew, with after over before."""
+        together = {**self.parts, **self.records}
+        return {name: gap.after / gap.before for name, gap in together.items() if gap.worse}
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return them as plain values."""
+        return {
+            **self.overall.as_dict(),
+            "channels": {name: gap.as_dict() for name, gap in self.parts.items()},
+            "records": {name: gap.as_dict() for name, gap in self.records.items()},
+        }
+
+
+def examine_machine(machine: Machine, rules: Rules = RULES) -> MachineFinding:
+    """Return the verdict on the records of a machine.
+
+    Parameters
+    ----------
+    machine : Machine
+    rules : Rules
+        Thresholds of the verdict.
+
+    Raises
+    ------
+    InvalidInput
+        If no record is to be fitted, a role is unknown, or the evidence has no finite residuals.
+    """
+    roles = [one_of(f"role of {record.name}", record.role, _ROLES) for record in machine.records]
+    train, held_out = (
+        [record for record, role in zip(machine.records, roles, strict=True) if role == wanted]
+        for wanted in _ROLES
+    )
+    if not train:
+        raise InvalidInput("number of train records", 0, "at least 1")
+    data = _checked(machine.evidence(train))
+    data.rules = rules
+    if held_out:
+        data.held_out = _checked(machine.evidence(held_out))
+    base = fit(data)
+    verdict = judge(data, base, data.candidates(base))
+    title = str(getattr(machine, "title", type(machine).__name__))
+    names, held_out_names = (
+        tuple(record.name for record in records) for records in (train, held_out)
+    )
+    finding = MachineFinding(title, names, held_out_names, data, verdict)
+    errors = held_out_errors(finding)
+    if errors is None or verdict.accepted is verdict.base:
+        return finding
+    verdict = verdict.proven(worse=errors.growths, condemned=errors.overall.worse)
+    return replace(finding, verdict=verdict)
+
+
+def _checked(data: ModelEvidence) -> ModelEvidence:
+    """Return evidence of a user, refused here where its residuals are none."""
+    data.check()
+    return data
+
+
+def held_out_errors(finding: MachineFinding) -> HeldOutErrors | None:
+    """Return the errors on held-out records before and after; None without such records."""
+    data, verdict = finding.data.held_out, finding.verdict
+    if data is None:
+        return None
+    before, after = (data.left_by(fitted) for fitted in (verdict.base, verdict.accepted))
+    misfit, (record, part) = verdict.accepted.misfit, data.layout
+    among = len(data.parts) + len(finding.held_out_names)
+
+    def gap(rows: Any, count: int) -> Gap:
+        size, corrected = (float(np.sqrt(np.mean(left[rows] ** 2))) for left in (before, after))
+        moved = (after - before)[rows]
+        chance = 2.0 * float(np.linalg.norm(moved)) * misfit**0.5 / moved.size
+        return Gap(size, corrected, 1.0, DEVIATIONS, verdict.rules, chance, count)
+
+    return HeldOutErrors(
+        {name: gap(part == place, among) for place, name in enumerate(data.parts)},
+        {name: gap(record == place, among) for place, name in enumerate(finding.held_out_names)},
+        gap(slice(None), 1),
+    )
