@@ -382,6 +382,7 @@ def test_what_is_alike_alone_is_compared_beside_the_further_effect():
     assert {play, friction} in [set(one.candidates) for one in found.of_size(2)]
 
 
+@pytest.mark.nightly
 def test_no_interval_of_a_torsion_holds_what_is_below_zero():
     """A time of a clutch was told as -7e-4 to 7e-4 s."""
     verdict = verdict_on(planted({SOFT: (0.3, 2e-4, 3.0)}), [SOFT])

@@ -240,6 +240,7 @@ def test_the_delay_of_an_encoder_is_not_told_from_friction():
     assert "in the other order" in torsion_test(finding)
 
 
+@pytest.mark.nightly
 def test_effects_that_make_the_held_out_torsion_worse_are_not_named():
     train, _ = records(Hidden(WINDUP))
     _, other = records(Hidden())

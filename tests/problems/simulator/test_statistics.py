@@ -41,6 +41,7 @@ def problem():
     )
 
 
+@pytest.mark.nightly
 def test_very_many_designs_have_the_objectives_and_constraints_of_few():
     several = robust_problem(
         lambda x, y, a: {"first": x * y + a, "second": x - y * a},
