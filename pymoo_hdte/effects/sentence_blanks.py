@@ -13,7 +13,6 @@ from pymoo_hdte.checks import InvalidInput, one_of
 
 BLANKS = ("port", "order", "force")
 """What a sentence may leave open: the port, the orders, and the word for what acts there."""
-_OUT = " lies outside its tolerance."
 _PORT = r"([A-Za-z]\w*(?:\.\w+)*(?: of \w+)?)"
 _FORM = r"(?:/([a-z\d.+]+(?: s)?))?"
 """A form of an effect; that of a new zero is its time."""
@@ -60,20 +59,7 @@ def sentence_at(sentence: str, port: str, orders: str, force: str) -> str:
 
 def out_of_tolerance_sentence(parameter: str) -> str:
     """Return the sentence for a base parameter, given in words, that is out of tolerance."""
-    return f"The {parameter}{_OUT}"
-
-
-def joined_sentences(sentences: Sequence[str]) -> str:
-    """Return sentences one after the other, all that are of values out of tolerance as one.
-
-    >>> joined_sentences([out_of_tolerance_sentence(one) for one in ("stiffness", "damping")])
-    'The stiffness and damping lie outside their tolerances.'
-    """
-    values = [one.removeprefix("The ").removesuffix(_OUT) for one in sentences if _OUT in one]
-    if len(values) < 2:
-        return " ".join(sentences)
-    of_values = f"The {listed(values)} lie outside their tolerances."
-    return " ".join([*(one for one in sentences if _OUT not in one), of_values])
+    return f"The {parameter} lies outside its tolerance."
 
 
 def listed(words: Sequence[str]) -> str:

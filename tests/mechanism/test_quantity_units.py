@@ -32,7 +32,7 @@ def test_a_ripple_beyond_the_band_has_the_units_of_its_port(angles, units):
         "port": "bearing",
         "parameters": {name: {"value": value} for name, value in RIPPLE.items()},
     }
-    found = SimpleNamespace(found=[SimpleNamespace(as_dicts=lambda: [effect])])
+    found = SimpleNamespace(lines=[SimpleNamespace(as_dicts=lambda: [effect])])
     (one,) = ripples(SimpleNamespace(mechanism=one_coordinate(angles), ripples=found))
     assert {name: value["unit"] for name, value in one["parameters"].items()} == units
 

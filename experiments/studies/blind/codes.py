@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 from experiments.studies.blind.cases import BELIEVED
 from experiments.studies.blind.rig.forms import LISTED, UNLISTED
-from pymoo_hdte.discrepancy._evidence.order_lines.parameters import MECHANICAL
+from pymoo_hdte.discrepancy._records.believed import MECHANICAL
 from pymoo_hdte.discrepancy._selection.verdict import STATUSES as VERDICTS
 from pymoo_hdte.drive._effects import ENCODER_LINE, drive_effects
 

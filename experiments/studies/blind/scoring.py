@@ -29,7 +29,7 @@ from pymoo_hdte.discrepancy._evidence.order_lines.observations import (
     cell_chi_square,
     cell_degrees_of_freedom,
 )
-from pymoo_hdte.discrepancy._evidence.order_lines.parameters import MECHANICAL
+from pymoo_hdte.discrepancy._records.believed import MECHANICAL
 from pymoo_hdte.discrepancy._report.document import effects_of
 from pymoo_hdte.discrepancy._selection.candidate import Layout
 from pymoo_hdte.discrepancy._selection.fitting import Fit, fit

@@ -26,7 +26,7 @@ from pymoo_hdte.discrepancy._evidence.order_lines.observations import (
     cell_chi_square,
     cell_degrees_of_freedom,
 )
-from pymoo_hdte.discrepancy._evidence.order_lines.parameters import MECHANICAL
+from pymoo_hdte.discrepancy._records.believed import MECHANICAL
 from pymoo_hdte.discrepancy._records.line_fit import CHANNELS
 from pymoo_hdte.discrepancy._selection.candidate import Layout
 from pymoo_hdte.discrepancy._verdicts.drive_finding import DriveFinding

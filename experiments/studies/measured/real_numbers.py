@@ -25,7 +25,7 @@ LOST = -10.0
 
 def named(one: Study) -> list[dict[str, Any]]:
     """Return what a verdict names with its values, ripple beyond the band included."""
-    beyond = (effect for ripple in one.finding.ripples.found for effect in ripple.as_dicts())
+    beyond = (effect for ripple in one.finding.ripples.lines for effect in ripple.as_dicts())
     twist = torsion_document(one.joint)["effects"] if one.joint else []
     return [*effects(one.finding), *beyond, *twist]
 

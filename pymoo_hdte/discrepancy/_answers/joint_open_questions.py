@@ -32,7 +32,7 @@ def near_by(finding: JointFinding) -> list[Hypothesis]:
     found = [
         one
         for one in sorted(every, key=lambda one: one.bic)
-        if all(candidate.frees is None for candidate in one.candidates)
+        if all(candidate.releases is None for candidate in one.candidates)
         and share_removed(torsion.sensors, torsion.data, verdict.base, one.fit) >= least
     ]
     return found[:_MOST_TOLD]
@@ -67,7 +67,7 @@ def _in_both(finding: JointFinding) -> list[str]:
     both = [
         one.order
         for one, _ in errors_of(finding.torsion.ripples)
-        if any(abs(one.order - r.order) <= r.resolution for r in finding.torque.ripples.found)
+        if any(abs(one.order - r.order) <= r.resolution for r in finding.torque.ripples.lines)
     ]
     if not both:
         return []

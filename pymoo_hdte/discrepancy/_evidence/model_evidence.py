@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy._selection.candidate import Candidate, candidate_of, out_of_tolerance
-from pymoo_hdte.discrepancy._selection.excess import Excess, Vote
+from pymoo_hdte.discrepancy._selection.excess import Excess, HeldOutTest
 from pymoo_hdte.discrepancy._selection.fitting import Fit, Response, Unknowns, Vector, built
 from pymoo_hdte.discrepancy._selection.rules import RULES, Rules
 from pymoo_hdte.effects.effect import place_of
@@ -155,13 +155,13 @@ class ModelEvidence(ABC):
         names = [parameter.name for parameter in self.base]
         return [out_of_tolerance(name, name) for name in at_bounds if name in names]
 
-    def held_out_vote(self, base: Fit, fitted: Fit) -> Vote | None:
+    def held_out_test(self, base: Fit, fitted: Fit) -> HeldOutTest | None:
         """Return what the records kept out of the fit say of two fits; None without any."""
         if self.held_out is None:
             return None
         before, after = (self.held_out.left_by(each) for each in (base, fitted))
         change = after - before
-        return Vote(float(before @ before), float(after @ after), float(change @ change))
+        return HeldOutTest(float(before @ before), float(after @ after), float(change @ change))
 
     def left_by(self, fitted: Fit) -> Vector:
         """Return the whitened residuals of these records, (n,), by a fit of any records."""

@@ -22,7 +22,7 @@ MECHANICAL = (
 """Fields of `BelievedDrive` that are fitted; J_out, 1/100 of the load's inertia, is not."""
 
 SENSOR_PLACES = ("drive", "brake")
-"""Of the output's torque sensor: before or behind the load inertia."""
+"""Places of the output's torque sensor: between drive and load inertia, or behind both."""
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ class BelievedDrive:
     input_inertia, output_inertia, load_inertia : float
         kg.m2; the load inertia may be zero.
     input_damping, output_damping : float
-        Of the bearings, N.m.s/rad.
+        Damping of the bearings, N.m.s/rad.
     error_orders : tuple of float, length n_lines
         Orders of the static error in cycles per input turn.
     error_amplitudes : tuple of float, length n_lines
@@ -48,18 +48,18 @@ class BelievedDrive:
     error_tolerance : float
         Relative half-width of the amplitudes.
     effects : tuple of Effect
-        Effects that the drive is believed to have beside the motion, Eq. (9); their numbers are
-        fixed but for those in ``tolerances``. The inertia of the load and the damping of the
-        torsion are given as values instead.
+        Effects that the drive is believed to have in addition to Eq. (9). Their numbers are fixed
+        unless ``tolerances`` names them. The inertia of the load and the damping of the torsion are
+        given as values instead.
     tolerances : dict of str to float
-        Relative half-widths of single values: of `MECHANICAL`, which replace ``tolerance``, and of
-        effects, by the names of `known_values`.
+        Relative half-widths of single values. Those of `MECHANICAL` replace ``tolerance``; numbers
+        of effects go by the names of `known_values`.
 
     Raises
     ------
     InvalidInput
-        For a value that is not finite or out of range, orders that do not match, or an effect that
-        is given twice at one place or is a value.
+        For a value that is not finite or out of range, orders that do not match, an effect that is
+        given twice at one place, or one that belongs in a value.
 
     Examples
     --------
@@ -149,17 +149,17 @@ class Rig:
         P and I of ``T_motor = P (w_set - w) + I integral(w_set - w) dt + constant``, N.m.s/rad and
         N.m/rad; both zero for a constant motor torque.
     angle_noise, torsion_angle_noise : float
-        Standard deviations of running and of torsion records, rad.
+        Standard deviations in running and in torsion records, rad.
     input_torque_noise, output_torque_noise : float
         Standard deviations, N.m.
     repeatability : float
-        Of the transmission error from one record to the next, rad.
+        Standard deviation of the transmission error from one record to the next, rad.
     angle_quantisation : float
-        Step, rad.
+        Step of the encoders, rad.
     input_torque_gain, output_torque_gain : float
-        Of the torque sensors, relative.
+        Gain errors of the torque sensors, relative.
     input_torque_zero, output_torque_zero : float
-        Of the torque sensors, N.m.
+        Zero errors of the torque sensors, N.m.
     output_torque_at : {"drive", "brake"}
         Where the torque sensor of the output sits: between drive and load inertia, so that it reads
         the load's torque and what accelerates the load, or behind both, where it reads the load's
@@ -191,13 +191,13 @@ class Rig:
     output_torque_at: str = "drive"
 
     def __post_init__(self) -> None:
-        for one in fields(self):
-            value = getattr(self, one.name)
-            if one.name == "output_torque_at":
-                one_of(one.name, value, SENSOR_PLACES)
+        for attribute in fields(self):
+            value = getattr(self, attribute.name)
+            if attribute.name == "output_torque_at":
+                one_of(attribute.name, value, SENSOR_PLACES)
                 continue
             # Residuals are weighted by the noise, so that it must not be zero.
-            if one.name.endswith("_noise"):
-                real_number(one.name, value, above=0.0)
+            if attribute.name.endswith("_noise"):
+                real_number(attribute.name, value, above=0.0)
             else:
-                real_number(one.name, value, at_least=0.0)
+                real_number(attribute.name, value, at_least=0.0)

@@ -40,9 +40,9 @@ def read_drive_model(path: str | Path, sheet: str | Path | None = None) -> Drive
     Parameters
     ----------
     path : str or Path
-        Of the model, in the format of `load_model`.
+        File of the model, in the format of `load_model`.
     sheet : str or Path, optional
-        Of its data sheet; by default ``NAME_sheet.toml`` beside ``NAME.toml``.
+        File of its data sheet; by default ``NAME_sheet.toml`` beside ``NAME.toml``.
 
     Returns
     -------
@@ -63,7 +63,7 @@ def read_drive_model(path: str | Path, sheet: str | Path | None = None) -> Drive
     """
     path = Path(path)
     sheet = path.with_name(f"{path.stem}{SHEET_SUFFIX}{path.suffix}") if sheet is None else sheet
-    # Where neither file is there, the model is the one that was asked for.
+    # Where neither file exists, the error is about the model's.
     path.stat()
     try:
         return load_model(path, load_datasheet(sheet))
@@ -92,7 +92,7 @@ def believed_of_model(
     InvalidInput
         Whatever `BelievedDrive` refuses.
     """
-    of_values = tuple(one for one in model.effects if one.name in OF_VALUES)
+    of_values = tuple(effect for effect in model.effects if effect.name in OF_VALUES)
     plain = replace(model, effects=of_values).coefficients(model.nominal[None])
     nominal = model.sheet.nominal
 
@@ -112,7 +112,7 @@ def believed_of_model(
         error_amplitudes=tuple(np.abs(plain.error_phasors[0]).tolist()),
         tolerance=tolerance,
         error_tolerance=error_tolerance,
-        effects=tuple(one for one in model.effects if one.name not in OF_VALUES),
+        effects=tuple(effect for effect in model.effects if effect.name not in OF_VALUES),
         tolerances=dict(tolerances or {}),
     )
 
@@ -131,7 +131,7 @@ def believed_from_fields(top: Fields, folder: Path) -> BelievedDrive:
 
 
 def tolerances_of_fields(top: Fields) -> tuple[float, float, dict[str, float]]:
-    """Take ``[tolerance]``: of all values, of the static error, and of single values."""
+    """Take ``[tolerance]``: that of all values, of the static error, and of single values."""
     limits: dict[str, float] = {}
     if top.has("tolerance"):
         table = top.table("tolerance")
@@ -154,21 +154,21 @@ def single_tolerances(table: Fields) -> dict[str, float]:
         For a name without a dot that is none of `MECHANICAL`, or a number that is no tolerance;
         what the effects do not have, `BelievedDrive` refuses.
     """
-    found = {
+    limits = {
         name: table.number(name, at_least=0.0, below=1.0) for name in MECHANICAL if table.has(name)
     }
     for name in table.names():
         if table.is_table(name) or "." in name:
-            found |= _dotted(table, name)
+            limits |= _dotted(table, name)
     table.finish()
-    return found
+    return limits
 
 
 def _dotted(table: Fields, name: str) -> dict[str, float]:
     """Take a number, or the numbers of a table, by dotted names."""
     if not table.is_table(name):
         return {name: table.number(name, at_least=0.0, below=1.0)}
-    inside, found = table.table(name), dict[str, float]()
-    for each in inside.names():
-        found |= {f"{name}.{rest}": one for rest, one in _dotted(inside, each).items()}
-    return found
+    inner, limits = table.table(name), dict[str, float]()
+    for field in inner.names():
+        limits |= {f"{name}.{tail}": limit for tail, limit in _dotted(inner, field).items()}
+    return limits

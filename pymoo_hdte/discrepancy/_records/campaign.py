@@ -52,9 +52,9 @@ class Campaign:
     Raises
     ------
     InvalidInput
-        For no running record, a name used twice, the same measurement under two names, beliefs that
-        no drive can have, or a record that contradicts them or the stated noise (see
-        `plausibility`); for a size that is good enough and not above zero.
+        For no running record, a name used twice, the same measurement under two names, a
+        ``good_enough`` size that is not above zero, values that no drive can have, or a record that
+        contradicts them or the stated noise (see `plausibility`).
 
     Examples
     --------
@@ -83,7 +83,7 @@ class Campaign:
                 real_number(field, size, above=0.0)
         if not self.running:
             raise InvalidInput("running records", 0, "at least one")
-        self._check_each_once()
+        self._check_duplicates()
         largest_load = max(abs(record.load_torque) for record in self.running)
         complaints = Complaints()
         with complaints.noted():
@@ -94,12 +94,12 @@ class Campaign:
                 check_stiffness(self.believed, largest_load, rules)
                 raise
         for record in self.running:
-            with complaints.noted(), _named(record.name):
+            with complaints.noted(), _errors_name_record(record.name):
                 check_running(record, self.believed, self.rig, largest_load, rules)
         for sweep in self.torsion:
-            with complaints.noted(), _named(sweep.name):
+            with complaints.noted(), _errors_name_record(sweep.name):
                 check_torsion(sweep, self.believed, rules)
-        # Below, what is wrong above would be told in other words.
+        # The checks below would only report the same faults in other words.
         complaints.finish()
         check_stiffness(self.believed, largest_load, rules)
         check_noise(self.running, self.torsion, self.believed, self.rig, rules)
@@ -127,8 +127,10 @@ class Campaign:
         """
         old = self.believed
         known = (*MECHANICAL, *known_values(model.effects))
-        kept = {name: one for name, one in old.tolerances.items() if name in known}
-        believed = believed_of_model(model, old.tolerance, old.error_tolerance, kept)
+        tolerances = {
+            name: tolerance for name, tolerance in old.tolerances.items() if name in known
+        }
+        believed = believed_of_model(model, old.tolerance, old.error_tolerance, tolerances)
         return replace(self, believed=believed)
 
     @property
@@ -138,7 +140,7 @@ class Campaign:
 
     @property
     def held_out(self) -> tuple[RunningRecord, ...]:
-        """Running records to validate the result; empty where new conditions cannot be judged."""
+        """Running records that validate the result at new conditions; may be empty."""
         return tuple(record for record in self.running if record.role == "held_out")
 
     @property
@@ -149,7 +151,7 @@ class Campaign:
         """
         return torque_scale([record.load_torque for record in self.running], self.believed)
 
-    def _check_each_once(self) -> None:
+    def _check_duplicates(self) -> None:
         names: set[str] = set()
         measurements: dict[bytes, str] = {}
         records: list[RunningRecord | TorsionRecord] = [*self.running, *self.torsion]
@@ -166,7 +168,7 @@ class Campaign:
 
 
 @contextmanager
-def _named(name: str) -> Iterator[None]:
+def _errors_name_record(name: str) -> Iterator[None]:
     try:
         yield
     except InvalidInput as error:
@@ -184,17 +186,16 @@ RATED_STIFFNESS = 2.583e4
 def torque_scale(loads: Sequence[float], believed: BelievedDrive) -> float:
     """Return the size of a drive in torque: 1 for rigs near `RATED_TORQUE`, a power of two.
 
-    The larger of the applied load and the load expected from the stiffness, since the friction of a
-    drive that was tested with light loads, or with none, still belongs to its size. In steps of
-    two, because only the order of magnitude counts; and multiplying by a power of two does not
-    round.
+    The load counts, or the load expected from the stiffness where that is larger: a drive tested
+    with light loads has the friction of its size all the same. A power of two is exact enough, and
+    multiplying by it does not round.
 
     Parameters
     ----------
     loads : sequence of float
-        Of the running records, N.m.
+        Loads of the running records, N.m.
     believed : BelievedDrive
-        For the stiffness.
+        Gives the stiffness.
     """
     largest = max(abs(load) for load in loads)
     size = max(largest / RATED_TORQUE, believed.stiffness / RATED_STIFFNESS)

@@ -57,7 +57,7 @@ def read_campaign(
     rules : Rules
         Thresholds of what `Campaign` refuses.
     progress : callable, optional
-        Is told how many bytes of the records have been read, and how many there are.
+        Called with the number of bytes of the records read so far, and of all.
 
     Returns
     -------
@@ -107,7 +107,7 @@ def read_campaign(
             with complaints.noted():
                 files.append(read_record(entry, place, path, believed.ratio, shared, seen))
         complaints.finish()
-        records = [one.record for one in files]
+        records = [file.record for file in files]
         running = tuple(record for record in records if isinstance(record, RunningRecord))
         torsion = tuple(record for record in records if isinstance(record, TorsionRecord))
         try:
@@ -121,19 +121,20 @@ def read_campaign(
 
 
 def write_campaign(campaign: Campaign, folder: str | Path) -> None:
-    """Write a campaign to a new or empty folder, completely or not at all, always with equal bytes.
+    """Write a campaign to a new or empty folder, completely or not at all.
 
     Parameters
     ----------
     campaign : Campaign
-        In SI units; the files use the units in the names of their fields.
+        In SI units; the files use the units in the names of their fields, and equal campaigns give
+        equal bytes.
     folder : str or Path
         Where `read_campaign` can read it.
 
     Raises
     ------
     InvalidInput
-        If the folder is a file or holds something.
+        If the folder is a file, or is not empty.
     OSError
         If it cannot be written.
 
@@ -166,7 +167,9 @@ def write_campaign(campaign: Campaign, folder: str | Path) -> None:
 
 def _table(campaign: Campaign) -> dict[str, Any]:
     records: list[RunningRecord | TorsionRecord] = [*campaign.running, *campaign.torsion]
-    stated = {name: one for name, one in GOOD_ENOUGH.items() if getattr(campaign, name) is not None}
+    stated = {
+        name: entry for name, entry in GOOD_ENOUGH.items() if getattr(campaign, name) is not None
+    }
     return {
         "title": campaign.title,
         "drive": campaign.drive,
@@ -186,7 +189,9 @@ def _believed_table(believed: BelievedDrive) -> dict[str, Any]:
     """Return the believed drive as a table, with any tolerances of single values and effects."""
     effects = [effect.to_dict() for effect in believed.effects]
     further = {"tolerances": dict(believed.tolerances), "effect": effects}
-    return in_units(believed, BELIEVED) | {name: one for name, one in further.items() if one}
+    return in_units(believed, BELIEVED) | {
+        name: content for name, content in further.items() if content
+    }
 
 
 def _believed(top: Fields) -> BelievedDrive:
@@ -234,9 +239,9 @@ def _placed_in_files(error: InvalidInput, files: Sequence[FileOfRecord]) -> Inva
 def _place_in_files(error: InvalidInput, files: Sequence[FileOfRecord]) -> str:
     name, _, channel = error.field.partition(": ")
     if channel:
-        (span,) = (one.span for one in files if one.record.name == name)
+        (span,) = (file.span for file in files if file.record.name == name)
         return f"{span()}: {channel}"
-    numbers = [index for index, one in enumerate(files) if one.record.name == error.value]
+    numbers = [index for index, file in enumerate(files) if file.record.name == error.value]
     if numbers:
         return f"{CAMPAIGN_FILE}.record[{numbers[-1]}].file"
     return f"{CAMPAIGN_FILE}.{error.field}"

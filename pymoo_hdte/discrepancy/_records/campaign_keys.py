@@ -66,7 +66,7 @@ RIG = _named(
 )
 
 SENSOR_PLACE = "output_torque_at"
-"""Key of the place of the output's torque sensor, which is no number; absent for the usual one."""
+"""Key of the place of the output's torque sensor, a word; absent for the usual place."""
 
 GOOD_ENOUGH = _named(
     good_enough_error="good_enough_arcsec",
@@ -99,11 +99,12 @@ COLUMNS = {
 }
 
 TEMPERATURE = "temperature"
-"""Channel of the drive's temperature, of which a record has the mean; or else its field has it."""
+"""Channel of the drive's temperature, whose mean a record keeps; `TEMPERATURE_FIELD` replaces
+it."""
 TEMPERATURE_FIELD = "temperature_C"
 
 TRANSMISSION_ERROR = "transmission_error"
-"""Channel of a measured transmission error, in the place of one of the angles."""
+"""Channel of a measured transmission error, which replaces one of the angles."""
 
 LAYOUT = TableLayout(
     format="csv",

@@ -43,15 +43,15 @@ _ENDINGS = (
     *(ENDING, PLAIN_ENDING, ".txt.gz", ".txt"),
     *(ending for endings, _ in READERS.values() for ending in endings),
 )
-"""Of files of records."""
+"""Endings of the files of records."""
 
 Channels = dict[str, Any]
-"""By attribute of the record: an array (n,), or a number for the temperature."""
+"""Values by attribute of the record: arrays (n,), and a number for the temperature."""
 
 
 @dataclass(frozen=True)
 class FileOfRecord:
-    """A record with its file, ``span`` being where its rows stand, found when it is called."""
+    """A record and the name of its file; ``span()`` says where in the file its rows stand."""
 
     record: RunningRecord | TorsionRecord
     file: str
@@ -88,17 +88,17 @@ def read_record(
     Parameters
     ----------
     entry : Fields
-        Without its file.
+        The table, from which `record_path` has taken the file.
     place : str
         Where the table stands.
     path : Path
-        From `record_path`.
+        File of the record, from `record_path`.
     ratio : float
         Transmission ratio N, for angles that wrap.
     shared : TableLayout
         Layout of the campaign's files, which the record may change.
     seen : callable, optional
-        Is told how many further bytes have been read.
+        Called with the number of bytes read since the last call.
 
     Raises
     ------
@@ -112,24 +112,24 @@ def read_record(
     kind: type[RunningRecord | TorsionRecord] = RunningRecord if running else TorsionRecord
     names = RUNNING if running else TORSION
     layout = layout_from_fields(entry.table("table"), shared) if entry.has("table") else shared
-    channels = {name: one for name, one in layout.channels.items() if one.column != ""}
-    of_error = running and TRANSMISSION_ERROR in channels
-    if of_error:
+    channels = {name: channel for name, channel in layout.channels.items() if channel.column != ""}
+    shows_error = running and TRANSMISSION_ERROR in channels
+    if shows_error:
         del channels[_computed_angle(channels, place)]
     layout = replace(layout, channels=channels)
     layout = with_zeros(entry.table("zero"), layout) if entry.has("zero") else layout
     stated = layout.channels
     needed = [field.name for field in fields(kind) if field.name in stated]
-    needed += [TRANSMISSION_ERROR] * of_error
+    needed += [TRANSMISSION_ERROR] * shows_error
     layout = replace(layout, channels={name: stated[name] for name in needed})
     known = _ranges(entry, place) | _temperature(entry, place, layout) if running else {}
     columns = read_columns(path, layout, seen=seen)
     measured = _in_si(columns, ratio)
-    with _placed(columns, place):
+    with _errors_name_file(columns, place):
         record: RunningRecord | TorsionRecord = build(
             kind, names, entry, place, name=_name_of(path.name), role=role, **known, **measured
         )
-    # Without the numbers as they stood in the file, which the record has in SI.
+    # The record has the numbers in SI, so that those of the file need not be kept.
     empty = replace(columns, raw={})
     return FileOfRecord(record, path.name, lambda: empty.span)
 
@@ -150,7 +150,7 @@ def record_table(record: RunningRecord | TorsionRecord) -> dict[str, Any]:
 
 def _name_of(file: str) -> str:
     """Return the name of the record in a file, which stands before its ending; empty for none."""
-    stem = next((file.removesuffix(one) for one in _ENDINGS if file.endswith(one)), "")
+    stem = next((file.removesuffix(ending) for ending in _ENDINGS if file.endswith(ending)), "")
     return stem if is_record_name(stem) else ""
 
 
@@ -177,19 +177,19 @@ def _temperature(entry: Fields, place: str, layout: TableLayout) -> dict[str, fl
     """Take the temperature out of a record's table, where no column has it; K."""
     if not entry.has(TEMPERATURE_FIELD):
         return {}
-    found = entry.number(TEMPERATURE_FIELD)
+    celsius = entry.number(TEMPERATURE_FIELD)
     if TEMPERATURE in layout.channels:
         allowed = f"absent beside the column of the channel {TEMPERATURE}"
-        raise InvalidInput(f"{place}.{TEMPERATURE_FIELD}", found, allowed)
-    if not found > -ORIGINS["C"]:
+        raise InvalidInput(f"{place}.{TEMPERATURE_FIELD}", celsius, allowed)
+    if not celsius > -ORIGINS["C"]:
         allowed = f"above {-ORIGINS['C']:g}, in degrees Celsius"
-        raise InvalidInput(f"{place}.{TEMPERATURE_FIELD}", found, allowed)
-    return {TEMPERATURE: found + ORIGINS["C"]}
+        raise InvalidInput(f"{place}.{TEMPERATURE_FIELD}", celsius, allowed)
+    return {TEMPERATURE: celsius + ORIGINS["C"]}
 
 
 def _computed_angle(stated: dict[str, Channel], place: str) -> str:
-    """Return the angle without a column, for which one of transmission error stands."""
-    # A channel that the file states may equal the usual one, which is that of no other file.
+    """Return the angle that has no column because the transmission error is measured instead."""
+    # By identity, because a file may state a channel that equals the default.
     own = [
         name
         for name in ("input_angle", "output_angle")
@@ -203,9 +203,9 @@ def _computed_angle(stated: dict[str, Channel], place: str) -> str:
 
 
 def _in_si(columns: Columns, ratio: float) -> Channels:
-    """Return time and channels of a file in SI; angles that wrap are on one turn with the other."""
+    """Return time and channels of a file in SI, an angle that wraps on one turn with the other."""
     layout = columns.layout
-    measured: Channels = {name: columns.si(one) for name, one in layout.channels.items()}
+    measured: Channels = {name: columns.si(channel) for name, channel in layout.channels.items()}
     if TEMPERATURE in measured:
         measured[TEMPERATURE] = float(np.mean(measured[TEMPERATURE]))
     if layout.time is not None:
@@ -219,7 +219,7 @@ def _in_si(columns: Columns, ratio: float) -> Channels:
         return measured | {"input_angle": (measured["output_angle"] + error) * ratio}
     if "input_angle" not in measured:
         return measured
-    # The turns before the first row are not known, but the transmission error is far below one.
+    # Turns before the first row are unknown, but the transmission error is far below one turn.
     middle = float(np.median(measured["input_angle"] / ratio - measured["output_angle"]))
     period = layout.channels["input_angle"].period
     if period is not None:
@@ -230,7 +230,7 @@ def _in_si(columns: Columns, ratio: float) -> Channels:
 
 
 @contextmanager
-def _placed(columns: Columns, place: str) -> Iterator[None]:
+def _errors_name_file(columns: Columns, place: str) -> Iterator[None]:
     """Raise errors about the channels of a record as errors about its file."""
     try:
         yield

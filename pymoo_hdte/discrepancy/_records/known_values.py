@@ -1,7 +1,7 @@
 """Numbers of the effects that a drive is believed to have, by name: those that a fit may move.
 
-A name is that of the effect, its port and order, where it has them, and that of the number, with
-dots between: ``coulomb_friction.input.level``, as a campaign's file and a verdict have it.
+A name joins effect, port, order (if it has them) and number by dots, in a campaign's file and in a
+verdict alike: ``coulomb_friction.input.level``.
 """
 
 from __future__ import annotations
@@ -51,14 +51,15 @@ def with_known_values(
     ----------
     effects : sequence of DriveEffect
     values : mapping of str to float
-        By the names of `known_values`, SI; absent numbers stay, further names do not count.
+        By the names of `known_values`, SI. Absent numbers keep their values; other names are
+        ignored.
 
     Raises
     ------
     InvalidInput
         For a number that its law does not take.
     """
-    return tuple(_with(effect, values) for effect in effects)
+    return tuple(_with_values(effect, values) for effect in effects)
 
 
 def of_equal_numbers(
@@ -75,7 +76,7 @@ def of_equal_numbers(
     Returns
     -------
     list of tuple
-        Places of the vectors of a group, and the effects with their numbers.
+        Indices of the vectors of a group, and the effects with its numbers.
     """
     columns = {name: values[name] for name in known_values(effects) if name in values}
     if not columns:
@@ -99,8 +100,8 @@ def known_words(name: str) -> str:
     >>> known_words("torque_ripple.input.2.amplitude")
     'amplitude of the torque ripple of order 2 at the input'
     """
-    effect, _, rest = name.partition(".")
-    place, _, number = rest.rpartition(".")
+    effect, _, address = name.partition(".")
+    place, _, number = address.rpartition(".")
     port = place.partition(".")[0]
     at = f" at the {port}" if port in PORTS else ""
     order = place.removeprefix(port).removeprefix(".") if at else place
@@ -113,7 +114,7 @@ def known_unit(name: str) -> str:
     return effect_named(name.partition(".")[0]).unit(name.rpartition(".")[2])
 
 
-def _with(effect: DriveEffect, values: Mapping[str, float]) -> DriveEffect:
+def _with_values(effect: DriveEffect, values: Mapping[str, float]) -> DriveEffect:
     given = {
         name.rpartition(".")[2]: float(values[name])
         for name in known_values([effect])

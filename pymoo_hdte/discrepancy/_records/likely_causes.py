@@ -6,14 +6,13 @@ import math
 
 from pymoo_hdte.units import FOREIGN, UNITS, si_unit
 
-NEAR = 0.1
-"""Relative distance from a factor up to which it is the likely one: half of that between 1.3558 and
-a load that is off by a third as it may be."""
+LARGEST_DISTANCE = 0.1
+"""Largest relative distance from a factor at which it still is the likely cause."""
 _RATIO_DIGITS = 5
-"""Of a ratio that travels of both angles show: a common zero moves it in no digit of these."""
+"""Digits of the ratio of both angles' travels that hold whatever the zeros of the angles."""
 
 
-def likely_unit(quantity: str, factor: float, near: float = NEAR) -> str:
+def likely_unit(quantity: str, factor: float, distance: float = LARGEST_DISTANCE) -> str:
     """Return which unit or sign explains readings that are too large, as the end of a sentence.
 
     Parameters
@@ -21,13 +20,13 @@ def likely_unit(quantity: str, factor: float, near: float = NEAR) -> str:
     quantity : {"angle", "torque"}
     factor : float
         What was read, in SI, over what is expected.
-    near : float
-        Relative distance up to which a factor explains it.
+    distance : float
+        Largest relative distance from a factor that explains it.
 
     Returns
     -------
     str
-        Empty where no factor comes near.
+        Empty where no factor explains them.
 
     Examples
     --------
@@ -41,22 +40,22 @@ def likely_unit(quantity: str, factor: float, near: float = NEAR) -> str:
         return ""
     shown = f"; {factor:.4g} times what is expected: "
     minus = "scale = -1.0 missing" if factor < 0.0 else ""
-    if abs(size - 1.0) <= near:
+    if abs(size - 1.0) <= distance:
         return f"{shown}is {minus}?" if minus else ""
     also = f", and {minus}" if minus else ""
     known = {unit: 1.0 / in_si for unit, in_si in UNITS[quantity].items()}
-    units = [unit for unit, scale in known.items() if abs(size / scale - 1.0) <= near]
+    units = [unit for unit, scale in known.items() if abs(size / scale - 1.0) <= distance]
     if units:
         return f"{shown}is the column in {' or '.join(map(repr, units))}{also}?"
-    # Already brought to SI by a unit that it is not in.
-    units = [unit for unit, scale in known.items() if abs(size * scale - 1.0) <= near]
+    # The column was converted from a unit that it is not in.
+    units = [unit for unit, scale in known.items() if abs(size * scale - 1.0) <= distance]
     if units:
         stated = " or ".join(map(repr, units))
         return f"{shown}is the column in {si_unit(quantity)!r} and not in {stated}{also}?"
     for unit, (base, scale, _) in FOREIGN.items():
-        if base == si_unit(quantity) and abs(size * scale - 1.0) <= near:
+        if base == si_unit(quantity) and abs(size * scale - 1.0) <= distance:
             return f"{shown}is the column in {unit}, with scale = {scale:.5g} missing{also}?"
-        if base == si_unit(quantity) and abs(size / scale - 1.0) <= near:
+        if base == si_unit(quantity) and abs(size / scale - 1.0) <= distance:
             return (
                 f"{shown}is the load in {unit}, or scale = {scale:.5g} there once too often{also}?"
             )
@@ -69,7 +68,7 @@ def likely_ratio(shown: float, ratio: float) -> str:
     Parameters
     ----------
     shown : float
-        Travel of the input over that of the output.
+        Travel of the input over travel of the output.
     ratio : float
         Believed.
 

@@ -31,15 +31,14 @@ ROWS_A_BLOCK = 1 << 15
 class LineFit:
     """Least squares: ``values = basis @ triangle @ coefficients + residual``.
 
-    The triangle is Cholesky's factor of the products of the columns, which loses twice as many
-    digits as a QR; those of the basis that it gives bring them back (Yamamoto et al., Electronic
-    Transactions on Numerical Analysis 44, 2015). Block by block, so that a record of millions of
-    rows takes the memory of a block: products add up, and a block of the basis follows from the
-    triangle.
+    The triangle is the Cholesky factor of the products of the columns. This loses twice as many
+    digits as a QR; a second factor, of the products of the resulting basis, restores them (Yamamoto
+    et al., Electronic Transactions on Numerical Analysis 44, 2015). Products add up over blocks of
+    rows, so that a record of millions of rows takes the memory of one block.
 
-    Columns are 1, the time from the middle of the record, the cosines, minus the sines, the decay
-    of a record that begins unsettled with its derivative by the time constant, which is known no
-    better than the rows show it, and a step of one at each of the record's jumps.
+    The columns are 1, the time from the middle of the record, the cosines, and minus the sines. A
+    record that begins unsettled adds its decay and the derivative of that by the time constant,
+    which is uncertain; each jump adds a unit step.
 
     Attributes
     ----------
@@ -86,7 +85,7 @@ class LineFit:
 
     def _sharpened(self) -> LineFit:
         """Return the fit with a basis that is orthonormal to the last digits."""
-        products = np.sum([one.T @ one for one in map(self.basis, self.parts)], axis=0)
+        products = np.sum([basis.T @ basis for basis in map(self.basis, self.parts)], axis=0)
         triangle = np.linalg.cholesky(products).T
         whole = None if self.whole is None else _orthonormal(self.whole, triangle)
         return replace(self, whole=whole, triangle=triangle @ self.triangle)
@@ -98,10 +97,10 @@ class LineFit:
 
     @cached_property
     def courses(self) -> NDArray[np.float64]:
-        """Parts in the basis of slow courses of one, shape (p, 9).
+        """Parts in the basis of slow courses of unit size, shape (p, 9).
 
-        First (t - t_mid)^k / k! for k = 2, 3, 4, then decays from the first row on with the time
-        constants `FADING`.
+        These are (t - t_mid)^k / k! for k = 2, 3, 4, then decays from the first row on with the
+        time constants `FADING`.
         """
         constants = np.ptp(self.record.time) * np.array(FADING)
 
@@ -116,7 +115,7 @@ class LineFit:
 
     @property
     def coefficients(self) -> NDArray[np.float64]:
-        """Of the columns, for each channel; the last are what the repair of jumps left, (p, 4)."""
+        """Coefficients of the columns for each channel, shape (p, 4); those of jumps come last."""
         return np.asarray(np.linalg.solve(self.triangle, self.projections))
 
     def basis(self, part: slice) -> NDArray[np.float64]:
@@ -163,18 +162,18 @@ def _design(record: RunningRecord, orders: NDArray[np.float64], part: slice) -> 
 def _waves(angle: NDArray[np.float64], orders: NDArray[np.float64]) -> NDArray[np.complex128]:
     """Return exp(i order angle) at angles (b,) for orders (m,), shape (m, b).
 
-    An order that is the sum of two others is their product: most are, as sums of lines are orders.
+    The wave of an order that is the sum of two others is their product, which saves most cosines.
     """
     waves = np.empty((len(orders), len(angle)), dtype=complex)
     places = dict[float, int]()
     for place in np.argsort(orders).tolist():
         order = float(orders[place])
-        parts = next(((one, order - one) for one in places if order - one in places), None)
+        parts = next(((part, order - part) for part in places if order - part in places), None)
         if parts is None:
             waves[place].real, waves[place].imag = np.cos(order * angle), np.sin(order * angle)
         else:
-            one, other = (waves[places[part]] for part in parts)
-            np.multiply(one, other, out=waves[place])
+            factor, cofactor = (waves[places[part]] for part in parts)
+            np.multiply(factor, cofactor, out=waves[place])
         places[order] = place
     return waves
 
@@ -187,7 +186,7 @@ def _orthonormal(design: NDArray[np.float64], triangle: NDArray[np.float64]) -> 
 def decays(
     record: RunningRecord, part: slice, constants: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Return decays from one at the first row, by time constants (k,), s, in some rows; (b, k)."""
+    """Return decays from 1 at the first row, for time constants (k,), s, in some rows; (b, k)."""
     return np.exp(-np.divide.outer(record.time[part] - record.time[0], constants))
 
 

@@ -27,7 +27,7 @@ CHANNELS = ("transmission_error", "input_torque", "output_torque", "input_angle"
 
 _READ = {"output_angle": (0, False), "input_angle": (0, True), "input_torque": (1, False),
          "output_torque": (2, False)}  # fmt: skip
-"""Place in `CHANNELS` of a mean that becomes uncertain; whether divided by the ratio."""
+"""For each sensor, the place in `CHANNELS` of its mean, and whether the ratio divides it."""
 # Which doubles of orders are fitted beside them decides no verdict.
 _RESOLVED = 0.9
 """Largest double, as a share of the Nyquist order."""
@@ -49,12 +49,12 @@ class OrderLines:
     mean : ndarray, shape (4,)
         Value of the straight line at the middle of the record, rad or N.m.
     slope : ndarray, shape (4,)
-        Of the straight line, rad/s or N.m/s; that of the input angle is the mean input speed.
+        Slope of the straight line, rad/s or N.m/s; that of the input angle is the mean input speed.
     phasors : ndarray of complex, shape (4, m)
         Corrected for the loss by averaging, rad or N.m.
     covariance : ndarray, shape (4, 1 + 2 m, 1 + 2 m)
-        Of (mean, Re phasors, Im phasors) of each channel, from sensor noise and quantisation, in
-        the square of its unit.
+        Covariance of (mean, Re phasors, Im phasors) of each channel, from sensor noise and
+        quantisation, in the square of its unit.
     row_covariance : ndarray, shape (4, 4)
         Covariance of the noise of one row between channels, in the product of their units. The
         covariance of channel a with channel b is ``covariance[a] * row_covariance[a, b] /
@@ -98,9 +98,9 @@ def order_lines(
     Parameters
     ----------
     record : RunningRecord
-        Of a drive at constant speed.
+        Record of a drive at constant speed.
     rig : Rig
-        For the noise.
+        Gives the noise.
     ratio : float
         Transmission ratio N, dimensionless.
     orders : array_like, shape (m,)
@@ -122,29 +122,29 @@ def order_lines(
     >>> lines.mean.shape
     (4,)
     """
-    asked = finite_array("orders", orders, (None,))
-    fit = LineFit.of(record, ratio, [*asked, *_doubles(asked, record, ratio)])
-    m, every = len(asked), len(fit.orders)
-    of_lines = np.r_[2 : 2 + m], np.r_[2 + every : 2 + every + m]
-    gains, coefficients = averaging_gain(asked, record), fit.coefficients
+    checked = finite_array("orders", orders, (None,))
+    fit = LineFit.of(record, ratio, [*checked, *_doubles(checked, record, ratio)])
+    m, n_fitted = len(checked), len(fit.orders)
+    of_lines = np.r_[2 : 2 + m], np.r_[2 + n_fitted : 2 + n_fitted + m]
+    gains, coefficients = averaging_gain(checked, record), fit.coefficients
     real, imaginary = (coefficients[rows].T for rows in of_lines)
     inverse = np.linalg.inv(fit.triangle)
-    kept = np.r_[0, of_lines[0], of_lines[1]]
+    columns = np.r_[0, of_lines[0], of_lines[1]]
     scales = 1.0 / np.concatenate([[1.0], gains, gains])
-    unit = (inverse @ inverse.T)[np.ix_(kept, kept)] * np.outer(scales, scales)
+    unit = (inverse @ inverse.T)[np.ix_(columns, columns)] * np.outer(scales, scales)
     phasors = np.asarray((real + 1j * imaginary) / gains, dtype=complex)
     noise = row_covariance(rig, ratio, record.samples_averaged)
     # The noise of the angle also enters the exponent, where a line is steep; it is nearly white.
-    steepness = asked * phasors
+    steepness = checked * phasors
     noise = noise + 0.5 * (steepness @ steepness.conj().T).real * noise[3, 3]
     real_parts, imaginary_parts = of_lines
 
-    def assigned(projected: NDArray[np.float64]) -> NDArray[np.complex128]:
-        found = inverse @ projected
-        lines = (found[real_parts] + 1j * found[imaginary_parts]).T / gains
-        return np.column_stack([found[0], lines])
+    def line_parts(projected: NDArray[np.float64]) -> NDArray[np.complex128]:
+        parts = inverse @ projected
+        lines = (parts[real_parts] + 1j * parts[imaginary_parts]).T / gains
+        return np.column_stack([parts[0], lines])
 
-    courses = assigned(fit.courses)
+    courses = line_parts(fit.courses)
     covariance = np.diag(noise)[:, None, None] * unit
     for jump in record.jumps:
         channel, share = _READ[jump.channel]
@@ -158,7 +158,7 @@ def order_lines(
             part = error.bent * np.r_[shape.real, shape.imag[1:]]
             covariance[channel] += np.outer(part, part)
     return OrderLines(
-        orders=asked,
+        orders=checked,
         mean=coefficients[0],
         slope=coefficients[1],
         phasors=phasors,
@@ -176,13 +176,13 @@ def _doubles(orders: NDArray[np.float64], record: RunningRecord, ratio: float) -
     other channels and is not orthogonal to it: left out, a ripple of order 8 that made the input
     wobble by 0.02 rad was off by 4e-3 of itself, forty times its interval.
     """
-    found: list[float] = []
+    doubles: list[float] = []
     highest = _RESOLVED * nyquist_order(record)
     for order in (2.0 * orders[orders >= 1.0]).tolist():
-        apart = np.abs(np.concatenate([orders, found]) - order)
-        if order < highest and apart.min() > _APART / ratio:
-            found.append(order)
-    return found
+        distances = np.abs(np.concatenate([orders, doubles]) - order)
+        if order < highest and distances.min() > _APART / ratio:
+            doubles.append(order)
+    return doubles
 
 
 def averaging_gain(orders: ArrayLike, record: RunningRecord) -> NDArray[np.float64]:

@@ -22,8 +22,8 @@ from pymoo_hdte.drive.datasheet import LOST_POWER
 from pymoo_hdte.units import ARCSEC
 
 _LEAP = 2.0
-"""Usual steps of an angle that a leap is off by at least, where its record is refused: a turn is
-as many at the fastest motion at which a wrapped angle can be continued."""
+"""Least size of a leap in usual steps of an angle: a turn is as many at the fastest motion at which
+a wrapped angle can be unwrapped."""
 _FRICTION = 0.5
 """Share of the motor's torque under load, up to which friction may change it."""
 
@@ -76,7 +76,7 @@ def check_stiffness(believed: BelievedDrive, largest_load: float, rules: Rules) 
     ----------
     believed : BelievedDrive
     largest_load : float
-        Of all running records, N.m.
+        Largest load of all running records, N.m.
     rules : Rules
 
     Raises
@@ -215,14 +215,14 @@ def _check_travel(record: RunningRecord, ratio: float, rules: Rules) -> None:
 
 
 def _check_error(record: RunningRecord, ratio: float, rules: Rules) -> None:
-    # All but the outermost hundredth: rows that an encoder read wrongly are left out later.
+    # Without the outermost hundredth, because rows that an encoder read wrongly are left out later.
     errors = np.abs(record.transmission_error(ratio))
     largest = float(np.quantile(errors, 1.0 - rules.spike_share))
     most = rules.largest_transmission_error
     if not largest <= most:
-        travels = [float(np.ptp(one)) for one in (record.input_angle, record.output_angle)]
-        turns = [float(one[-1] - one[0]) for one in (record.input_angle, record.output_angle)]
-        # Where an angle begins anew, its ends tell nothing.
+        travels = [float(np.ptp(angle)) for angle in (record.input_angle, record.output_angle)]
+        turns = [float(angle[-1] - angle[0]) for angle in (record.input_angle, record.output_angle)]
+        # Where an angle wraps, its ends say nothing about the ratio.
         steady = all(0.9 * wide <= abs(turn) for wide, turn in zip(travels, turns, strict=True))
         cause = likely_ratio(turns[0] / turns[1], ratio) if steady and turns[1] else ""
         allowed = (
@@ -233,25 +233,25 @@ def _check_error(record: RunningRecord, ratio: float, rules: Rules) -> None:
 
 
 def _leaps(record: RunningRecord, rules: Rules) -> str:
-    """Return in words where an angle leaps, as a counter that begins anew does, for errors.
+    """Return where an angle leaps, as a counter that wraps does, as the end of a sentence.
 
     Rows that are missing are no leap, nor is a row that was misread, which the next step undoes.
     """
-    found, steps = [], np.diff(record.time)
+    leaps, steps = [], np.diff(record.time)
     for name in ("input_angle", "output_angle"):
         moved = np.diff(getattr(record, name))
         usual = float(np.median(moved / steps))
         off = moved - usual * steps
         least = max(_LEAP * abs(float(np.median(moved))), rules.largest_transmission_error)
-        far = np.abs(off) > least
-        undone = far[:-1] & (np.abs(off[:-1] + off[1:]) < least)
-        far[:-1] &= ~undone
-        far[1:] &= ~undone
-        if far.any():
-            row = int(np.argmax(far))
-            found.append(f"; {name} leaps by {off[row]:.4g} rad after row {row + 1}")
+        leaping = np.abs(off) > least
+        undone = leaping[:-1] & (np.abs(off[:-1] + off[1:]) < least)
+        leaping[:-1] &= ~undone
+        leaping[1:] &= ~undone
+        if leaping.any():
+            row = int(np.argmax(leaping))
+            leaps.append(f"; {name} leaps by {off[row]:.4g} rad after row {row + 1}")
     which = "an angle that begins anew is continued by `unwrap` or `wraps`"
-    return f"{''.join(found)}: {which}" if found else ""
+    return f"{''.join(leaps)}: {which}" if leaps else ""
 
 
 def _check_torques(
@@ -287,7 +287,7 @@ def _check_torques(
     # torque.
     least = rules.load_mismatch * share - slack if load * record.input_speed > 0.0 else -math.inf
     if not (least <= math.copysign(1.0, load) * motor and abs(motor) <= multiple * share + slack):
-        # Friction takes its share of the motor's torque, so that only large factors are told.
+        # Friction takes its share of the motor's torque, so that only large factors are clear.
         cause = likely_unit("torque", motor * ratio / load, _FRICTION)
         allowed = f"near load / ratio = {load / ratio:.3g} N.m{cause}"
         raise InvalidInput("mean of input_torque", motor, allowed)

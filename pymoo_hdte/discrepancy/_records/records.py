@@ -20,20 +20,20 @@ _NOT_IN_NAMES = frozenset('/\\:*?"<>|')
 """Characters that the name of a file cannot have on one system or another."""
 
 _COLDEST, _HOTTEST = 200.0, 473.0
-"""K. No grease of a gear serves beyond -73 and 200 degrees Celsius: the unit is then another."""
+"""Limits of a temperature, K: no grease serves beyond -73 and 200 degrees Celsius."""
 
 
 @dataclass(frozen=True)
 class Jump:
-    """A jump of a sensor within a record, which its rows no longer show.
+    """A jump of a sensor that was taken out of the rows of a record.
 
-    How large it is, is fitted again together with the lines; whether the rows before or after it
-    were right, nobody knows, so that the mean of the channel counts as uncertain by ``size``.
+    Its size is fitted again together with the lines. Nobody knows whether the rows before or after
+    it were right, so the mean of the channel counts as uncertain by ``size``.
 
     Attributes
     ----------
     time : float
-        Of the first row after it, s.
+        Time of the first row after it, s.
     channel : str
         Attribute of the record.
     size : float
@@ -56,10 +56,10 @@ class ReadingError:
     size : float
         Standard deviation of what is added to the mean of the channel, rad or N.m.
     of_lines : bool
-        Whether each part of each order line is as uncertain: with steps that hide the motion.
+        Whether both parts of each order line are as uncertain, as where coarse steps hide them.
     bent : float
-        Standard deviation of what is added as powers 2, 3 and 4 of the time from the middle of the
-        record, as a share of its length, in the unit of ``size``: of a drift that is not straight.
+        Standard deviation of a drift that is not straight, in the unit of ``size``: the coefficient
+        of powers 2, 3 and 4 of the time from the middle of the record, as a share of its length.
     """
 
     channel: str
@@ -77,13 +77,13 @@ class RunningRecord:
     name : str
         In any script, as `is_record_name` has it; also the stem of its file.
     role : {"train", "held_out"}
-        To be fitted, or only to judge the result.
+        To be fitted, or only to validate the result.
     input_speed : float
         Set speed, rad/s; negative in the reverse direction.
     load_torque : float
         N.m at the output; positive against positive rotation.
     sample_rate : float
-        Of the rows, after averaging, Hz.
+        Rate of the rows, after averaging, Hz.
     samples_averaged : int
         Number of raw samples averaged into one row.
     elapsed : float
@@ -97,17 +97,16 @@ class RunningRecord:
         On the input shaft from the motor, and between drive and load inertia, N.m.
     speed_range, load_range : tuple of float, length 2 or 0
         Lowest and highest mean speed, rad/s, and mean load torque, N.m, that the record may have.
-        Without them both are near the values set, within shares that `Rules` has.
+        Without them both must be near the values set, within the limits of `Rules`.
     temperature : float, optional
-        Of the drive in kelvin, near its lubricant; the mean over the record.
+        Mean over the record near the lubricant, K.
     jumps : tuple of Jump
-        Jumps of a sensor that were taken out of the rows; none in a record as it was measured.
+        Jumps of sensors that were taken out of the rows; none in a record as measured.
     reading_errors : tuple of ReadingError
-        What its sensors may be wrong by, as the rows show; none in a record as it was
-        measured.
+        Errors of its sensors that the rows show; none in a record as measured.
     settling : float, optional
-        Time constant in s of the decay with which the rows begin, which is fitted with the lines;
-        None in a record as it was measured.
+        Time constant of the decay with which the rows begin, s; it is fitted with the lines. None
+        in a record as measured.
 
     Raises
     ------

@@ -99,25 +99,25 @@ class _Sums:
         rows: NDArray[np.float64],
         angle: NDArray[np.float64],
         multiples: int,
-        others: NDArray[np.float64],
+        extra_lines: NDArray[np.float64],
     ) -> _Sums:
         """Sum over rows at angles (n,) with waves exp(i line angle).
 
         Lines are 1, 2, .. up to ``multiples``, and then the others.
         """
-        one = np.ones((1, len(angle)))
+        ones = np.ones((1, len(angle)))
         products = _whole_sums(rows, angle, multiples)
-        squares = _whole_sums(one, 2.0 * angle, multiples)
-        if others.size:
-            more = sums_at_lines(angle, rows.astype(complex, order="C"), others)
-            products = np.hstack([products, more])
-            more = sums_at_lines(angle, one.astype(complex), 2.0 * others)
-            squares = np.hstack([squares, more])
+        squares = _whole_sums(ones, 2.0 * angle, multiples)
+        if extra_lines.size:
+            extra_sums = sums_at_lines(angle, rows.astype(complex, order="C"), extra_lines)
+            products = np.hstack([products, extra_sums])
+            extra_sums = sums_at_lines(angle, ones.astype(complex), 2.0 * extra_lines)
+            squares = np.hstack([squares, extra_sums])
         return cls(products, squares[0])
 
-    def plus(self, more: _Sums) -> _Sums:
+    def plus(self, addend: _Sums) -> _Sums:
         """Return the sums over the rows of both."""
-        return _Sums(self.products + more.products, self.squares + more.squares)
+        return _Sums(self.products + addend.products, self.squares + addend.squares)
 
     def amplitudes(self, n: int) -> tuple[NDArray[np.bool_], NDArray[np.float64]]:
         """Fit cosine and sine of each wave, orthogonal to the basis, to residuals of variance 1.
@@ -148,5 +148,5 @@ def _whole_sums(
     pairs.imag[: len(rows) - half] = rows[half:]
     sums = sums_at_whole_lines(angle, pairs, count)
     above, below = sums[..., count + 1 :], sums[..., :count][..., ::-1].conj()
-    found = np.vstack([above + below, -1j * (above - below)])[: len(rows)] / 2.0
-    return np.asarray(found, dtype=complex)
+    sums_of_rows = np.vstack([above + below, -1j * (above - below)])[: len(rows)] / 2.0
+    return np.asarray(sums_of_rows, dtype=complex)

@@ -89,11 +89,11 @@ class MeasuredMechanism:
     Attributes
     ----------
     mechanism : Mechanism
-        Without the effects that are to be found.
+        The mechanism, without the effects that are to be found.
     records : sequence of Record
         At least one of them of role ``train``; others, ``held_out``, to validate the result.
     cutoff : float, optional
-        Hz, up to which the motion is known; by default where it falls below its noise.
+        Frequency up to which the motion is known, Hz; by default where it falls below its noise.
     effects : sequence of LawAt
         Laws that the mechanism is known to have.
     title : str
@@ -151,7 +151,7 @@ def read_rig(
     data : str or Path, optional
         Folder of the files of the records; by default the folder of the rig's file.
     progress : callable, optional
-        Is told how many bytes of the records have been read, and how many there are.
+        Called with the number of bytes of the records read so far, and of all.
 
     Raises
     ------
@@ -182,14 +182,16 @@ def read_rig(
         ]
         _check_names(listed)
         # Each part is read on its own, so that a fault outside of it does no harm.
-        seen = told(progress, [file for one in listed for _ in one.parts for file in one.paths])
+        seen = told(
+            progress, [file for listing in listed for _ in listing.parts for file in listing.paths]
+        )
         coordinates = model.mechanism.coordinates
         records: dict[str, Record] = {}
-        for one in listed:
-            for record in read_records(one, coordinates, noise, seen):
+        for listing in listed:
+            for record in read_records(listing, coordinates, noise, seen):
                 if record.name in records:
                     allowed = "another name: a record that was divided at a gap has it"
-                    raise InvalidInput(f"{one.place}: name", record.name, allowed)
+                    raise InvalidInput(f"{listing.place}: name", record.name, allowed)
                 records[record.name] = record
         _check_noise(noise, records, path.name)
     return MeasuredMechanism(
@@ -206,13 +208,13 @@ def _model(top: Fields, path: Path) -> MechanismModel:
     """Take the believed model out of a rig's file, or out of the file that it names."""
     if not top.has("model"):
         model = model_from_fields(top, path.name)
-        for one in model.mechanism.inputs if model.effects else ():
-            if not one.scaled:
+        for signal in model.mechanism.inputs if model.effects else ():
+            if not signal.scaled:
                 allowed = (
                     "a number, with a tolerance or factor: a known effect has a scale of its own; "
                     "one in units of the signal belongs into a model file, model = ..."
                 )
-                raise InvalidInput(f"{path.name}.inputs.{one.name}.gain", None, allowed)
+                raise InvalidInput(f"{path.name}.inputs.{signal.name}.gain", None, allowed)
         return model
     model = read_mechanism_model(path.parent / top.text("model"))
     cutoff = top.number("cutoff", above=0.0) if top.has("cutoff") else model.cutoff
@@ -220,20 +222,20 @@ def _model(top: Fields, path: Path) -> MechanismModel:
 
 
 def _with_angles(mechanism: Mechanism, listed: Sequence[ListedRecord]) -> Mechanism:
-    """Return a mechanism that knows its angles: as its file says, or else by units of columns.
+    """Return a mechanism that knows its angles, from its file or else from the units of columns.
 
-    A coordinate of which neither tells is no angle and no length.
+    A coordinate without either is no angle and no length.
     """
-    told = [*(mechanism.angles or ()), *(mechanism.lengths or ())]
+    stated = [*(mechanism.angles or ()), *(mechanism.lengths or ())]
     turning = {COUNTS, *UNITS["angle"], *UNITS["speed"]}
     sliding = {*UNITS["length"], *UNITS["linear speed"]}
-    tables = [one.layout.channels for one in listed]
+    tables = [listing.layout.channels for listing in listed]
 
     def all_in(units: set[str]) -> list[str]:
         return [
             name
             for name in mechanism.coordinates
-            if name not in told
+            if name not in stated
             and all(name in table and table[name].unit in units for table in tables)
         ]
 
@@ -244,10 +246,12 @@ def _with_angles(mechanism: Mechanism, listed: Sequence[ListedRecord]) -> Mechan
 
 def _check_names(listed: Sequence[ListedRecord]) -> None:
     taken = set[str]()
-    for one in listed:
-        for name, _, _ in one.parts:
+    for listing in listed:
+        for name, _, _ in listing.parts:
             if name in taken:
-                raise InvalidInput(f"{one.place}.name", name, "a name of its own for each record")
+                raise InvalidInput(
+                    f"{listing.place}.name", name, "a name of its own for each record"
+                )
             taken.add(name)
 
 

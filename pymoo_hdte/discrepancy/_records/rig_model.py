@@ -29,7 +29,7 @@ class MechanismModel:
     effects : tuple of LawAt
         Known laws at its ports.
     cutoff : float or None
-        Hz, up to which the motion is known; None to determine it from the records.
+        Frequency up to which the motion is known, Hz; None to determine it from the records.
 
     Examples
     --------
@@ -49,7 +49,7 @@ def read_mechanism_model(path: str | Path) -> MechanismModel:
     Parameters
     ----------
     path : str or Path
-        Of a file like ``rig.toml``, without records.
+        File like ``rig.toml``, without records.
 
     Raises
     ------
@@ -90,12 +90,13 @@ def model_text(model: MechanismModel) -> str:
     }
     top["ports"] = {port.name: _port_table(port) for port in mechanism.ports}
     top["inputs"] = {
-        one.name: {"acts": one.acts} | ({"gain": _believed_table(one.gain)} if one.scaled else {})
-        for one in mechanism.inputs
+        signal.name: {"acts": signal.acts}
+        | ({"gain": _believed_table(signal.gain)} if signal.scaled else {})
+        for signal in mechanism.inputs
     }
     # The reader takes finite numbers only: a loop without saturation has no limit there.
     loops = [
-        {name: one for name, one in vars(loop).items() if one != float("inf")}
+        {name: value for name, value in vars(loop).items() if value != float("inf")}
         for loop in mechanism.loops
     ]
     rows = [table_of(effect) for effect in model.effects]
@@ -106,21 +107,23 @@ def model_text(model: MechanismModel) -> str:
     return toml_text(top)
 
 
-def _believed_table(one: BelievedValue) -> dict[str, float]:
-    limits = {"tolerance": one.tolerance, "factor": one.factor}
-    return {"value": one.value} | {
+def _believed_table(believed: BelievedValue) -> dict[str, float]:
+    limits = {"tolerance": believed.tolerance, "factor": believed.factor}
+    return {"value": believed.value} | {
         name: limit for name, limit in limits.items() if limit != getattr(NOTHING, name)
     }
 
 
 def _port_table(port: Port) -> dict[str, Any]:
     elements = {"stiffness": port.stiffness, "damping": port.damping}
-    there = {name: _believed_table(one) for name, one in elements.items() if one != NOTHING}
+    stated = {name: _believed_table(value) for name, value in elements.items() if value != NOTHING}
     error = {"error": [vars(line) for line in port.error]} if port.error else {}
-    more: dict[str, Any] = {"load": dict(port.load)} if port.load else {}
+    optional: dict[str, Any] = {"load": dict(port.load)} if port.load else {}
     if port.gear:
-        more["gear"] = vars(port.gear)
-    return {"motion": port.motion, **there} | ({"read": True} if port.read else {}) | error | more
+        optional["gear"] = vars(port.gear)
+    return (
+        {"motion": port.motion, **stated} | ({"read": True} if port.read else {}) | error | optional
+    )
 
 
 def model_from_fields(top: Fields, file: str) -> MechanismModel:
@@ -139,36 +142,36 @@ def model_from_fields(top: Fields, file: str) -> MechanismModel:
 def _mechanism(top: Fields, file: str) -> Mechanism:
     inertias: dict[str, BelievedValue] = {}
     angles: dict[str, bool] = {}
-    for name, table in _named(top, "coordinates", file).items():
+    for name, table in _tables_by_name(top, "coordinates", file).items():
         inertias[name] = _believed(table, "inertia", above=0.0)
         if table.has("angle"):
             angles[name] = _flag(table, "angle", f"{file}.coordinates.{name}")
         table.finish()
     inputs = []
-    for name, table in _named(top, "inputs", file).items():
+    for name, table in _tables_by_name(top, "inputs", file).items():
         acts = _shares(table, "acts", f"{file}.inputs.{name}", inertias)
         scaled = table.has("gain")
         gain = _believed(table, "gain") if scaled else BelievedValue(1.0)
         inputs.append(Input(name, acts, gain, scaled))
         table.finish()
-    pushing = [one.name for one in inputs]
+    input_names = [signal.name for signal in inputs]
     ports = [
-        _port(name, table, f"{file}.ports.{name}", inertias, pushing)
-        for name, table in _named(top, "ports", file).items()
+        _port(name, table, f"{file}.ports.{name}", inertias, input_names)
+        for name, table in _tables_by_name(top, "ports", file).items()
     ]
     rows = top.tables("loops") if top.has("loops") else []
-    loops = [_loop(row, [one.name for one in inputs], inertias) for row in rows]
+    loops = [_loop(row, input_names, inertias) for row in rows]
     turning = [name for name, turns in angles.items() if turns] if angles else None
     sliding = [name for name, turns in angles.items() if not turns] if angles else None
     try:
         return Mechanism(inertias, ports, inputs, loops, turning, sliding)
     except InvalidInput as error:
-        gains = {f"gain of {one.name}": f"{file}.inputs.{one.name}.gain" for one in inputs}
+        gains = {f"gain of {signal.name}": f"{file}.inputs.{signal.name}.gain" for signal in inputs}
         place = gains.get(error.field, f"{file}: {error.field}")
         raise InvalidInput(place, error.value, error.allowed) from None
 
 
-def _named(top: Fields, field: str, file: str) -> dict[str, Fields]:
+def _tables_by_name(top: Fields, field: str, file: str) -> dict[str, Fields]:
     """Return tables by the names that users gave them; only coordinates are required."""
     if field != "coordinates" and not top.has(field):
         return {}
@@ -227,7 +230,7 @@ def _port(
     lines = []
     for row in table.tables("error") if table.has("error") else []:
         coordinate = row.choice("coordinate", coordinates)
-        numbers = {one: row.number(one) for one in ("order", "amplitude", "phase")}
+        numbers = {field: row.number(field) for field in ("order", "amplitude", "phase")}
         lines.append(ErrorLine(coordinate, **numbers))
         row.finish()
     gear = _gear(table.table("gear"), place) if table.has("gear") else None
@@ -260,12 +263,12 @@ def _loop(row: Fields, inputs: Collection[str], coordinates: Collection[str]) ->
 
 
 def _effect(row: Fields, place: str, mechanism: Mechanism) -> LawAt:
-    standing = read_law(row, place, mechanism.port_names)
-    name, port, effect = standing.name, standing.port, effect_named(standing.name)
+    law = read_law(row, place, mechanism.port_names)
+    name, port, effect = law.name, law.port, effect_named(law.name)
     if effect.of_reading and not mechanism.port(port).read:
         allowed = f"a port with read = true: {name} is what its force sensor shows"
         raise InvalidInput(f"{place}.port", port, allowed)
     if effect.loaded and not mechanism.port(port).load:
         allowed = f"a port with load = {{ input = share }}, on which {name} depends"
         raise InvalidInput(f"{place}.port", port, allowed)
-    return standing
+    return law

@@ -23,7 +23,7 @@ SPLIT = 0.6
 _SPEEDS = {*UNITS["speed"], *UNITS["linear speed"]}
 _OF_POSITIONS = {"position", "pos", "angle", "travel", "displacement"}
 _OF_SPEEDS = {"speed", "velocity", "vel", "rate", "rpm", "omega"}
-"""Words in the title of a column that say what it holds."""
+"""Words in the title of a column that name a speed."""
 _ACCELERATIONS = {*UNITS["acceleration"], *UNITS["linear acceleration"]}
 
 
@@ -69,7 +69,7 @@ def listed_record(
     folder : Path
         With the files.
     shared : TableLayout or None
-        That of records without one of their own.
+        Layout of records without one of their own.
 
     Raises
     ------
@@ -103,11 +103,11 @@ def read_records(
     ----------
     listed : ListedRecord
     coordinates : collection of str
-        Names of coordinates; the speed of one is integrated.
+        Names of coordinates, whose speeds are integrated.
     noise : mapping of str to float
         Standard deviations of channels that are known, SI.
     seen : callable, optional
-        Is told how many further bytes have been read.
+        Called with the number of bytes read since the last call.
 
     Raises
     ------
@@ -119,8 +119,8 @@ def read_records(
     """
     if listed.sha256 is not None:
         _check_sha256(*listed.sha256, listed.place)
-    layout, told = _with_positions(listed, coordinates)
-    found = []
+    layout, notes = _with_positions(listed, coordinates)
+    records = []
     tables = [
         (name if len(pieces) == 1 else f"{name}_{number}", role, table)
         for name, role, part in listed.parts
@@ -128,15 +128,15 @@ def read_records(
         for number, table in enumerate(pieces, 1)
     ]
     for name, role, table in tables:
-        of_channels = {one: noise[one] for one in noise if one in table.channels}
-        remarks = [*([table.remark] if table.remark else []), *told]
+        channel_noise = {channel: noise[channel] for channel in noise if channel in table.channels}
+        remarks = [*([table.remark] if table.remark else []), *notes]
         try:
             record = Record(
                 name,
                 role,
                 table.time,
                 table.channels,
-                of_channels,
+                channel_noise,
                 table.dropped,
                 remarks,
                 table.interpolated,
@@ -144,8 +144,8 @@ def read_records(
         except InvalidInput as error:
             place = f"{listed.paths[0].name}: {error.field}"
             raise InvalidInput(place, error.value, error.allowed) from None
-        found.append(record)
-    return found
+        records.append(record)
+    return records
 
 
 def _path(file: str, place: str, folder: Path) -> Path:
@@ -166,14 +166,14 @@ def _files(
         for name in table.names():
             one_of(table._name("channel"), name, tuple(layout.channels))
             stated[name] = _path(table.text(name), table._name(name), folder)
-    found: dict[str, Path] = {}
+    files: dict[str, Path] = {}
     for name in layout.channels:
         path = stated.get(name, main)
         if path is None:
             allowed = f"a file for {name} as well, or file = ... for all that are not here"
             raise InvalidInput(f"{place}.files", sorted(stated), allowed)
-        found[name] = path
-    return found
+        files[name] = path
+    return files
 
 
 def _parts(entry: Fields, place: str, path: Path) -> tuple[tuple[str, str, Part | None], ...]:
@@ -195,8 +195,8 @@ def _parts(entry: Fields, place: str, path: Path) -> tuple[tuple[str, str, Part 
 def _with_positions(
     listed: ListedRecord, coordinates: Collection[str]
 ) -> tuple[TableLayout, list[str]]:
-    """Return the layout with positions for speeds of coordinates, and what is to be told of it."""
-    channels, told = dict(listed.layout.channels), []
+    """Return the layout with positions for speeds of coordinates, and remarks about them."""
+    channels, notes = dict(listed.layout.channels), []
     for name in coordinates:
         unit = channels[name].unit if name in channels else ""
         if unit in _ACCELERATIONS:
@@ -208,12 +208,12 @@ def _with_positions(
         if unit in _SPEEDS:
             _check_title(name, channels[name])
             channels[name] = replace(channels[name], integrated=True)
-            told.append(
+            notes.append(
                 f"The position {name} is its speed, integrated from the first row of the file: "
                 "where it began is not known, and an error of the sensor's zero makes it drift. A "
                 "constant force may be that of a spring, and phases over the position are relative."
             )
-    return replace(listed.layout, channels=channels), told
+    return replace(listed.layout, channels=channels), notes
 
 
 def _check_title(name: str, channel: Channel) -> None:

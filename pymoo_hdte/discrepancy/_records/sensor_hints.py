@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from pymoo_hdte.discrepancy._records.campaign import Campaign
-from pymoo_hdte.discrepancy._records.likely_causes import NEAR, likely_unit
+from pymoo_hdte.discrepancy._records.likely_causes import LARGEST_DISTANCE, likely_unit
 
 _ERRORS = 3.0
 """Standard errors within which the factor of a unit explains the mean torques."""
 _SURE = 5.0
 """Standard errors between a sensor that feels the load's inertia and one that does not."""
 _HALF = 0.5
-"""Of the inertia: within it of what a place shows, a sensor is nearer to that place."""
+"""Share of the load inertia within which a reading belongs to the nearer of both places."""
 
 
 def inertia_felt(campaign: Campaign) -> tuple[float, float]:
@@ -24,7 +24,7 @@ def inertia_felt(campaign: Campaign) -> tuple[float, float]:
     Parameters
     ----------
     campaign : Campaign
-        With a load inertia.
+        A campaign of a drive with a load inertia.
 
     Returns
     -------
@@ -58,37 +58,40 @@ def sensor_hints(campaign: Campaign) -> list[str]:
     ----------
     campaign : Campaign
     """
-    return [hint for hint in (_of_place(campaign), _of_unit(campaign)) if hint]
+    return [hint for hint in (_place_hint(campaign), _unit_hint(campaign)) if hint]
 
 
-def _of_unit(campaign: Campaign) -> str:
+def _unit_hint(campaign: Campaign) -> str:
     """Return which unit the mean torques are in, if it is not that of the loads that were set.
 
-    A factor counts as near within its standard error and what is stated of gain and zero.
+    A factor may differ by its standard error and by the stated errors of gain and zero.
     """
-    records = [one for one in campaign.running if one.load_torque and not one.load_range]
-    load = np.array([one.load_torque for one in records])
-    measured = np.array([np.mean(one.output_torque) for one in records])
+    records = [
+        record for record in campaign.running if record.load_torque and not record.load_range
+    ]
+    load = np.array([record.load_torque for record in records])
+    measured = np.array([np.mean(record.output_torque) for record in records])
     power = float(load @ load)
     factor = float(load @ measured) / power if power else 0.0
     if not factor:
         return ""
     error = float(np.std(measured - factor * load)) / power**0.5
     zero = campaign.rig.output_torque_zero * float(np.abs(load).sum()) / power
-    near = campaign.rig.output_torque_gain + (zero + _ERRORS * error) / abs(factor)
-    cause = likely_unit("torque", factor, min(near, NEAR))
+    distance = campaign.rig.output_torque_gain + (zero + _ERRORS * error) / abs(factor)
+    cause = likely_unit("torque", factor, min(distance, LARGEST_DISTANCE))
     return f"The output torque is{cause.removeprefix(';')}" if cause else ""
 
 
-def _of_place(campaign: Campaign) -> str:
+def _place_hint(campaign: Campaign) -> str:
     """Return where the output's torque sensor seems to sit, if it is not where it is stated.
 
-    At least half of the inertia, and several standard errors, are between both places.
+    The reading must differ from the stated place by half of the inertia and several standard
+    errors.
     """
     share, error = inertia_felt(campaign)
     at_drive = campaign.rig.output_torque_at == "drive"
-    stated, other = (1.0, 0.0) if at_drive else (0.0, 1.0)
-    if abs(share - stated) <= max(_HALF, _SURE * error) or abs(share - other) >= _HALF:
+    stated, alternative = (1.0, 0.0) if at_drive else (0.0, 1.0)
+    if abs(share - stated) <= max(_HALF, _SURE * error) or abs(share - alternative) >= _HALF:
         return ""
     where, place = ("behind", "brake") if at_drive else ("in front of", "drive")
     return (

@@ -24,7 +24,7 @@ _WIDTH = 16
 """Points of the grid under a kernel: with twice as many points as waves it errs 10^(1 - width)."""
 _SHAPE = 2.3 * _WIDTH
 _NODES = 100
-"""Of the Gauss rule for the transform of the kernel, which is smooth."""
+"""Nodes of the Gauss rule for the transform of the kernel, which is smooth."""
 _AT_ONCE = 2**16
 """Angles at a time, which bounds the memory."""
 
@@ -79,10 +79,10 @@ def spread_sums(
     for start in range(0, len(angle), _AT_ONCE):
         part = slice(start, start + _AT_ONCE)
         places = np.mod(angle[part], 2.0 * np.pi) / step
-        near = np.ceil(places - _WIDTH / 2.0)[:, None] + np.arange(_WIDTH)
-        weights = _kernel((near - places[:, None]) / (_WIDTH / 2.0))
+        grid_places = np.ceil(places - _WIDTH / 2.0)[:, None] + np.arange(_WIDTH)
+        weights = _kernel((grid_places - places[:, None]) / (_WIDTH / 2.0))
         columns = np.repeat(np.arange(len(places)), _WIDTH)
-        where = np.mod(near, points).astype(int).ravel(), columns
+        where = np.mod(grid_places, points).astype(int).ravel(), columns
         grid += csr_array((weights.ravel(), where), (points, len(places))) @ rows[:, part].T
     waves = np.arange(-highest, highest + 1)
     nodes, shares = np.polynomial.legendre.leggauss(_NODES)

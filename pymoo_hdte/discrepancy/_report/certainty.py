@@ -11,8 +11,8 @@ from pymoo_hdte.discrepancy._report.words import doubts
 from pymoo_hdte.discrepancy._selection.hypothesis import (
     Hypothesis,
     adequate,
+    contradicted_parts,
     explains,
-    unexplained,
 )
 from pymoo_hdte.discrepancy._selection.verdict import Verdict
 from pymoo_hdte.discrepancy._verdicts.drive_finding import DriveFinding
@@ -101,7 +101,7 @@ def _next_best(best: Hypothesis, chosen: Hypothesis, error_orders: Sequence[floa
 
 def _too_little(finding: DriveFinding, nearest: Hypothesis) -> str:
     """Return why the nearest effect is not named."""
-    residual = unexplained(finding.data, finding.verdict.base, nearest.fit)
+    residual = contradicted_parts(finding.data, finding.verdict.base, nearest.fit)
     if residual.any():
         parts = [
             part.replace("_", " ") for part, missed in zip(PARTS, residual, strict=True) if missed

@@ -15,7 +15,7 @@ from pymoo_hdte.discrepancy._answers.where.map import Location
 from pymoo_hdte.discrepancy._answers.where.relevance import relevance
 from pymoo_hdte.discrepancy._evidence.order_lines.evidence import PARTS
 from pymoo_hdte.discrepancy._evidence.order_lines.parameters import base_unit, labels_by_order
-from pymoo_hdte.discrepancy._report.words import doubts
+from pymoo_hdte.discrepancy._report.words import doubts, what_is_missing
 from pymoo_hdte.discrepancy._selection.candidate import Candidate, labels_apart
 from pymoo_hdte.discrepancy._selection.fitting import Fit
 from pymoo_hdte.discrepancy._selection.hypothesis import (
@@ -28,7 +28,6 @@ from pymoo_hdte.discrepancy._selection.rules import Rules
 from pymoo_hdte.discrepancy._selection.verdict import Verdict
 from pymoo_hdte.discrepancy._verdicts.drive_finding import DriveFinding
 from pymoo_hdte.discrepancy._verdicts.stated_sensors import scale_error, shares_scale
-from pymoo_hdte.effects.sentence_blanks import joined_sentences
 from pymoo_hdte.effects.unknowns import HARMONIC_NAMES, Parameter, line_with_variance
 
 SCHEMA_VERSION = 1
@@ -117,7 +116,7 @@ def sentence(verdict: Verdict, error_orders: Sequence[float] = ()) -> str:
         return "Nothing is missing: the believed drive explains the records within its tolerances."
     if chosen is None:
         return "Something is missing that no known effect explains."
-    what = joined_sentences([candidate.sentence for candidate in chosen.candidates])
+    what = what_is_missing(chosen.candidates)
     if not chosen.listed:
         return f"Something is missing that is none of the known effects. {what}"
     if verdict.status == "unlisted":
@@ -232,8 +231,8 @@ def _parameters(
     The phase is that of amplitude cos(order theta_in + phase), in the direction of the part fitted.
     """
     found: dict[str, Any] = {}
-    if candidate.frees is not None:
-        rows = [[one.name for one in fitted.parameters].index(candidate.frees)]
+    if candidate.releases is not None:
+        rows = [[one.name for one in fitted.parameters].index(candidate.releases)]
     values, scale = expected_values(fitted, rules), scale_error(fitted, rules)
     for row in rows:
         one = fitted.parameters[row]

@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 
 from pymoo_hdte.discrepancy._evidence.order_lines.parameters import labels_by_order
 from pymoo_hdte.discrepancy._selection import reason as codes
+from pymoo_hdte.discrepancy._selection.candidate import Candidate
 from pymoo_hdte.discrepancy._selection.reason import Reason
 from pymoo_hdte.discrepancy._selection.verdict import Verdict
 from pymoo_hdte.effects.sentence_blanks import listed
@@ -55,6 +56,20 @@ _SENTENCES: dict[str, Callable[[Reason, Label], str]] = {
         f"{reason.effect} ended at the bound of its tolerance"
     ),
 }
+
+
+def what_is_missing(candidates: Sequence[Candidate]) -> str:
+    """Return the sentences of effects, values out of tolerance as one.
+
+    Parameters
+    ----------
+    candidates : sequence of Candidate
+    """
+    released = [candidate.released for candidate in candidates if candidate.released]
+    if len(released) < 2:
+        return " ".join(candidate.sentence for candidate in candidates)
+    effects = [candidate.sentence for candidate in candidates if not candidate.released]
+    return " ".join([*effects, f"The {listed(released)} lie outside their tolerances."])
 
 
 def in_a_sentence(reason: Reason, label: Label = str) -> str:

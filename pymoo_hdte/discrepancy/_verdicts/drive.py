@@ -23,7 +23,7 @@ from pymoo_hdte.discrepancy._evidence.order_lines.prediction import coefficients
 from pymoo_hdte.discrepancy._evidence.order_lines.sizes import port_sizes, scales_of
 from pymoo_hdte.discrepancy._evidence.order_lines.steady_states import PREDICTION
 from pymoo_hdte.discrepancy._records.campaign import Campaign
-from pymoo_hdte.discrepancy._records.cleaning.cleaning import examined_rows
+from pymoo_hdte.discrepancy._records.cleaning.cleaning import cleaned_rows
 from pymoo_hdte.discrepancy._records.records import RunningRecord
 from pymoo_hdte.discrepancy._selection.candidate import Candidate
 from pymoo_hdte.discrepancy._selection.fitting import Fit, fit
@@ -78,7 +78,7 @@ def examine_drive(campaign: Campaign, rules: Rules = RULES) -> DriveFinding:
         raise InvalidInput("number of train records", len(campaign.train), allowed)
     ratio = campaign.believed.ratio
     expected = expected_orders(campaign, rules)
-    campaign, rows = examined_rows(campaign, expected, rules)
+    campaign, rows = cleaned_rows(campaign, expected, rules)
     features = measure(campaign, campaign.train, expected)
     lines = unexpected_lines(features, ratio, campaign.rig, rules)
     held = flanks_held(features, campaign.torque_scale, rules)

@@ -102,7 +102,7 @@ def errors_of(ripples: Ripples) -> list[tuple[Ripple, Part]]:
     """
     return [
         (one, part)
-        for one in ripples.found
+        for one in ripples.lines
         for part in one.parts
         if isinstance(part.law.law, PeriodicTorque)
     ]

@@ -27,7 +27,7 @@ from pymoo_hdte.discrepancy._evidence.force_balances.preconditions import (
 from pymoo_hdte.discrepancy._evidence.force_balances.unexplained import (
     fitted_values,
     root_mean_square,
-    with_rest,
+    with_unexplained_residual,
 )
 from pymoo_hdte.discrepancy._selection.candidate import Candidate
 from pymoo_hdte.discrepancy._selection.fitting import Fit, fit
@@ -99,7 +99,7 @@ def examine_mechanism(
     check_scale(sensors)
     data, verdict = examined(sensors)
     ripples = _beyond(sensors, sampled, cutoff, verdict)
-    if ripples.found and verdict.status == "unlisted":
+    if ripples.lines and verdict.status == "unlisted":
         data, verdict, ripples = _beside(sensors, sampled, cutoff, data, verdict, ripples)
     verdict = replace(verdict, seen_beyond=ripples.names)
     # A ripple beyond the band moves nothing that could be measured, and takes a solver many steps.
@@ -145,7 +145,7 @@ def _beside(
             break
         (data, verdict), ripples = again, taken
         taken = _beyond(sensors, sampled, cutoff, verdict)
-        if not taken.found or taken.laws == ripples.laws:
+        if not taken.lines or taken.laws == ripples.laws:
             break
     return data, verdict, ripples
 
@@ -166,7 +166,7 @@ def examined(
     base = fit(sensors)
     seen = position_orders(sensors, base)
     of_fit = partial(candidates or _candidates, sensors, base, seen)
-    data, every, best = with_rest(sensors, base, of_fit)
+    data, every, best = with_unexplained_residual(sensors, base, of_fit)
     return data, judged(sensors, data, every, best)
 
 

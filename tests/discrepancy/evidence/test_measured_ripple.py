@@ -16,10 +16,10 @@ from pymoo_hdte.discrepancy._evidence.force_balances.beyond_band.high_band impor
 from pymoo_hdte.discrepancy._evidence.force_balances.beyond_band.order_search import (
     SeenOrder,
     _at_two_speeds,
+    _order_grids,
     _refined,
     _significance,
-    _tried,
-    told_from_frequencies,
+    differs_from_frequencies,
 )
 from pymoo_hdte.discrepancy._evidence.force_balances.beyond_band.ripple import find_ripples
 from pymoo_hdte.discrepancy._evidence.force_balances.beyond_band.ripple_size import size_of
@@ -93,7 +93,7 @@ def test_no_noise_and_no_line_of_one_frequency_is_an_order(kind):
         found = find_ripples(
             JOINT, [record(q, dry + 0.1 * noises(generator)[kind], generator)], CUTOFF
         )
-        assert found.found == ()
+        assert found.lines == ()
 
 
 @pytest.mark.parametrize("count", [15, pytest.param(600, marks=pytest.mark.nightly)])
@@ -104,7 +104,7 @@ def test_noise_makes_an_order_significant_as_rarely_as_the_rule_says(count):
     for _ in range(count):
         torque = lfilter([1.0], [1.0, -0.6], generator.standard_normal(len(TIME)))
         bands = bands_of(q, torque, generator)
-        grids, resolution, _ = _tried(bands, (), rules)
+        grids, resolution, _ = _order_grids(bands, (), rules)
         alarms += bool(np.any(_significance(bands, grids, (), resolution, rules) > 1.0))
     assert alarms <= count * chance + 3.0 * math.sqrt(count * chance)
 
@@ -114,7 +114,7 @@ def test_the_orders_of_a_gear_are_seen_at_a_smaller_size():
     q = swings(generator)
     bands = bands_of(q, 0.02 * np.cos(202.0 * q) + 0.1 * noises(generator)["white"], generator)
     expected = tuple(GEAR.expected)
-    grids, resolution, _ = _tried(bands, expected, RULES)
+    grids, resolution, _ = _order_grids(bands, expected, RULES)
     there = int(np.argmin(np.abs(np.concatenate(grids) - 202.0)))
     with_gear, without = (
         _significance(bands, grids, known, resolution, RULES)[there] for known in (expected, ())
@@ -139,7 +139,7 @@ def test_a_ripple_beyond_the_band_is_found_with_its_kind_order_and_size(kind, or
     q = swings(generator)
     noise = 0.1 * noises(generator)["mains"]
     torque = hidden(kind, order, 0.1, phase, q) + noise
-    (one,) = find_ripples(JOINT, [record(q, torque, generator)], CUTOFF).found
+    (one,) = find_ripples(JOINT, [record(q, torque, generator)], CUTOFF).lines
     (part,) = one.parts
     assert part.law.name == kind
     assert one.order == pytest.approx(order, abs=0.25 * one.resolution)
@@ -157,8 +157,8 @@ def test_at_one_speed_an_order_and_a_frequency_look_alike_and_neither_is_an_orde
     for line in (np.cos(202.0 * q), np.cos(2.0 * np.pi * 50.0 * TIME)):
         torque = 0.02 * line + 0.1 * generator.standard_normal(len(TIME))
         bands = bands_of(q, torque, generator)
-        assert not told_from_frequencies(bands, 202.0, RULES)[0]
-        assert find_ripples(JOINT, [record(q, torque, generator)], CUTOFF).found == ()
+        assert not differs_from_frequencies(bands, 202.0, RULES)[0]
+        assert find_ripples(JOINT, [record(q, torque, generator)], CUTOFF).lines == ()
 
 
 def test_what_follows_the_position_at_one_speed_only_is_no_order():
@@ -182,7 +182,7 @@ def test_two_records_of_one_speed_each_tell_an_order_from_a_frequency():
             torque = line(q) + mains + 0.1 * generator.standard_normal(len(TIME))
             one = record(q, torque, generator)
             records.append(Record(name, "train", one.time, one.channels))
-        found = find_ripples(JOINT, records, CUTOFF).found
+        found = find_ripples(JOINT, records, CUTOFF).lines
         assert [one.order for one in found] == pytest.approx(orders, abs=0.3)
 
 
@@ -193,9 +193,9 @@ def test_how_the_amplitude_changes_with_the_speed_is_said(power, words):
     speed = np.abs(np.gradient(q, STEP))
     torque = np.maximum(speed, 0.1) ** power * np.cos(202.0 * q)
     torque = torque + 0.02 * generator.standard_normal(len(TIME))
-    one = find_ripples(JOINT, [record(q, torque, generator)], CUTOFF).found[0]
+    one = find_ripples(JOINT, [record(q, torque, generator)], CUTOFF).lines[0]
     assert one.trend.startswith(f"It {words}")
-    (plain,) = find_ripples(joint(), [record(q, torque, generator)], CUTOFF).found
+    (plain,) = find_ripples(joint(), [record(q, torque, generator)], CUTOFF).lines
     turns = f"{one.order / GEAR.ratio:.4g} per input turn"
     for told, without in ((one.sentence, plain.sentence), (one.words, plain.words)):
         assert turns in told
@@ -213,10 +213,10 @@ def test_a_ripple_that_other_records_do_not_show_is_not_named():
     first = record(train, 0.1 * np.cos(202.0 * train) + noise[0], generator)
     shows = record(other, 0.1 * np.cos(202.0 * other) + noise[1], generator, "held_out")
     not_there = record(other, noise[2], generator, "held_out")
-    (one,) = find_ripples(JOINT, [first, shows], CUTOFF).found
+    (one,) = find_ripples(JOINT, [first, shows], CUTOFF).lines
     assert one.held_out[1] < one.held_out[0]
     lost = find_ripples(JOINT, [first, not_there], CUTOFF)
-    assert not lost.found
+    assert not lost.lines
     assert "not named" in lost.limits[0]
 
 
@@ -225,8 +225,8 @@ def test_what_is_known_already_is_not_found_again():
     q = swings(generator)
     torque = hidden("torque_ripple", 202.0, 0.3, 1.0, q)
     one = record(q, torque + 0.1 * generator.standard_normal(len(TIME)), generator)
-    (ripple,) = find_ripples(JOINT, [one], CUTOFF).found
-    assert not find_ripples(JOINT, [one], CUTOFF, [part.law for part in ripple.parts]).found
+    (ripple,) = find_ripples(JOINT, [one], CUTOFF).lines
+    assert not find_ripples(JOINT, [one], CUTOFF, [part.law for part in ripple.parts]).lines
 
 
 def geared(*shares):
@@ -246,21 +246,21 @@ def test_a_ripple_has_one_size_by_the_angle_of_the_motor_and_by_that_of_the_outp
     output = record(q, torque, generator)
     channels = {"m": 101.0 * output.channels["q"], "torque": torque / 101.0}
     motor = Record("motor", "train", output.time, channels)
-    (expected,) = find_ripples(JOINT, [output], CUTOFF).found
-    (one,) = find_ripples(geared(1.0 / 101.0), [motor], CUTOFF).found
+    (expected,) = find_ripples(JOINT, [output], CUTOFF).lines
+    (one,) = find_ripples(geared(1.0 / 101.0), [motor], CUTOFF).lines
     assert one.order == pytest.approx(expected.order, rel=1e-6)
     ((name, (size, variance)), *_), same = one.parts[0].values.items(), expected.parts[0].values
     assert size == pytest.approx(0.1, abs=0.005)
     assert (size, variance) == pytest.approx(same[name], rel=1e-4)
     # Ports of the same motion have the same forces: one of them is named, and known at each.
     both = geared(1.0, 1.0 / 101.0)
-    (one,) = find_ripples(both, [motor], CUTOFF).found
+    (one,) = find_ripples(both, [motor], CUTOFF).lines
     assert one.order == pytest.approx(2.0, rel=1e-3)
     for there in (both.ports[0], both.ports[1]):
         order = one.order / there.motion["m"]
         law = effect_named("torque_ripple").law_of({"order": order, "amplitude": 1.0, "phase": 0.0})
         known = [LawAt("torque_ripple", there.name, law)]
-        assert not find_ripples(both, [motor], CUTOFF, known).found
+        assert not find_ripples(both, [motor], CUTOFF, known).lines
 
 
 @pytest.mark.parametrize("count", [40, pytest.param(400, marks=pytest.mark.nightly)])
@@ -295,7 +295,7 @@ def test_an_order_that_differs_between_the_directions_is_known_no_better_than_th
     forward = np.gradient(q) > 0.0
     torque = 0.1 * np.where(forward, np.cos(202.0 * q), np.cos(200.0 * q))
     torque = torque + 0.02 * generator.standard_normal(len(TIME))
-    one, *_ = find_ripples(JOINT, [record(q, torque, generator)], CUTOFF).found
+    one, *_ = find_ripples(JOINT, [record(q, torque, generator)], CUTOFF).lines
     least, most = one.as_dicts()[0]["parameters"]["order"]["interval95"]
     assert least < 200.0 < 202.0 < most
     assert "200 is 2 per input turn" in one.meaning
@@ -310,7 +310,7 @@ def test_in_one_direction_a_torque_is_not_told_from_friction():
         torque = hidden("position_dependent_friction", 202.0, 0.1, 1.0, q)
         torque = torque + 0.05 * generator.standard_normal(len(TIME))
         found = find_ripples(JOINT, [record(q, torque, generator)], CUTOFF)
-        (one,) = found.found
+        (one,) = found.lines
         assert one.ways == ways
         doubted = [words for words in found.limits if "one direction only" in words]
         assert len(doubted) == (ways == 1)
@@ -335,7 +335,7 @@ def test_a_ripple_has_the_size_of_the_fitted_gain():
     accepted = finding.accepted
     names = [parameter.name for parameter in accepted.parameters]
     assert accepted.values[names.index("gain of torque")] == pytest.approx(1.0, rel=0.03)
-    (one,) = finding.ripples.found
+    (one,) = finding.ripples.lines
     assert one.parts[0].values["amplitude"][0] == pytest.approx(0.1, rel=0.04)
 
 
@@ -354,7 +354,7 @@ def test_a_ripple_in_rows_at_uneven_times_has_its_size(kind):
     even = even_steps(time, {"q": q, "torque": torque})
     assert even.interpolated
     one = Record("uneven", "train", even.time, even.signals, interpolated=True)
-    (found, *_) = find_ripples(JOINT, [one], CUTOFF).found
+    (found, *_) = find_ripples(JOINT, [one], CUTOFF).lines
     (size, _), *_ = found.parts[0].values.values()
     assert found.parts[0].law.name == kind
     assert size == pytest.approx(0.3, rel=0.05)
@@ -377,7 +377,7 @@ def test_a_ripple_that_hides_the_gain_is_told_with_the_gain_that_is_found_withou
     finding = examine_mechanism(mechanism, [record(q, torque, generator)], 8.0)
     assert [one.name for one in finding.accepted.candidates] == ["coulomb_friction"]
     assert finding.accepted.values[:2] == pytest.approx([0.5, 1.0], rel=0.01)
-    (one,) = finding.ripples.found
+    (one,) = finding.ripples.lines
     assert one.parts[0].values["amplitude"][0] == pytest.approx(0.5, rel=0.02)
     assert finding.believed == ()
 
@@ -389,9 +389,9 @@ def test_a_range_of_orders_that_is_too_long_is_cut_at_its_end_and_that_is_said()
     q = 0.01 * swings(generator)
     force = 0.2 * generator.standard_normal(len(TIME))
     bands = bands_of(q, force, generator)
-    (whole,), resolution, cut = _tried(bands, (), RULES)
+    (whole,), resolution, cut = _order_grids(bands, (), RULES)
     assert not cut
-    (short,), _, cut = _tried(bands, (), rules)
+    (short,), _, cut = _order_grids(bands, (), rules)
     assert cut
     assert len(short) <= 101
     # No finer, and from as low on, than without a cut.
@@ -411,9 +411,9 @@ def test_an_order_of_a_gear_is_seen_between_whole_numbers_and_beyond_a_cut():
     for order in (40.6, 81.2):
         force = 0.03 * np.cos(order * q) + 0.1 * generator.standard_normal(len(TIME))
         one = [record(q, force, generator)]
-        found = find_ripples(joint(gear), one, CUTOFF, rules=rules).found
+        found = find_ripples(joint(gear), one, CUTOFF, rules=rules).lines
         assert [each.order for each in found] == pytest.approx([order], abs=0.02)
-        assert not find_ripples(joint(), one, CUTOFF, rules=rules).found
+        assert not find_ripples(joint(), one, CUTOFF, rules=rules).lines
 
 
 def test_a_gear_is_at_a_port_that_is_an_angle_only():
@@ -484,6 +484,6 @@ def test_joints_of_a_robot_have_two_or_four_cycles_per_input_turn(number):
         Record(role, role, even[part], {name: one[part] for name, one in channels.items()})
         for role, part in (("train", slice(first)), ("held_out", slice(first, None)))
     ]
-    found = find_ripples(JOINT, records, 3.5).found
+    found = find_ripples(JOINT, records, 3.5).lines
     assert any(abs(one.order - order) <= one.resolution for one in found)
     assert all("input turn" in one.meaning for one in found[:1])

@@ -17,7 +17,7 @@ READ_AND_FIT = """
 import resource, sys
 import numpy as np
 from pymoo_hdte.discrepancy import order_lines, read_campaign, residual_spectrum
-from pymoo_hdte.discrepancy._records.cleaning.cleaning import examined_rows
+from pymoo_hdte.discrepancy._records.cleaning.cleaning import cleaned_rows
 
 def peak():
     return 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
@@ -27,7 +27,7 @@ campaign = read_campaign(sys.argv[1])
 record, ratio = campaign.running[0], campaign.believed.ratio
 lines = order_lines(record, campaign.rig, ratio, np.arange(1.0, 41.0))
 residual_spectrum(record, campaign.rig, ratio, [1.0, 2.0], 0.5)
-examined_rows(campaign, np.arange(1.0, 21.0))
+cleaned_rows(campaign, np.arange(1.0, 21.0))
 print(peak(), len(record.time), abs(lines.phasors[0, 1]))
 """
 
@@ -35,14 +35,14 @@ READ_AND_SWEEP = """
 import resource, sys
 import numpy as np
 from pymoo_hdte.discrepancy import read_campaign
-from pymoo_hdte.discrepancy._records.cleaning.cleaning import examined_rows
+from pymoo_hdte.discrepancy._records.cleaning.cleaning import cleaned_rows
 from pymoo_hdte.discrepancy._evidence.order_lines.torsion_curve import torsion_points
 
 def peak():
     return 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
 
 print(peak())
-campaign, _ = examined_rows(read_campaign(sys.argv[1]), [1.0, 2.0, 2.04])
+campaign, _ = cleaned_rows(read_campaign(sys.argv[1]), [1.0, 2.0, 2.04])
 (record,) = campaign.torsion
 points = torsion_points(record, campaign.rig)
 compliance, _ = np.polyfit(points.torque, points.angle, 1, w=1.0 / points.deviation)

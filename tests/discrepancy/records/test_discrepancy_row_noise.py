@@ -13,7 +13,7 @@ from virtual_rig_cases import BELIEVED, RIG, effect
 from experiments.studies.virtual_rig.rig import draw_rig, run_campaign
 from experiments.studies.virtual_rig.runs import Condition
 from pymoo_hdte.discrepancy import analyse, order_lines, read_campaign
-from pymoo_hdte.discrepancy._records.cleaning.cleaning import examined_rows
+from pymoo_hdte.discrepancy._records.cleaning.cleaning import cleaned_rows
 from pymoo_hdte.discrepancy._report.tables import rows_sentence
 from pymoo_hdte.discrepancy._selection.rules import RULES
 from pymoo_hdte.discrepancy._verdicts.drive import expected_orders
@@ -24,7 +24,7 @@ CASES = SHARED / "cases" / "campaigns"
 
 
 def examined(campaign, rules=RULES):
-    return examined_rows(campaign, expected_orders(campaign), rules)
+    return cleaned_rows(campaign, expected_orders(campaign), rules)
 
 
 def with_stated(campaign, name, factor):

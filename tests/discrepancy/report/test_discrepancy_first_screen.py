@@ -229,7 +229,7 @@ def test_a_line_of_the_error_is_told_by_its_order():
 def test_an_effect_that_explains_less_than_half_is_not_called_near(share, told):
     """A frequency that is fixed was said to be nearest to a friction that explained 0 %."""
     chosen = SimpleNamespace(
-        candidates=(SimpleNamespace(sentence="Dry friction."),),
+        candidates=(SimpleNamespace(sentence="Dry friction.", released=""),),
         listed=True,
         explained=share,
         label="coulomb_friction:input",
@@ -264,7 +264,7 @@ def test_what_all_members_of_a_class_share_is_said_once(sets, words):
 
     def one(name):
         label = f"parameter:{name}" if name == "stiffness" else f"{name}:mesh"
-        return SimpleNamespace(label=label, sentence=f"The {name} is off.")
+        return SimpleNamespace(label=label, sentence=f"The {name} is off.", released="")
 
     def together(names):
         candidates = [one(name) for name in names]

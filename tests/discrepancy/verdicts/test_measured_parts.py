@@ -150,7 +150,7 @@ def test_intervals_cover_when_the_rest_is_coloured():
         rest = 0.01 * np.convolve(drawn, np.hanning(201), "valid")
         channels = dict(record.channels) | {"torque": record.channels["torque"] + rest}
         sensors = measured_data(JOINT, [Record("one", "train", TIME, channels)], CUTOFF)
-        data = sensors.with_rest(fit(sensors).residuals)
+        data = sensors.with_residual_as_noise(fit(sensors).residuals)
         fitted = fit(data)
         off, spread = np.abs(fitted.values - truth), Spread(data, fitted)
         covered["coloured"] += int(off[1] <= spread.reach[1] * np.sqrt(spread.covariance[1, 1]))
@@ -207,9 +207,9 @@ def test_what_no_record_determines_reaches_as_far_as_its_bounds(share):
 def test_the_rest_is_never_less_than_the_sensors_noise():
     record = turning("one", 1.5, lambda q, v: 0.0 * q)
     data = measured_data(JOINT, [record], CUTOFF)
-    rested = data.with_rest(np.zeros(len(data.frequency)))
+    rested = data.with_residual_as_noise(np.zeros(len(data.frequency)))
     assert np.array_equal(rested.deviation[0], data.deviation[0])
-    louder = data.with_rest(np.full(len(data.frequency), 3.0))
+    louder = data.with_residual_as_noise(np.full(len(data.frequency), 3.0))
     assert np.all(louder.deviation[0] > data.deviation[0])
     # What was left then counts as noise: its power is that of the deviation.
     power = np.mean((3.0 * data.deviation[0][data.spectra[0].kept]) ** 2)

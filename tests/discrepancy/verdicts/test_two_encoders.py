@@ -156,7 +156,7 @@ def test_what_is_hidden_in_a_torsion_is_named_with_its_size(hidden, name, unknow
 def test_an_error_beyond_the_band_is_found_in_the_torsion_with_its_order():
     finding, _ = torsion_of(Hidden(order=202.0, amplitude=5.0 * ARCSECOND))
     assert finding.verdict.status == "named"
-    (line,) = finding.ripples.found
+    (line,) = finding.ripples.lines
     assert line.order == pytest.approx(202.0, abs=line.resolution)
     assert "2 per input turn" in line.meaning
     both = JointFinding(joint_of(believed()), finding, finding, ())

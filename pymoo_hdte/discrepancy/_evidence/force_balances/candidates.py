@@ -17,8 +17,8 @@ from pymoo_hdte.mechanism.effects import law_effects
 from pymoo_hdte.mechanism.port_motion import PortMotion
 
 LARGEST = 5.0
-"""Largest force of an effect, in units of the largest residual of the base in a balance, where no
-larger force acts: of a misfit the root mean square says little about what the base absorbs."""
+"""Largest force of an effect, in units of the largest residual of the base in a balance, unless a
+larger force acts: the residual says little about how much the base absorbs."""
 
 
 def mechanism_candidates(
@@ -32,21 +32,21 @@ def mechanism_candidates(
     ----------
     data : MeasuredData
     forces : mapping of str to float
-        By port, size of a force that may be missing there, N or N.m.
+        Size of the force that may be missing at each port, N or N.m.
     orders : mapping of str to sequence of float
-        By port, orders at which the residual varies with its position, per unit of position.
+        Orders at which the residual varies with the position of each port, per unit of position.
     """
-    found = [
+    candidates = [
         candidate_of(effect, guess, port.name, "force", LawAt)
         for port in data.mechanism.ports
-        for effect, sizes in _sought(data, port, forces[port.name], orders)
+        for effect, sizes in _searched_effects(data, port, forces[port.name], orders)
         for guess in effect.guesses(sizes)
     ]
-    known = {place_of(one) for one in data.known}
-    return [one for one in found if not one.places & known]
+    known = {place_of(effect) for effect in data.known}
+    return [candidate for candidate in candidates if not candidate.places & known]
 
 
-def _sought(
+def _searched_effects(
     data: MeasuredData, port: Port, force: float, orders: Mapping[str, Sequence[float]]
 ) -> Iterator[tuple[Effect, Sizes]]:
     """Yield the effects that are searched for at a port, each with the sizes of the port."""
@@ -56,7 +56,7 @@ def _sought(
             yield effect, sizes
         if effect.drives and not effect.of_reading and not port.read:
             for read in data.mechanism.ports:
-                # The reading of a force sensor may be caused by a torque that acts on the motion.
+                # A torque that acts on the motion may also show in the reading of a force sensor.
                 if read.read and dict(read.motion) == dict(port.motion):
                     yield effect, replace(sizes, seen=tuple(orders.get(read.name, ())))
 
@@ -69,30 +69,32 @@ def port_sizes(data: MeasuredData, port: Port, force: float, seen: Sequence[floa
     data : MeasuredData
     port : Port
     force : float
-        That may be missing there, N or N.m.
+        Force that may be missing there, N or N.m.
     seen : sequence of float
-        Orders, per unit of the position.
+        Orders of the residual, per unit of the position.
 
     Raises
     ------
     InvalidInput
         For a port that does not move.
     """
-    here = [one.ports[port.name] for one in data.spectra]
-    travel = max(float(np.ptp(one.position)) for one in here) / 2.0
+    motions = [balance.ports[port.name] for balance in data.spectra]
+    travel = max(float(np.ptp(motion.position)) for motion in motions) / 2.0
     if travel == 0.0:
         raise InvalidInput(f"motion of port {port.name}", 0.0, "one that changes in some record")
     return Sizes(
         force=force,
         residual=force,
         largest=max(LARGEST * force, _peak_force(data, port)),
-        speed=max(float(np.abs(one.speed).max()) for one in here),
+        speed=max(float(np.abs(motion.speed).max()) for motion in motions),
         travel=travel,
         stiffness=port.stiffness.value,
         damping=port.damping.value,
         both_ways=turns_back(data, port.name),
-        load=max(0.0 if one.load is None else float(np.abs(one.load).max()) for one in here),
-        driven=_driven(data, here),
+        load=max(
+            0.0 if motion.load is None else float(np.abs(motion.load).max()) for motion in motions
+        ),
+        driven=_driven(data, motions),
         turns=data.mechanism.turns(port),
         read=port.read,
         seen=tuple(seen),
@@ -101,24 +103,24 @@ def port_sizes(data: MeasuredData, port: Port, force: float, seen: Sequence[floa
 
 
 def _peak_force(data: MeasuredData, port: Port) -> float:
-    """Return the largest force of the inputs on the motion of a port, or that its sensor reads."""
+    """Return the largest force of the inputs on a port's motion, or the largest that it reads."""
     peaks = [0.0]
-    for record in (one.record for one in data.spectra):
+    for record in (balance.record for balance in data.spectra):
         if port.read:
             peaks.append(float(np.abs(record.channels[port.name]).max()))
         for name, share in port.motion.items():
             parts = [
-                one.acts.get(name, 0.0) * one.gain.value * record.channels[one.name]
-                for one in data.mechanism.inputs
+                signal.acts.get(name, 0.0) * signal.gain.value * record.channels[signal.name]
+                for signal in data.mechanism.inputs
             ]
             if share and parts and not port.read:
                 peaks.append(float(np.abs(np.sum(parts, axis=0)).max()) / abs(share))
     return max(peaks)
 
 
-def _driven(data: MeasuredData, here: Sequence[PortMotion]) -> bool:
+def _driven(data: MeasuredData, motions: Sequence[PortMotion]) -> bool:
     """Tell whether the load of a port opposes its motion for some of the time and drives it."""
-    powers = [one.load * one.speed for one in here if one.load is not None]
+    powers = [motion.load * motion.speed for motion in motions if motion.load is not None]
     power = np.concatenate([*powers, np.zeros(1)])
     opposing, driving = np.sum(np.maximum(power, 0.0)), np.sum(np.maximum(-power, 0.0))
     return bool(min(opposing, driving) > data.rules.reverse_share * (opposing + driving))
@@ -126,7 +128,7 @@ def _driven(data: MeasuredData, here: Sequence[PortMotion]) -> bool:
 
 def turns_back(data: MeasuredData, port: str) -> bool:
     """Tell whether a port moves in both directions, in one record or another."""
-    speeds = np.concatenate([one.ports[port].speed for one in data.spectra])
+    speeds = np.concatenate([balance.ports[port].speed for balance in data.spectra])
     forward, backward = np.sum(np.maximum(speeds, 0.0)), np.sum(np.maximum(-speeds, 0.0))
-    # At rest, noise sometimes changes the sign of the speed.
+    # A few rows do not count, because noise changes the sign of the speed at rest.
     return bool(min(forward, backward) > data.rules.reverse_share * (forward + backward))

@@ -1,8 +1,8 @@
 """Force balances of measured records as evidence, and the unexplained residual as their noise.
 
 The noise of the sensors is estimated from the records. No model of a real machine fits down to it:
-the residual of the best model (the rest) then counts as noise, as in Birge's ratio (Physical Review
-40, 1932).
+the unexplained residual of the best model then counts as noise, as in Birge's ratio (Physical
+Review 40, 1932).
 """
 
 from __future__ import annotations
@@ -42,14 +42,14 @@ class MeasuredData(WhitenedBalances):
     rules: Rules = RULES
 
     def what(self, part: str) -> str:
-        """Return in words what a part is."""
+        """Return the name of a part in words."""
         return (
             f"force balance of {part}" if part in self.mechanism.coordinates else f"reading {part}"
         )
 
     @property
     def evident(self) -> frozenset[str]:
-        """None: no effect shows by itself in records of a mechanism."""
+        """Empty, because no effect shows by itself in records of a mechanism."""
         return frozenset()
 
     @property
@@ -67,7 +67,7 @@ class MeasuredData(WhitenedBalances):
         return lambda added: -self.whitened_forces(base, added)
 
     def corrections(self, candidate: Candidate) -> None:
-        """Return none: no forms of laws are known beside those of the library."""
+        """Return None, because no forms of laws are known beside those of the library."""
 
     def rows_of_parts(self) -> list[NDArray[np.int_]]:
         """Return the indices of the residuals of each part."""
@@ -81,9 +81,9 @@ class MeasuredData(WhitenedBalances):
     def known_over_noise(self) -> float:
         """Return the ratio of exactly known forces to the noise.
 
-        The largest ratio of powers in the force balance of a coordinate in a record. Without a
-        force that is known exactly all others are known up to a common factor only. A part that is
-        the same in all records at rest may be the zero of a sensor and does not count.
+        It is the largest ratio of powers in the force balance of a coordinate in a record. Without
+        an exactly known force, all others are known up to a common factor only. A constant part
+        that all records share may be the zero of a sensor and does not count.
         """
         believed = np.array([parameter.start for parameter in self.base])
         known = self._linear[0] - self.whitened_forces(believed, self.known)
@@ -99,62 +99,64 @@ class MeasuredData(WhitenedBalances):
             out_of_tolerance(name, name) for name in at_bounds if name in self.mechanism.quantities
         ]
 
-    def held_out_vote(self, base: Fit, fitted: Fit) -> None:
-        """Return None: held-out records of a mechanism are simulated, once the verdict stands."""
+    def held_out_test(self, base: Fit, fitted: Fit) -> None:
+        """Return None, because held-out records of a mechanism are simulated after the verdict."""
         return
 
     def with_noise_of(self, fitted: Fit) -> None:
-        """Return None: the noise of measured motion and force is that of the sensors."""
+        """Return None, because the noise of measured motion and force is that of the sensors."""
         return
 
-    def with_rest(self, residuals: Vector) -> MeasuredData:
+    def with_residual_as_noise(self, residuals: Vector) -> MeasuredData:
         """Return the data with whitened residuals (n,) beyond the sensors' noise as further noise.
 
-        White, one level for each part of a record: with weights by frequency a model that is
-        wrong at low frequencies would be fitted to the others.
+        The noise is white, with one level for each part of a record: with weights by frequency, a
+        model that is wrong at low frequencies would be fitted to the others.
         """
-        found = []
-        for residual, one in zip(self.coefficients(residuals), self.spectra, strict=True):
-            beyond = np.sum(residual**2 - one.noise**2 * one.kept, axis=1, keepdims=True)
-            level = np.maximum(beyond, 0.0) / one.kept.sum(axis=1, keepdims=True)
-            found.append(np.sqrt(one.noise**2 + level))
-        return replace(self, deviation=tuple(found))
+        deviations = []
+        for residual, balance in zip(self.coefficients(residuals), self.spectra, strict=True):
+            beyond = np.sum(residual**2 - balance.noise**2 * balance.kept, axis=1, keepdims=True)
+            level = np.maximum(beyond, 0.0) / balance.kept.sum(axis=1, keepdims=True)
+            deviations.append(np.sqrt(balance.noise**2 + level))
+        return replace(self, deviation=tuple(deviations))
 
     def coefficients(self, residuals: Vector) -> list[Values]:
         """Return whitened residuals (n,) as coefficients (n_parts, n_bins) of each record.
 
-        SI; zero where a part is not known.
+        They are in SI, and zero where a part is unknown.
         """
-        found, start = [], 0
+        coefficients, start = [], 0
         for balance, deviation in zip(self.spectra, self.deviation, strict=True):
             whole, end = np.zeros(deviation.shape), start + int(balance.kept.sum())
             whole[balance.kept] = residuals[start:end]
-            found.append(whole * deviation)
+            coefficients.append(whole * deviation)
             start = end
-        return found
+        return coefficients
 
     def power(self, residuals: Vector) -> Vector:
         """Return the sum of squares of whitened residuals (n,) by part, in squares of its unit."""
-        return np.sum([np.sum(one**2, axis=1) for one in self.coefficients(residuals)], axis=0)
+        return np.sum(
+            [np.sum(values**2, axis=1) for values in self.coefficients(residuals)], axis=0
+        )
 
     def _chi_square(self, residuals: Vector) -> Values:
         """Return the sum of squares of whitened residuals (n,) by record and part."""
-        found = np.zeros((len(self.spectra), len(self.names)))
-        np.add.at(found, (self._record, self._part), residuals**2)
-        return found
+        chi_square = np.zeros((len(self.spectra), len(self.names)))
+        np.add.at(chi_square, (self._record, self._part), residuals**2)
+        return chi_square
 
     @property
     def _coefficients(self) -> Values:
         """Number of coefficients by record and part."""
-        return np.array([one.kept.sum(axis=1) for one in self.spectra], dtype=float)
+        return np.array([balance.kept.sum(axis=1) for balance in self.spectra], dtype=float)
 
     @cached_property
     def _part(self) -> NDArray[np.int_]:
-        return np.concatenate([np.nonzero(one.kept)[0] for one in self.spectra])
+        return np.concatenate([np.nonzero(balance.kept)[0] for balance in self.spectra])
 
     @cached_property
     def _record(self) -> NDArray[np.int_]:
-        sizes = [int(one.kept.sum()) for one in self.spectra]
+        sizes = [int(balance.kept.sum()) for balance in self.spectra]
         return np.repeat(np.arange(len(sizes)), sizes)
 
 
@@ -172,11 +174,11 @@ def measured_data(
     mechanism : Mechanism
     records : sequence of Record
     cutoff : float
-        Hz, up to which the motion is known.
+        Frequency up to which the motion is known, Hz.
     known : sequence of LawAt
-        Effects that the mechanism has; rows in which one holds a port at rest are left out.
+        Effects that the mechanism has; rows in which one of them holds a port at rest are left out.
     rules : Rules
-        Thresholds by which the records are judged.
+        Thresholds of the verdict on the records.
 
     Raises
     ------
@@ -184,5 +186,5 @@ def measured_data(
         See `ForceBalance`.
     """
     spectra = tuple(ForceBalance(mechanism, record, cutoff, known) for record in records)
-    noise = tuple(one.noise for one in spectra)
+    noise = tuple(balance.noise for balance in spectra)
     return MeasuredData(mechanism, spectra, noise, tuple(known), rules)

@@ -1,7 +1,7 @@
 """A joint with encoders on both sides of its gear, taken apart into two mechanisms.
 
-One is the joint as a rigid body, for its balance of torques, in which the gear's torque cancels.
-The other is the input alone, driven by the motor and held by the gear's spring, whose far end
+The first is the joint as a rigid body, whose balance of torques does not contain the gear's torque.
+The second is the input alone, driven by the motor and held by the gear's spring, whose far end
 follows the measured angle of the output. All angles and torques are those of the output side.
 """
 
@@ -30,12 +30,12 @@ class Joint:
     Attributes
     ----------
     mechanism : Mechanism
-        Of two coordinates.
+        A mechanism of two coordinates.
     gear : Port
-        Whose motion is the torsion.
+        Port whose motion is the torsion.
     kind : Gear
     motor, load : str
-        Coordinates of its input and output.
+        Coordinates of the gear's input and output.
     """
 
     mechanism: Mechanism
@@ -53,7 +53,7 @@ class Joint:
 
 
 def joint_of(mechanism: Mechanism) -> Joint | None:
-    """Return the joint with two encoders that a mechanism is; None for any other one.
+    """Return a mechanism as a joint with two encoders, or None if it is not one.
 
     Raises
     ------
@@ -75,9 +75,9 @@ def _check(joint: Joint) -> None:
     if joint.gear.stiffness.value == 0.0:
         allowed = "above 0; if it is known roughly only, with factor = 10"
         raise InvalidInput(f"stiffness of {name}", 0.0, allowed)
-    others = [port for port in mechanism.ports if port is not joint.gear]
-    moved = [one for port in others for one, share in port.motion.items() if share]
-    plain = all([*port.motion.values()] == [1.0] and not port.read for port in others)
+    sides = [port for port in mechanism.ports if port is not joint.gear]
+    moved = [coordinate for port in sides for coordinate, share in port.motion.items() if share]
+    plain = all([*port.motion.values()] == [1.0] and not port.read for port in sides)
     if mechanism.loops or len(mechanism.coordinates) != 2 or len(set(moved)) < len(moved):
         plain = False
     if not plain:
@@ -85,12 +85,12 @@ def _check(joint: Joint) -> None:
             "beside the gear between two encoders no third coordinate, no loop, no force sensor, "
             "and one port on each side, its motion 1 of the angle there"
         )
-        raise InvalidInput(f"ports beside {name}", [port.name for port in others], allowed)
+        raise InvalidInput(f"ports beside {name}", [port.name for port in sides], allowed)
 
 
 @dataclass(frozen=True)
 class Half:
-    """One of the two mechanisms, with what is known of it.
+    """One of the two mechanisms, with its records and known effects.
 
     Attributes
     ----------
@@ -105,9 +105,9 @@ class Half:
 
 
 def rigid_half(joint: Joint, records: Sequence[Record], known: Sequence[LawAt]) -> Half:
-    """Return the joint as a rigid body, its coordinate that of the load.
+    """Return the joint as a rigid body with the coordinate of the load.
 
-    The ports of both sides become one, as torques do not tell on which side a friction is.
+    The ports of both sides become one, because torques do not tell the sides of a friction apart.
 
     Parameters
     ----------
@@ -121,23 +121,27 @@ def rigid_half(joint: Joint, records: Sequence[Record], known: Sequence[LawAt]) 
     port = replace(
         load,
         motion={name: 1.0},
-        stiffness=_sum(load.stiffness, motor.stiffness),
-        damping=_sum(load.damping, motor.damping),
+        stiffness=_sum_of_values(load.stiffness, motor.stiffness),
+        damping=_sum_of_values(load.damping, motor.damping),
         load={**motor.load, **load.load},
         gear=joint.kind,
     )
-    inputs = [replace(one, acts={name: sum(one.acts.values())}) for one in mechanism.inputs]
-    rigid = Mechanism({name: _sum(*mechanism.inertias.values())}, [port], inputs, (), [name])
-    laws = [replace(one, port=port.name) for one in known if one.port != joint.gear.name]
-    kept = {name, *(one.name for one in inputs)}
-    return Half(rigid, tuple(_only(one, kept) for one in records), tuple(laws))
+    inputs = [
+        replace(signal, acts={name: sum(signal.acts.values())}) for signal in mechanism.inputs
+    ]
+    rigid = Mechanism(
+        {name: _sum_of_values(*mechanism.inertias.values())}, [port], inputs, (), [name]
+    )
+    laws = [replace(effect, port=port.name) for effect in known if effect.port != joint.gear.name]
+    channels = {name, *(signal.name for signal in inputs)}
+    return Half(rigid, tuple(_with_channels(record, channels) for record in records), tuple(laws))
 
 
 def torsion_half(joint: Joint, records: Sequence[Record], known: Sequence[LawAt]) -> Half:
     """Return the input of the gear, which its spring holds to the measured angle of the load.
 
-    The mean torsion of the first record is taken from all of them: encoders have zeros of their
-    own, which all records share.
+    The mean torsion of the first record is subtracted from all records, because they share the
+    zeros of the encoders.
 
     Parameters
     ----------
@@ -152,54 +156,58 @@ def torsion_half(joint: Joint, records: Sequence[Record], known: Sequence[LawAt]
         If no input acts on the motor.
     """
     motor, load = joint.motor, joint.load
-    first = records[0]
-    middle = float(np.mean(first.channel(motor) - first.channel(load)))
+    reference = records[0]
+    middle = float(np.mean(reference.channel(motor) - reference.channel(load)))
     error = tuple(
-        # The load's angle is moved by the middle, its believed errors are not.
+        # The load's angle moves by the middle, but its believed errors stay where they were.
         replace(line, phase=line.phase - line.order * middle) if line.coordinate == load else line
         for line in joint.gear.error
     )
     gear = replace(joint.gear, motion={motor: 1.0}, followed={load: -1.0}, error=error, gear=None)
     inputs = [
-        Input(one.name, {motor: one.acts[motor]}, one.gain, one.scaled)
-        for one in joint.mechanism.inputs
-        if one.acts.get(motor)
+        Input(signal.name, {motor: signal.acts[motor]}, signal.gain, signal.scaled)
+        for signal in joint.mechanism.inputs
+        if signal.acts.get(motor)
     ]
     if not inputs:
         raise InvalidInput("inputs", (), f"one that acts on {motor}: the torque of the motor")
     inertia = {motor: joint.mechanism.inertias[motor]}
-    # What the motor delivers passes the shaft: a friction of tenths of it changes it by so much.
+    # The motor's torque passes the shaft and loads it, because friction may be tenths of it.
     shaft = joint.side(motor)
-    shaft = replace(shaft, load=shaft.load or {one.name: one.acts[motor] for one in inputs})
+    shaft = replace(
+        shaft, load=shaft.load or {signal.name: signal.acts[motor] for signal in inputs}
+    )
     half = Mechanism(inertia, [shaft, gear], inputs, (), [motor])
-    kept = {motor, load, *(one.name for one in inputs)}
+    channels = {motor, load, *(signal.name for signal in inputs)}
     moved = [
-        _only(one, kept, {load: one.channel(load) + middle, motor: one.channel(motor)})
-        for one in records
+        _with_channels(
+            record, channels, {load: record.channel(load) + middle, motor: record.channel(motor)}
+        )
+        for record in records
     ]
-    laws = tuple(one for one in known if one.port in half.port_names)
+    laws = tuple(effect for effect in known if effect.port in half.port_names)
     return Half(half, tuple(moved), laws)
 
 
-def _only(
+def _with_channels(
     record: Record, names: Collection[str], instead: dict[str, NDArray[np.float64]] | None = None
 ) -> Record:
     """Return a record with the named channels only, some of them replaced."""
     channels = {name: record.channel(name) for name in sorted(names)} | (instead or {})
-    noise = {name: one for name, one in record.noise.items() if name in channels}
-    told = record.dropped, record.remarks, record.interpolated
-    return Record(record.name, record.role, record.time, channels, noise, *told)
+    noise = {name: level for name, level in record.noise.items() if name in channels}
+    treatment = record.dropped, record.remarks, record.interpolated
+    return Record(record.name, record.role, record.time, channels, noise, *treatment)
 
 
-def _sum(one: BelievedValue, other: BelievedValue) -> BelievedValue:
+def _sum_of_values(a: BelievedValue, b: BelievedValue) -> BelievedValue:
     """Return a sum, which is right where both parts are within their limits."""
-    if NOTHING.value in (one.value, other.value):
-        return other if one.value == NOTHING.value else one
-    value = one.value + other.value
-    lower, upper = (one.limits[end] + other.limits[end] for end in (0, 1))
+    if NOTHING.value in (a.value, b.value):
+        return b if a.value == NOTHING.value else a
+    value = a.value + b.value
+    lower, upper = (a.limits[end] + b.limits[end] for end in (0, 1))
     share = max(1.0 - lower / value, upper / value - 1.0)
     factor = max(value / lower, upper / value) if lower > 0.0 else math.inf
-    # The narrower of the two ways to say it.
+    # The narrower of both limits.
     if 2.0 * share <= factor - 1.0 / factor:
         return BelievedValue(value, tolerance=min(share, 1.0))
     return BelievedValue(value, factor=factor)

@@ -18,38 +18,38 @@ from pymoo_hdte.discrepancy._selection.rules import Rules
 
 Values = NDArray[np.float64]
 
-# Grid and smoothing of the search. When an order counts as seen is in `Rules`.
+# Grid and smoothing of the search; `Rules` decide which order counts as seen.
 _MOST_TRIED = 2000
 _WHOLE = 2.0
-"""Resolution up to which orders are taken as whole numbers."""
+"""Coarsest resolution of the travel at which orders are taken as whole numbers."""
 _BESIDE = 5.0
-"""Distance in steps within which an order is a side line of another one with changing amplitude."""
+"""Distance, in steps, up to which an order is a side line of one with a changing amplitude."""
 
 
 def position_orders(data: MeasuredData, base: Fit) -> dict[str, tuple[float, ...]]:
     """Return orders by port, the strongest first.
 
-    Cycles per turn of an angle in rad, whole numbers; of a length, radians per m. Variations slower
-    in time than the trend of the residual are attributed to friction.
+    They are whole cycles per turn of an angle in rad, or radians per m of a length. Variations that
+    are slower than the trend of the residual in time are attributed to friction.
 
     Parameters
     ----------
     data : MeasuredData
     base : Fit
-        Of the model without effects.
+        Fit of the model without effects.
     """
     coefficients = data.coefficients(base.residuals)
-    found = {}
+    orders = {}
     for port in data.mechanism.ports:
         shares = {port.name: 1.0} if port.read else port.motion
         signals = []
-        for left_by_row, balance in zip(coefficients, data.spectra, strict=True):
-            # A force at the port would enter all of them with these shares.
+        for residual_by_row, balance in zip(coefficients, data.spectra, strict=True):
+            # A force at the port would enter all rows with these shares.
             rows = [data.names.index(name) for name in shares]
-            residual = np.array(list(shares.values())) @ left_by_row[rows]
+            residual = np.array(list(shares.values())) @ residual_by_row[rows]
             signals.append((balance.ports[port.name].shaft, _detrended(balance.in_time(residual))))
-        found[port.name] = _strongest(signals, data.rules)
-    return found
+        orders[port.name] = _strongest(signals, data.rules)
+    return orders
 
 
 def _detrended(signal: Values) -> Values:
@@ -63,35 +63,38 @@ def _strongest(signals: list[tuple[Values, Values]], rules: Rules) -> tuple[floa
 
     Each order found is removed before the next search, so that none is found twice.
     """
-    orders, step = _tried([position for position, _ in signals], rules)
-    kept: list[float] = []
-    while len(kept) < rules.most_position_orders and orders.size:
+    orders, step = _order_grid([position for position, _ in signals], rules)
+    strongest: list[float] = []
+    while len(strongest) < rules.most_position_orders and orders.size:
         ratio = _significance(signals, orders, rules)
         place = int(np.argmax(ratio))
         if ratio[place] <= 1.0:
             break
         order = _refined(signals, float(orders[place]), step)
-        if not any(abs(order - other) <= _BESIDE * step for other in kept):
-            kept.append(order)
-        signals = [(position, _without(signal, order * position)) for position, signal in signals]
-    return tuple(kept)
+        if not any(abs(order - stronger) <= _BESIDE * step for stronger in strongest):
+            strongest.append(order)
+        signals = [
+            (position, _without_wave(signal, order * position)) for position, signal in signals
+        ]
+    return tuple(strongest)
 
 
-def _tried(positions: Sequence[Values], rules: Rules) -> tuple[Values, float]:
+def _order_grid(positions: Sequence[Values], rules: Rules) -> tuple[Values, float]:
     """Return the orders that are searched, and their step.
 
-    Whole numbers where the travel resolves them, as for a shaft; otherwise half the resolution.
+    Orders are whole numbers where the travel resolves them, as for a shaft; otherwise they step by
+    half the resolution.
     """
     widest = max(float(np.ptp(position)) for position in positions)
     if widest == 0.0:
         return np.empty(0), 1.0
     step = 1.0 if np.pi / widest < _WHOLE else np.pi / widest
     lowest = step * np.ceil(max(1.0, 2.0 * np.pi * rules.fewest_periods / widest) / step)
-    highest = min(max(map(_finest, positions)), lowest + _MOST_TRIED * step)
+    highest = min(max(map(_finest_order, positions)), lowest + _MOST_TRIED * step)
     return np.arange(lowest, highest, step), step
 
 
-def _finest(position: Values) -> float:
+def _finest_order(position: Values) -> float:
     """Return the order at which a record has eight samples per period on average."""
     return len(position) * np.pi / (4.0 * max(float(np.sum(np.abs(np.diff(position)))), 1e-300))
 
@@ -100,11 +103,12 @@ def _refined(signals: Sequence[tuple[Values, Values]], order: float, step: float
     """Return the order of largest power near one of a coarse grid."""
     if step == 1.0:
         return order
-    near = order + step * np.linspace(-1.0, 1.0, 41)
+    fine_grid = order + step * np.linspace(-1.0, 1.0, 41)
     power = sum(
-        np.abs(np.exp(-1j * np.outer(near, position)) @ signal) ** 2 for position, signal in signals
+        np.abs(np.exp(-1j * np.outer(fine_grid, position)) @ signal) ** 2
+        for position, signal in signals
     )
-    return float(near[np.argmax(power)])
+    return float(fine_grid[np.argmax(power)])
 
 
 def _significance(signals: Sequence[tuple[Values, Values]], orders: Values, rules: Rules) -> Values:
@@ -112,7 +116,7 @@ def _significance(signals: Sequence[tuple[Values, Values]], orders: Values, rule
     total, counted = np.zeros((2, len(orders)))
     for position, signal in signals:
         seen = orders * np.ptp(position) >= 2.0 * np.pi * rules.fewest_periods
-        seen &= orders <= _finest(position)
+        seen &= orders <= _finest_order(position)
         if not seen.any():
             continue
         power = np.abs(phasors(position, signal, orders[seen])) ** 2
@@ -122,7 +126,7 @@ def _significance(signals: Sequence[tuple[Values, Values]], orders: Values, rule
     return np.asarray(total / limit)
 
 
-def _without(signal: Values, angle: Values) -> Values:
+def _without_wave(signal: Values, angle: Values) -> Values:
     """Return a signal without its cosine and sine parts of an angle, both of shape (n,)."""
     lines = np.column_stack([np.cos(angle), np.sin(angle)])
     return np.asarray(signal - lines @ np.linalg.lstsq(lines, signal, rcond=None)[0])

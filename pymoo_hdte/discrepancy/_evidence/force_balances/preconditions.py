@@ -26,7 +26,7 @@ def check_signals(mechanism: Mechanism, records: Sequence[Record]) -> None:
             "gain is known, leave it out of the only input, and all is told in units of its signal"
         )
         raise InvalidInput("tolerances of the mechanism", "on all", allowed)
-    needed = (*balance_names(mechanism), *(one.name for one in mechanism.inputs))
+    needed = (*balance_names(mechanism), *(signal.name for signal in mechanism.inputs))
     names = [record.name for record in records]
     for record in records:
         if names.count(record.name) > 1:
@@ -46,8 +46,8 @@ def check_signals(mechanism: Mechanism, records: Sequence[Record]) -> None:
 def usual_cutoff(mechanism: Mechanism, records: Sequence[Record], rules: Rules = RULES) -> float:
     """Return the frequency, Hz, up to which every coordinate exceeds its noise.
 
-    At most a tenth of the sampling rate; a third where that would leave out more than
-    `Rules.band_share` of the power of some coordinate, and no record is interpolated.
+    It is at most a tenth of the sampling rate, or a third where a tenth would leave out more than
+    `Rules.band_share` of the power of some coordinate and the record is not interpolated.
 
     Raises
     ------
@@ -60,29 +60,31 @@ def usual_cutoff(mechanism: Mechanism, records: Sequence[Record], rules: Rules =
         for name in mechanism.coordinates
     )
     coarse = max(beyond) > rules.band_share
-    found = []
+    frequencies = []
     for record in records:
         for name in mechanism.coordinates:
             noise = noise_between(record, name) if coarse else record.noise_of(name)
             share = COARSEST_SHARE if coarse and not record.interpolated else highest_share(1.0)
             try:
-                found.append(highest_frequency(record.channels[name], record.step, noise, share))
+                frequencies.append(
+                    highest_frequency(record.channels[name], record.step, noise, share)
+                )
             except InvalidInput as error:
                 field = f"{name} of record {record.name}: {error.field}"
                 raise InvalidInput(field, error.value, error.allowed) from None
-    return min(found)
+    return min(frequencies)
 
 
 def fine_enough(records: Sequence[Record], cutoff: float) -> tuple[Record, ...]:
-    """Return records with ten samples in a period of the cutoff, interpolated where they have less.
+    """Return records with ten samples in a period of the cutoff, interpolated if necessary.
 
     Raises
     ------
     InvalidInput
-        If a record has less than three, or less than ten and is interpolated already.
+        If a record has fewer than three, or fewer than ten and is interpolated already.
     """
     real_number("cutoff", cutoff, above=0.0)
-    found = []
+    fine_records = []
     for record in records:
         fine, most = highest_share(record.step), highest_share(record.step, COARSEST_SHARE)
         if cutoff > RATE_SLACK * most:
@@ -100,16 +102,16 @@ def fine_enough(records: Sequence[Record], cutoff: float) -> tuple[Record, ...]:
                 f"cutoff of {cutoff:.4g} Hz, because its rows were not measured at even steps; or "
                 f"a cutoff of at most {fine:.4g} Hz",
             )
-        # Finer than the ratio asks for, so that rounding refuses no record afterwards.
+        # Finer than the ratio requires, so that rounding refuses no record afterwards.
         coarse = cutoff > RATE_SLACK * fine
-        found.append(refined(record, int(cutoff / fine) + 1) if coarse else record)
-    return tuple(found)
+        fine_records.append(refined(record, int(cutoff / fine) + 1) if coarse else record)
+    return tuple(fine_records)
 
 
 def check_sampling(mechanism: Mechanism, records: Sequence[Record], cutoff: float) -> None:
     """Raise `InvalidInput` if a record is too short or sampled too slowly for a cutoff in Hz.
 
-    Held-out ones as well: they are judged later at the cutoff of the others.
+    This includes held-out records, which are compared later at the same cutoff.
     """
     for record in records:
         working_rows(mechanism, record, cutoff)
@@ -121,7 +123,7 @@ def check_scale(data: MeasuredData) -> None:
     A gain that is known sets the scale only where its input drives the mechanism. Where all
     quantities are known, no scale has to be determined.
     """
-    if all(one.known for one in data.mechanism.quantities.values()):
+    if all(quantity.known for quantity in data.mechanism.quantities.values()):
         return
     ratio, least = data.known_over_noise(), data.rules.noise_power_ratio
     if not ratio > least:
@@ -135,6 +137,6 @@ def check_scale(data: MeasuredData) -> None:
 
 
 def _scales(mechanism: Mechanism) -> list[str]:
-    """Return the exactly known quantities, relative to which all others are determined."""
-    known = [name for name, one in mechanism.quantities.items() if one.known]
+    """Return the exactly known quantities that set the scale of all others."""
+    known = [name for name, quantity in mechanism.quantities.items() if quantity.known]
     return [name for name in known if name.startswith(("inertia", "stiffness", "gain"))]

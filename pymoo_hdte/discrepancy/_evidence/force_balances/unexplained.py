@@ -1,7 +1,7 @@
-"""The unexplained residual (the rest) of a mechanism, relative to which effects are named.
+"""The unexplained residual of a mechanism, relative to which effects are named.
 
-No model of a real machine fits down to the noise of its sensors. What the best model leaves counts
-as noise, with as many effects as a verdict names at most.
+No model of a real machine fits down to the noise of its sensors. The residual of the best model,
+with at most as many effects as a verdict names, counts as noise.
 """
 
 from __future__ import annotations
@@ -25,61 +25,68 @@ from pymoo_hdte.discrepancy._selection.screening import screen, varied
 from pymoo_hdte.mechanism import Mechanism
 
 
-def with_rest(
+def with_unexplained_residual(
     sensors: MeasuredData, base: Fit, candidates_for: Callable[[Fit], list[Candidate]]
 ) -> tuple[MeasuredData, list[Candidate], Hypothesis | None]:
     """Return the data with the residual of the best effects as the noise, and all candidates.
 
-    The best effects depend on the noise; after a few rounds they no longer change. They come last,
-    fitted to the data of the last round but one; None where the base is adequate.
+    The best effects depend on the noise; after a few rounds they no longer change. The hypothesis
+    with them comes last, fitted to the data of the last round but one; it is None where the base is
+    adequate.
 
     Parameters
     ----------
     sensors : MeasuredData
-        With the noise of the sensors.
+        Data with the noise of the sensors.
     base : Fit
-        Of them, without effects.
+        Fit of these data without effects.
     candidates_for : callable
-        From a fit to the candidates for what it leaves. Orders beside a much larger load or
-        friction are seen in what the best effects of the first round leave only.
+        Returns the candidates for the residual of a fit. Orders beside a much larger load or
+        friction only show in the residual of the best effects of the first round.
     """
     rules, degrees_of_freedom = sensors.rules, len(base.residuals) - len(base.values)
     candidates = candidates_for(base)
     if down_to_noise(base, degrees_of_freedom, rules):
         return sensors, candidates, None
-    data, found = sensors.with_rest(base.residuals), None
+    data, hypothesis = sensors.with_residual_as_noise(base.residuals), None
     for turn in range(rules.rest_rounds):
-        found = _best_few(data, candidates)
-        best = replace(found.fit, residuals=in_units_of(sensors, data, found.fit.residuals))
-        data = sensors.with_rest(best.residuals)
+        hypothesis = _best_hypothesis(data, candidates)
+        best = replace(
+            hypothesis.fit, residuals=in_units_of(sensors, data, hypothesis.fit.residuals)
+        )
+        data = sensors.with_residual_as_noise(best.residuals)
         if turn == 0:
-            labels = {one.label for one in candidates}
-            candidates += [one for one in candidates_for(best) if one.label not in labels]
-    return data, candidates, found
+            labels = {candidate.label for candidate in candidates}
+            candidates += [
+                candidate for candidate in candidates_for(best) if candidate.label not in labels
+            ]
+    return data, candidates, hypothesis
 
 
-def _best_few(data: MeasuredData, candidates: Sequence[Candidate]) -> Hypothesis:
+def _best_hypothesis(data: MeasuredData, candidates: Sequence[Candidate]) -> Hypothesis:
     """Return the best model with up to as many effects as a verdict has, by BIC."""
-    candidates = [one for one in candidates if not one.instead_of]
+    candidates = [candidate for candidate in candidates if not candidate.instead_of]
     base, rules = fit(data), data.rules
     excess = base.chi_square - (len(base.residuals) - len(base.values))
-    promising = varied(screen(data, base, candidates), rules.most_of_one_name)
-    level = fit_all(data, base, promising[: rules.most_fitted], excess)
-    found = [hypothesis_of(base, excess), *level]
-    firsts = rules.rest_seconds
+    shortlisted = varied(screen(data, base, candidates), rules.most_of_one_name)
+    level = fit_all(data, base, shortlisted[: rules.most_fitted], excess)
+    hypotheses = [hypothesis_of(base, excess), *level]
+    n_extended = rules.rest_seconds
     for _ in range(1, rules.most_effects):
-        grown = []
-        for one in level[:firsts]:
-            others = [
-                more for more in candidates if all(more.goes_with(each) for each in one.candidates)
+        extended = []
+        for hypothesis in level[:n_extended]:
+            compatible = [
+                candidate
+                for candidate in candidates
+                if all(candidate.goes_with(member) for member in hypothesis.candidates)
             ]
-            more = varied(screen(data, one.fit, others), 1)
-            grown += fit_all(data, one.fit, more[: rules.rest_seconds], excess)
-        level = sorted(grown, key=lambda one: one.bic)
-        found += level
-        # Of several effects the best set is extended alone: others mostly hold the same ones.
-        firsts = 1
-    return min(found, key=lambda one: one.bic)
+            added = varied(screen(data, hypothesis.fit, compatible), 1)
+            extended += fit_all(data, hypothesis.fit, added[: rules.rest_seconds], excess)
+        level = sorted(extended, key=lambda hypothesis: hypothesis.bic)
+        hypotheses += level
+        # Of larger sets only the best is extended, since others mostly hold the same effects.
+        n_extended = 1
+    return min(hypotheses, key=lambda hypothesis: hypothesis.bic)
 
 
 def share_removed(sensors: MeasuredData, data: MeasuredData, base: Fit, fitted: Fit) -> float:
@@ -96,10 +103,10 @@ def share_removed(sensors: MeasuredData, data: MeasuredData, base: Fit, fitted: 
 def in_units_of(
     wanted: MeasuredData, given: MeasuredData, residuals: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Return whitened residuals, whitened by the deviation of other data instead."""
+    """Return whitened residuals of the given data in units of the deviation of the wanted data."""
     ratio = [
-        (one / other)[balance.kept]
-        for one, other, balance in zip(
+        (numerator / denominator)[balance.kept]
+        for numerator, denominator, balance in zip(
             given.deviation, wanted.deviation, wanted.spectra, strict=True
         )
     ]

@@ -1,6 +1,6 @@
 """Whitened residuals of force balances, and their derivatives by the base and by effects.
 
-They are linear in masses, dampers and the other quantities of a mechanism, but not in those of a
+They are linear in the quantities of a mechanism, such as masses and dampers, but not in those of a
 law.
 """
 
@@ -26,13 +26,13 @@ _OF_LAWS = ("stiffness of ", "zero of ")
 
 @dataclass(frozen=True, eq=False)
 class WhitenedBalances:
-    """Force balances of records over what counts as their noise.
+    """Force balances of records, in units of what counts as their noise.
 
     Attributes
     ----------
     mechanism : Mechanism
     spectra : tuple of ForceBalance
-        Of the records.
+        Force balances of the records.
     deviation : tuple of ndarray, shape (n_balances, n_bins)
         Standard deviation of what counts as noise, by record.
     known : tuple of LawAt
@@ -52,31 +52,36 @@ class WhitenedBalances:
     @cached_property
     def base(self) -> tuple[Parameter, ...]:
         """Quantities that are not known exactly, within their tolerances, and sensors' zeros."""
-        found = []
-        for name, one in self.mechanism.quantities.items():
-            if not one.known:
-                least, most = one.fit_limits
-                found.append(Parameter(name, one.value, least, most, (most - least) / 2.0))
+        parameters = []
+        for name, quantity in self.mechanism.quantities.items():
+            if not quantity.known:
+                least, most = quantity.fit_limits
+                parameters.append(
+                    Parameter(name, quantity.value, least, most, (most - least) / 2.0)
+                )
         for port in self.mechanism.ports:
             if port.read or port.followed:
-                size = max(*(self._peak(port, one) for one in self.spectra), 1e-12)
-                found.append(Parameter(f"zero of {port.name}", 0.0, -2.0 * size, 2.0 * size, size))
-        return tuple(found)
+                size = max(*(self._peak(port, balance) for balance in self.spectra), 1e-12)
+                parameters.append(
+                    Parameter(f"zero of {port.name}", 0.0, -2.0 * size, 2.0 * size, size)
+                )
+        return tuple(parameters)
 
     @staticmethod
     def _peak(port: Port, balance: ForceBalance) -> float:
         """Return the largest force of a sensor, or of the spring between two angles.
 
-        Of the spring at the measured torsion, whose zero is not known, and to hold the inputs.
+        That of the spring is the force at the measured torsion, whose zero is unknown, and the
+        force that holds the inputs.
         """
         if port.read:
             return float(np.abs(balance.record.channels[port.name]).max())
         wound = port.stiffness.limits[1] * float(np.abs(balance.ports[port.name].position).max())
         held = (
-            max(map(abs, one.gain.limits))
-            * sum(map(abs, one.acts.values()))
-            * float(np.abs(balance.record.channels[one.name]).max())
-            for one in balance.mechanism.inputs
+            max(map(abs, signal.gain.limits))
+            * sum(map(abs, signal.acts.values()))
+            * float(np.abs(balance.record.channels[signal.name]).max())
+            for signal in balance.mechanism.inputs
         )
         return wound + sum(held)
 
@@ -86,8 +91,8 @@ class WhitenedBalances:
         quantities = quantity_names(self.mechanism)
         places = [quantities.index(parameter.name) for parameter in self.base]
         known = np.zeros(len(quantities))
-        for name, one in self.mechanism.quantities.items():
-            known[quantities.index(name)] = one.value
+        for name, quantity in self.mechanism.quantities.items():
+            known[quantities.index(name)] = quantity.value
         known[places] = 0.0
         constants, slopes = [], []
         for balance, deviation in zip(self.spectra, self.deviation, strict=True):
@@ -102,9 +107,9 @@ class WhitenedBalances:
         """Return how effects reduce whitened residuals, (n,), at base parameters (n_base,)."""
         stiffness, zeros = (
             {
-                one.name.removeprefix(prefix): float(value)
-                for one, value in zip(self.base, base, strict=True)
-                if one.name.startswith(prefix)
+                parameter.name.removeprefix(prefix): float(value)
+                for parameter, value in zip(self.base, base, strict=True)
+                if parameter.name.startswith(prefix)
             }
             for prefix in _OF_LAWS
         )
@@ -124,7 +129,10 @@ class WhitenedBalances:
     def frequency(self) -> Vector:
         """Frequency of each residual, Hz, shape (n,)."""
         return np.concatenate(
-            [np.broadcast_to(one.frequency, one.kept.shape)[one.kept] for one in self.spectra]
+            [
+                np.broadcast_to(balance.frequency, balance.kept.shape)[balance.kept]
+                for balance in self.spectra
+            ]
         )
 
 
@@ -145,16 +153,16 @@ class BalanceObjective(Unknowns):
     def jacobian(self, values: Vector) -> Values:
         """Return derivatives (n, n_parameters) by parameters in units of their scale."""
         n_base, steps = len(self.data.base), self.steps(values)
-        found = np.zeros((len(self.data.frequency), len(values)))
-        found[:, :n_base] = self.data._linear[1] * self.scale[:n_base]
-        stands = self._forces(values)
+        jacobian = np.zeros((len(self.data.frequency), len(values)))
+        jacobian[:, :n_base] = self.data._linear[1] * self.scale[:n_base]
+        forces = self._forces(values)
         for place, parameter in enumerate(self.parameters):
             # A law may depend on stiffness and zero of its port, but not on masses and dampers.
             if place >= n_base or parameter.name in self._of_laws:
                 moved = values.copy()
                 moved[place] += steps[place] * self.scale[place]
-                found[:, place] -= (self._forces(moved) - stands) / steps[place]
-        return found
+                jacobian[:, place] -= (self._forces(moved) - forces) / steps[place]
+        return jacobian
 
     def _forces(self, values: Vector) -> Vector:
         n_base = len(self.data.base)

@@ -34,12 +34,12 @@ class AnyForce(Behaviour):
         return self.force(state)
 
     def with_input_locked(self) -> Law | None:
-        """Return none: what varies with an angle has a mean of zero, and nothing else moves."""
+        """Return None: what varies with an angle has a mean of zero, and nothing else moves."""
         return None
 
 
 class AnyForceOfLoad(AnyForce):
-    """One that depends on the load too."""
+    """A law of any function of the motion that depends on the load too."""
 
     loaded: ClassVar[bool] = True
 
@@ -59,14 +59,16 @@ class Correction(DriveEffect):
     law: Law
 
     def times(self, factor: float) -> Correction | None:
-        """Return a larger one, or None for a law of the library: it does more than its force."""
+        """Return the effect times a factor; None for a law of the library, which does more."""
         law = self.law
         if not isinstance(law, AnyForce):
             return None
 
         def force(state: PortState) -> Response:
-            one = law.respond(state)
-            return Response(factor * one.torque, factor * one.slope, factor * one.damping)
+            response = law.respond(state)
+            return Response(
+                factor * response.torque, factor * response.slope, factor * response.damping
+            )
 
         return Correction(self.port, replace(law, force=force))
 
@@ -77,23 +79,23 @@ class Correction(DriveEffect):
 
 @dataclass(frozen=True, eq=False)
 class DampingByRecord(DriveEffect):
-    """A damping of the torsion that differs between records, whose number r divides the rows'.
+    """A damping of the torsion that differs between r records, which divide the rows evenly.
 
     Attributes
     ----------
     shares : ndarray, shape (r,)
-        Of the believed damping, added.
+        Added damping, as a share of the believed one.
     """
 
     name = "damping_by_record"
     shares: NDArray[np.float64]
 
     def times(self, factor: float) -> DampingByRecord:
-        """Return a larger one."""
+        """Return the effect times a factor."""
         return DampingByRecord(factor * self.shares)
 
     def apply(self, coefficients: Coefficients) -> Coefficients:
-        """Return the coefficients; those of a sweep at rest, of one row, as they are."""
+        """Return the coefficients with the damping; those of a sweep, of one row, stay."""
         damping = np.asarray(coefficients.damping)
         if len(damping) % len(self.shares):
             return coefficients
@@ -103,9 +105,9 @@ class DampingByRecord(DriveEffect):
 
 @dataclass(frozen=True, eq=False)
 class LoadRate(DriveEffect):
-    """A load that answers to a derivative of the output's acceleration: it is not rigidly there.
+    """A load that is not rigidly coupled and answers to a derivative of the acceleration.
 
-    Of whatever couples it, springs, dampers or both, the torque is a series in these derivatives.
+    Whatever couples it, springs, dampers or both, its torque is a series in these derivatives.
 
     Attributes
     ----------
@@ -120,7 +122,7 @@ class LoadRate(DriveEffect):
     size: float
 
     def times(self, factor: float) -> LoadRate:
-        """Return a larger one."""
+        """Return the effect times a factor."""
         return LoadRate(self.derivative, factor * self.size)
 
     def apply(self, coefficients: Coefficients) -> Coefficients:

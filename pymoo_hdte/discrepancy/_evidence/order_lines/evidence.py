@@ -24,7 +24,7 @@ from pymoo_hdte.discrepancy._evidence.order_lines.torsion_curve import torsion_p
 from pymoo_hdte.discrepancy._records.campaign import Campaign
 from pymoo_hdte.discrepancy._records.line_fit import CHANNELS
 from pymoo_hdte.discrepancy._selection.candidate import Candidate
-from pymoo_hdte.discrepancy._selection.excess import Excess, Vote
+from pymoo_hdte.discrepancy._selection.excess import Excess, HeldOutTest
 from pymoo_hdte.discrepancy._selection.fitting import Fit, Response
 from pymoo_hdte.discrepancy._selection.rules import RULES, Rules
 from pymoo_hdte.drive import DriveEffect
@@ -45,7 +45,7 @@ class Data(Observations):
     rules : Rules
         Thresholds of the verdict.
     evident : frozenset of str
-        As of `Evidence`.
+        Effects that show by themselves, as in `Evidence`.
     """
 
     rules: Rules = RULES
@@ -63,17 +63,17 @@ class Data(Observations):
     def response(self, fitted: Fit) -> Response:
         """Return how the whitened residuals of a fit respond to further effects."""
         base = fitted.values[None, : len(self.base)]
-        stands = self.prediction(base, fitted.effects)
-        before = self.features.of_prediction(stands)
+        unchanged = self.prediction(base, fitted.effects)
+        before = self.features.of_prediction(unchanged)
         before_torsion = self.torsion_residuals(base, fitted.effects)
         priors = np.zeros(len(fitted.residuals) - before.size - before_torsion.size)
 
         def change(added: Sequence[DriveEffect]) -> Vector:
             effects = (*fitted.effects, *added)
-            there = self.prediction(base, effects, stands.balance, SCREENING)
-            # A record without a steady state says nothing of the effect.
-            steady = (there.balance.converged & stands.balance.converged)[:, None]
-            changed = self.features.of_prediction(there) - before
+            moved = self.prediction(base, effects, unchanged.balance, SCREENING)
+            # A record without a steady state says nothing about the effect.
+            steady = (moved.balance.converged & unchanged.balance.converged)[:, None]
+            changed = self.features.of_prediction(moved) - before
             running = self.whiten(np.where(steady, changed, 0.0))[0]
             torsion = self.torsion_residuals(base, effects) - before_torsion
             return np.concatenate([running, np.nan_to_num(torsion[0]), priors])
@@ -81,19 +81,19 @@ class Data(Observations):
         return change
 
     def corrections(self, candidate: Candidate) -> list[DriveEffect]:
-        """Return the corrections of a law's form: see `forms.of_laws`."""
+        """Return the corrections of a law's form: see `forms.corrections`."""
         return corrections(candidate, _ranges_of(self))
 
     def rows_of_parts(self) -> list[NDArray[np.int_]]:
         """Return the indices of the residuals of each channel, and of the sweeps."""
         n_records, n_features = self.features.values.shape
-        first = n_features * np.arange(n_records)[:, None]
-        found = []
+        starts = n_features * np.arange(n_records)[:, None]
+        rows = []
         for channel in range(len(CHANNELS)):
             mean = [MEANS.index(channel)] if channel in MEANS else []
             places = np.append(mean, self.features.places(channel)).astype(int)
-            found.append((first + places).ravel())
-        return [*found, n_records * n_features + np.arange(self.n_sweep_residuals)]
+            rows.append((starts + places).ravel())
+        return [*rows, n_records * n_features + np.arange(self.n_sweep_residuals)]
 
     def excess(self, fitted: Fit) -> Excess:
         """Return the excess chi-square of a fit by record and part of the data.
@@ -123,33 +123,33 @@ class Data(Observations):
             self.base, at_bounds, believed.error_orders, together, believed.effects
         )
 
-    def held_out_vote(self, base: Fit, fitted: Fit) -> Vote | None:
+    def held_out_test(self, base: Fit, fitted: Fit) -> HeldOutTest | None:
         """Return what the records kept out of the fit say of two fits; None without any.
 
-        What creeps in them is noise or an error of the model: as noise it covers most of what a
-        loop that forgets does, and as an error it outweighs that. What speaks better for the change
-        counts, so that only what is denied both ways is denied.
+        Creep in these records is noise or an error of the model: as noise it covers most of what a
+        loop that forgets does, and as an error it outweighs that. The version that speaks better
+        for the change counts, so that a change is denied only if both deny it.
         """
         if (data := self.held_out) is None:
             return None
         if not self.creep:
             return data._vote(base, fitted)
         settled = replace(data.features.conditions, fading=None)
-        both = data, replace(data, features=replace(data.features, conditions=settled))
-        votes = [each._vote(base, fitted) for each in both]
+        versions = data, replace(data, features=replace(data.features, conditions=settled))
+        votes = [version._vote(base, fitted) for version in versions]
         return max(votes, key=lambda vote: (vote.before - vote.after) / max(vote.change, 1e-300))
 
-    def _vote(self, base: Fit, fitted: Fit) -> Vote:
+    def _vote(self, base: Fit, fitted: Fit) -> HeldOutTest:
         """Return what these records say of two fits."""
         before, after = (
             self.whiten(
-                self.predict(one.values[None, : len(self.base)], one.effects)[0]
+                self.predict(fit.values[None, : len(self.base)], fit.effects)[0]
                 - self.features.values
             )
-            for one in (base, fitted)
+            for fit in (base, fitted)
         )
         change = after - before
-        return Vote(float(before @ before), float(after @ after), float(change @ change))
+        return HeldOutTest(float(before @ before), float(after @ after), float(change @ change))
 
     @cached_property
     def held_out(self) -> Data | None:
@@ -167,14 +167,14 @@ class Data(Observations):
         return replace(self, features=features, torsion=()) if features.records else None
 
     def with_noise_of(self, fitted: Fit) -> Data | None:
-        """Return the data with the noise of another model; None where it adds little to theirs.
+        """Return the data with the noise of another model, or None where the noise hardly grows.
 
         The non-repeatable error is a motion, which reaches all channels through the response of
         the drive, its effects included.
         """
         base = fitted.values[: len(self.base)]
         renewed = replace(self, reference=base, reference_effects=fitted.effects)
-        variances = (np.diagonal(one.covariance, axis1=1, axis2=2) for one in (renewed, self))
+        variances = (np.diagonal(data.covariance, axis1=1, axis2=2) for data in (renewed, self))
         ratio = np.divide(*variances).max()
         return renewed if ratio > self.rules.changed_noise_ratio else None
 
@@ -182,7 +182,7 @@ class Data(Observations):
     def loaded(self) -> Data:
         """The data without records whose load does not hold the tooth flanks together.
 
-        With a clearance such a drive rattles and has no steady state that could be fitted.
+        With a clearance the drive rattles in them and has no steady state to fit.
         """
         held = flanks_held(self.features, self.campaign.torque_scale, self.rules)
         if np.all(held) or held.sum() < self.rules.fewest_records:
@@ -191,9 +191,12 @@ class Data(Observations):
 
 
 def _ranges_of(data: Data) -> Ranges:
-    """Return what the records of some data run through."""
+    """Return the ranges of speed, torque and time of the records."""
     when, believed = data.features.conditions, data.campaign.believed
-    torques = [np.abs(when.output_torque).max(), *(np.abs(one.path).max() for one in data.torsion)]
+    torques = [
+        np.abs(when.output_torque).max(),
+        *(np.abs(points.path).max() for points in data.torsion),
+    ]
     lines = zip(believed.error_orders, believed.error_amplitudes, strict=True)
     return Ranges(
         np.abs(when.input_speed),

@@ -40,7 +40,7 @@ class Features:
         Cycles per input turn.
     values : ndarray, shape (r, n_features)
     covariance : ndarray, shape (r, n_features, n_features)
-        Of the sensors' noise only.
+        Covariance of the sensors' noise only.
     shown : ndarray of bool, shape (r, m), optional
         Which lines each record shows; by default all.
     """
@@ -73,8 +73,8 @@ class Features:
     def places(self, channel: int) -> NDArray[np.int_]:
         """Return the indices (m, 2) of a channel's real and imaginary parts among the features."""
         m = len(self.orders)
-        first = len(MEANS) + 2 * m * channel
-        return first + np.array([np.arange(m), m + np.arange(m)]).T
+        start = len(MEANS) + 2 * m * channel
+        return start + np.array([np.arange(m), m + np.arange(m)]).T
 
 
 def stack(mean: NDArray[np.float64], phasors: NDArray[np.complex128]) -> NDArray[np.float64]:
@@ -90,7 +90,7 @@ def measure(
     orders: Sequence[float],
     rules: Rules = RULES,
 ) -> Features:
-    """Return the features of records at these orders, of each record at those that it shows.
+    """Return the features of records, each at those of the orders that it shows.
 
     Raises
     ------
@@ -98,38 +98,42 @@ def measure(
         For orders that a record cannot tell apart.
     """
     ratio, rig = campaign.believed.ratio, campaign.rig
-    asked = np.array(orders)
-    shown = np.array([asked <= shown_order(record, rules) for record in records])
+    all_orders = np.array(orders)
+    shown = np.array([all_orders <= shown_order(record, rules) for record in records])
     lines = [
-        _at_all_orders(order_lines(record, rig, ratio, asked[of_record]), asked, of_record)
+        _at_all_orders(
+            order_lines(record, rig, ratio, all_orders[of_record]), all_orders, of_record
+        )
         for record, of_record in zip(records, shown, strict=True)
     ]
     conditions = Conditions(
         input_speed=np.array([line.slope[3] for line in lines]),
         output_torque=np.array([line.mean[2] for line in lines]),
-        elapsed=np.array([_middle(record) for record in records]),
+        elapsed=np.array([_middle_time(record) for record in records]),
         bends=np.array([line.bends for line in lines]),
         temperature=np.array([record.temperature for record in records], dtype=float),
         input_angle=np.array([line.mean[3] for line in lines]),
         fading=np.array([line.fading for line in lines]),
-        travel=np.array([abs(one.input_angle[-1] - one.input_angle[0]) for one in records]),
+        travel=np.array(
+            [abs(record.input_angle[-1] - record.input_angle[0]) for record in records]
+        ),
     )
     values = np.array([stack(line.mean, line.phasors) for line in lines])
     stiffness = campaign.believed.stiffness
     covariance = np.array([_sensor_covariance(line, rig, stiffness) for line in lines])
-    # The load is taken from the measured output torque: its error is one of the input torque, too.
+    # The load is the measured output torque, whose error also shifts the predicted input torque.
     covariance[:, 1, 1] += [_load_variance(record) / ratio**2 for record in records]
     return Features(
-        tuple(records), conditions, asked, values, covariance, None if shown.all() else shown
+        tuple(records), conditions, all_orders, values, covariance, None if shown.all() else shown
     )
 
 
 def _at_all_orders(
     lines: OrderLines, orders: NDArray[np.float64], shown: NDArray[np.bool_]
 ) -> OrderLines:
-    """Return lines of a record with those that it does not show, which are zero.
+    """Return lines of a record at all orders; those that it does not show are zero.
 
-    These have the mean variance of the others, as a covariance has to have one.
+    These get the mean variance of the others, because a covariance cannot be zero.
     """
     if shown.all():
         return lines
@@ -155,9 +159,9 @@ def shown_order(record: RunningRecord, rules: Rules) -> float:
     return rules.nyquist_share * (np.pi * record.sample_rate / abs(record.input_speed))
 
 
-def _middle(record: RunningRecord) -> float:
+def _middle_time(record: RunningRecord) -> float:
     """Return the time from the start of the session to the middle of a record, s."""
-    # If the first time is not within one row of zero, the clock has another origin than the record.
+    # A first time further than one row from zero shows that the clock does not start at the record.
     own_clock = abs(record.time[0]) * record.sample_rate <= 1.0
     start = 0.0 if own_clock else record.time[0]
     return float(record.elapsed + (record.time[0] + record.time[-1]) / 2.0 - start)
@@ -174,13 +178,13 @@ def _sensor_covariance(line: OrderLines, rig: Rig, stiffness: float) -> NDArray[
                         + np.arange(2 * m)])
         for channel in range(len(CHANNELS))
     ]  # fmt: skip
-    for one, first in enumerate(places):
-        for other, second in enumerate(places):
-            share = line.row_covariance[one, other] / line.row_covariance[one, one]
-            block = share * line.covariance[one]
-            rows, columns = first >= 0, second >= 0
-            covariance[np.ix_(first[rows], second[columns])] += block[np.ix_(rows, columns)]
-    # The load is taken from the measured output torque, whose error changes the predicted torsion.
+    for a, places_a in enumerate(places):
+        for b, places_b in enumerate(places):
+            share = line.row_covariance[a, b] / line.row_covariance[a, a]
+            block = share * line.covariance[a]
+            rows, columns = places_a >= 0, places_b >= 0
+            covariance[np.ix_(places_a[rows], places_b[columns])] += block[np.ix_(rows, columns)]
+    # The load is the measured output torque, whose error changes the predicted torsion.
     covariance[0, 0] += line.covariance[2, 0, 0] / stiffness**2
     return covariance
 
@@ -194,11 +198,11 @@ def _load_variance(record: RunningRecord) -> float:
 def unexpected_lines(
     features: Features, ratio: float, rig: Rig, rules: Rules = RULES
 ) -> list[dict[float, float]]:
-    """Return where the residual of each record exceeds the noise, beyond the features' orders.
+    """Return the lines outside the features' orders at which each record exceeds the noise.
 
-    For each record the power, summed over channels, by order in cycles per input turn.
+    Each record has a mapping of orders, in cycles per input turn, to powers summed over channels.
     """
-    found = []
+    lines = []
     for record in features.records:
         orders, amplitudes = residual_spectrum(
             record, rig, ratio, features.orders, rules.highest_order
@@ -207,8 +211,8 @@ def unexpected_lines(
         threshold = np.log(power.size * len(features.records) / rules.unexpected_line_chance)
         beyond = np.flatnonzero(power.max(axis=0) > threshold)
         sizes = power[:, beyond].sum(axis=0)
-        found.append(dict(zip(orders[beyond].round(9).tolist(), sizes.tolist(), strict=True)))
-    return found
+        lines.append(dict(zip(orders[beyond].round(9).tolist(), sizes.tolist(), strict=True)))
+    return lines
 
 
 def unexpected_orders(
@@ -216,14 +220,14 @@ def unexpected_orders(
 ) -> list[float]:
     """Return the orders of unexpected lines of several records, the strongest first.
 
-    In total; fixed frequencies, whose order differs from record to record, do not add up and come
-    last.
+    The total power counts. Fixed frequencies, whose order differs between records, do not add up
+    and come last.
     """
     total: Counter[float] = Counter()
-    for one in lines:
-        total.update(one)
+    for powers in lines:
+        total.update(powers)
     strongest: list[float] = []
-    for order in sorted(total, key=lambda one: -total[one]):
-        if all(abs(order - other) > 2.5 / ratio for other in strongest):
+    for order in sorted(total, key=lambda order: -total[order]):
+        if all(abs(order - stronger) > 2.5 / ratio for stronger in strongest):
             strongest.append(order)
     return strongest[: rules.most_unexpected_lines]

@@ -1,9 +1,9 @@
 """Corrections of a law's form: small forces of the same argument at the same port.
 
-No bearing has exactly the friction curve of a library. Whatever the curve, it is a force of the
-speed at its port, a spring's is one of the deflection, a ripple's one of the angle. The corrections
-of a law span smooth functions of its argument, or further harmonics. To first order, what is left
-of a misfit beside all of them cannot be an error of that law's form.
+No bearing has exactly the friction curve of a library. Whatever the curve, it is a function of the
+speed at its port, that of a spring one of the deflection, and that of a ripple one of the angle.
+The corrections of a law span smooth functions of its argument, or further harmonics. To first
+order, a misfit that remains beside all of them cannot be an error of that law's form.
 """
 
 from __future__ import annotations
@@ -38,15 +38,15 @@ from pymoo_hdte.effects.law import PortState, Response, Values
 from pymoo_hdte.effects.ripple import PeriodicTorque
 from pymoo_hdte.effects.stiffness import HardeningStiffness, PeriodicStiffness, SoftWindup
 
-# Sizes are far below those that matter: only directions count.
+# Sizes are far below those that matter, because only directions count.
 _SHARE = 1e-3
-"""Of the torque or stiffness of the drive, for what varies with an angle."""
+"""Size of what varies with an angle, as a share of the torque or stiffness of the drive."""
 _LARGER_SHARE = 5e-3
-"""For what changes means."""
+"""Size of what changes means, as a share of the same."""
 _ANGLE = 1e-7
-"""rad, of an error of the output angle."""
+"""Size of an error of the output angle, rad."""
 _SHARPNESS = 3.0
-"""Of the bends, as of a play with a soft skin."""
+"""Sharpness of the bends, as of a play with a soft skin."""
 _BENDS = tuple(np.geomspace(0.01, 1.0, 8).tolist())
 """Torsions, as shares of the largest, at which a stiffness may bend and springs may slip."""
 _PARTS = (0.0, np.pi / 2.0)
@@ -60,18 +60,18 @@ _DRIFTS = (0.1, 0.3, 1.0, 3.0)
 
 @dataclass(frozen=True, eq=False)
 class Ranges:
-    """What the records of a drive run through, SI.
+    """Ranges of speed, torque and time in the records of a drive, SI.
 
     Attributes
     ----------
     speed : ndarray, shape (r,)
-        Of the input.
+        Speeds of the input.
     torque, travel : float
-        Largest at the output, and the torsion by it.
+        Largest torque at the output, and the torsion that it causes.
     duration : float
-        Of the session.
+        Duration of the session.
     ratio, stiffness, damping, inertia : float
-        Of the believed drive; the inertia that of its load.
+        Values of the believed drive; the inertia is that of its load.
     lines : tuple of float
         Orders of the believed static error.
     shown : tuple of float
@@ -93,9 +93,13 @@ class Ranges:
     terms: int
 
     def multiples(self, order: float) -> list[float]:
-        """Return an order and those of its harmonics that are analysed."""
+        """Return those of an order and its harmonics that are analysed."""
         multiples = [k * order for k in range(1, self.terms + 1)]
-        return [one for one in multiples if np.min(np.abs(np.subtract(self.shown, one))) < 1e-6]
+        return [
+            multiple
+            for multiple in multiples
+            if np.min(np.abs(np.subtract(self.shown, multiple))) < 1e-6
+        ]
 
     def slower(self, port: str) -> float:
         """Return turns of the input per turn of a port."""
@@ -103,26 +107,26 @@ class Ranges:
 
 
 def corrections(candidate: Candidate, ranges: Ranges) -> list[DriveEffect]:
-    """Return the corrections of the form of a candidate's laws; none where no form is known.
+    """Return the corrections of the form of a candidate's laws, none where no form is known.
 
-    A base parameter out of its tolerance has those of the effect that says the same. An error that
-    no verdict names has none.
+    A base parameter out of its tolerance has those of the effect that covers it. An error that no
+    verdict names has none.
     """
     effect = candidate.effect if candidate.listed else None
     return _FAMILIES[(effect and effect.forms) or AS_LISTED](candidate, ranges)
 
 
 def _friction(candidate: Candidate, ranges: Ranges) -> list[DriveEffect]:
-    """Friction of any curve; at the output bristles show in the sweep, which turns there."""
-    found: list[DriveEffect] = [
+    """Return friction of any curve; at the output with bristles, which show in the sweep."""
+    effects: list[DriveEffect] = [
         Correction(candidate.port, AnyForce(_of_speed(power, candidate.port, ranges)))
         for power in range(ranges.terms)
     ]
-    return found + (_contacts(ranges) if candidate.port == "output" else [])
+    return effects + (_contacts(ranges) if candidate.port == "output" else [])
 
 
 def _contacts(ranges: Ranges) -> list[DriveEffect]:
-    """Contacts of the output that bend before they slip, by any way up to those of a bearing."""
+    """Return contacts of the output that bend before they slip, as far as those of a bearing."""
     size, shares = _SHARE * ranges.torque, _BENDS[:4]
     laws = [PreslidingFriction(size, share * ranges.travel, 1e-3) for share in shares]
     return [Correction("output", law) for law in laws]
@@ -151,19 +155,19 @@ def _of_speed(
 
 def _varying_friction(candidate: Candidate, ranges: Ranges) -> list[DriveEffect]:
     port, slower = candidate.port, ranges.slower(candidate.port)
-    found = _friction(candidate, ranges)
-    for order in (slower * one for one in ranges.multiples(candidate.order or 1.0)):
+    effects = _friction(candidate, ranges)
+    for order in (slower * multiple for multiple in ranges.multiples(candidate.order or 1.0)):
         for phase in _PARTS:
             for power in range(2):
                 force = _of_speed(power, port, ranges, order, phase)
-                found.append(Correction(port, AnyForce(force, (order,))))
-    return found
+                effects.append(Correction(port, AnyForce(force, (order,))))
+    return effects
 
 
 def _friction_of_load(candidate: Candidate, ranges: Ranges) -> list[DriveEffect]:
-    """Friction of any power of the load, which may differ where the load drives."""
+    """Return friction of any power of the load, which may differ where the load drives."""
     scale = ranges.torque / ranges.ratio
-    found: list[DriveEffect] = [*_friction(candidate, ranges)[:2]]
+    effects: list[DriveEffect] = [*_friction(candidate, ranges)[:2]]
     for power in (0.0, 0.5, 1.0, 2.0):
         for driven in (False, True):
 
@@ -176,35 +180,35 @@ def _friction_of_load(candidate: Candidate, ranges: Ranges) -> list[DriveEffect]
                     return Response(size * sign**2, damping=2.0 * size * sign * steep)
                 return Response(size * sign, damping=size * steep)
 
-            found.append(Correction("input", AnyForceOfLoad(force)))
-    return found
+            effects.append(Correction("input", AnyForceOfLoad(force)))
+    return effects
 
 
 def _stiffness(candidate: Candidate, ranges: Ranges) -> list[DriveEffect]:
-    """Stiffness that bends anywhere; with the angle too, where a clearance varies."""
+    """Return stiffness that bends anywhere, and with the angle where a clearance varies."""
     bends = [SoftWindup(_LARGER_SHARE, share * ranges.travel, _SHARPNESS) for share in _BENDS]
     cubic = HardeningStiffness(_LARGER_SHARE * ranges.stiffness / ranges.travel**2)
-    found: list[DriveEffect] = [Correction("mesh", law) for law in bends]
-    found.append(Correction("mesh", cubic))
+    effects: list[DriveEffect] = [Correction("mesh", law) for law in bends]
+    effects.append(Correction("mesh", cubic))
     for order in ranges.multiples(candidate.order) if candidate.order else ():
         for phase in _PARTS:
             waving = [_waving(law, order, phase) for law in bends[::2]]
-            found += [Correction("mesh", AnyForce(force, (order,))) for force in waving]
-    return found
+            effects += [Correction("mesh", AnyForce(force, (order,))) for force in waving]
+    return effects
 
 
 def _waving(law: SoftWindup, order: float, phase: float) -> Force:
     """Return a bend that comes and goes with the angle."""
 
     def force(state: PortState) -> Response:
-        one, wave = law.respond(state), np.cos(state.phase(order) + phase)
-        return Response(one.torque * wave, one.slope * wave)
+        bend, wave = law.respond(state), np.cos(state.phase(order) + phase)
+        return Response(bend.torque * wave, bend.slope * wave)
 
     return force
 
 
 def _springs(candidate: Candidate, ranges: Ranges) -> list[DriveEffect]:
-    """Springs at the mesh that slip at any torsion; all four of each at the same."""
+    """Return springs at the mesh that slip at any torsion, all four of each at the same."""
     size = _SHARE * ranges.torque
     return [Correction("mesh", MaxwellSlip(size, share * ranges.travel, 1e-3)) for share in _BENDS]
 
@@ -218,8 +222,8 @@ def _stiffness_wave(candidate: Candidate, ranges: Ranges) -> list[DriveEffect]:
 def _ripple(candidate: Candidate, ranges: Ranges) -> list[DriveEffect]:
     size, order = _SHARE * ranges.torque / ranges.ratio, candidate.order or 1.0
     orders = ranges.multiples(order)
-    # It moves its own angle, through which each harmonic shows at the next lower one, too.
-    shown = {round(one / order) for one in orders}
+    # A ripple moves its own angle, so that each harmonic also shows at the next lower one.
+    shown = {round(multiple / order) for multiple in orders}
     orders += [(k + 1) * order for k in shown if k < ranges.terms and k + 1 not in shown]
     return [
         Correction("input", PeriodicTorque(order, phase, size))
@@ -241,8 +245,8 @@ def _scale_error(candidate: Candidate, ranges: Ranges) -> list[DriveEffect]:
 
 
 def _reaction(candidate: Candidate, ranges: Ranges) -> list[DriveEffect]:
-    """Return torques by the load at the orders of the error in any phase, as with a lag."""
-    fastest, found = ranges.speed.max(), []
+    """Return torques by the load at the orders of the error, in any phase, as with a lag."""
+    fastest, effects = ranges.speed.max(), []
     for order in ranges.lines:
         for phase in _PARTS:
             for power in (0, 1):
@@ -254,8 +258,8 @@ def _reaction(candidate: Candidate, ranges: Ranges) -> list[DriveEffect]:
                     wave: Values = np.cos(state.phase(order) + phase)
                     return Response(1e-2 * _SHARE * np.asarray(state.load) * wave * faster)
 
-                found.append(Correction("input", AnyForceOfLoad(force, (order,))))
-    return list[DriveEffect](found)
+                effects.append(Correction("input", AnyForceOfLoad(force, (order,))))
+    return list[DriveEffect](effects)
 
 
 def _damping(candidate: Candidate, ranges: Ranges) -> list[DriveEffect]:
@@ -267,8 +271,8 @@ def _damping(candidate: Candidate, ranges: Ranges) -> list[DriveEffect]:
         slope = _LARGER_SHARE * ranges.damping * np.abs(state.speed) / rate
         return Response(slope * state.speed, damping=2.0 * slope)
 
-    found: list[DriveEffect] = [DampingByRecord(0.05 * share**power) for power in (1, 2)]
-    return [*found, Correction("mesh", AnyForce(force))]
+    effects: list[DriveEffect] = [DampingByRecord(0.05 * share**power) for power in (1, 2)]
+    return [*effects, Correction("mesh", AnyForce(force))]
 
 
 def _drift(candidate: Candidate, ranges: Ranges) -> list[DriveEffect]:

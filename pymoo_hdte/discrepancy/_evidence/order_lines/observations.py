@@ -37,8 +37,8 @@ Vector = NDArray[np.float64]
 Values = NDArray[np.float64]
 
 _COURSE = 0.1
-"""Share by which what creeps may differ from a sum of decays, line by line: it slows down as it
-fades, and goes by fits and starts where lines of the error beat."""
+"""Share by which creep may differ from a sum of decays, line by line: it slows down as it fades,
+and comes in fits and starts where lines of the error beat."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +75,8 @@ class Observations:
     def covariance(self) -> NDArray[np.float64]:
         """Covariance of the features of each record, shape (r, f, f).
 
-        Of sensors, of the repeatability, and of what still creeps in laws that forget gradually.
+        It is the sum of those of sensors, of the repeatability, and of creep in laws that forget
+        gradually.
         """
         layout = Layout(self.base)
         start = layout.array("start") if self.reference is None else self.reference
@@ -86,30 +87,32 @@ class Observations:
     def creep(self) -> float:
         """Mesh torque that fades in believed and included effects, N.m: see `Behaviour.creep`."""
         effects = (*self.campaign.believed.effects, *self.reference_effects)
-        laws = (one for one in effects if isinstance(one, LawAtPort) and one.port == "mesh")
-        return sum(one.law.creep for one in laws)
+        at_mesh = (
+            effect for effect in effects if isinstance(effect, LawAtPort) and effect.port == "mesh"
+        )
+        return sum(effect.law.creep for effect in at_mesh)
 
     def _creep(self, stiffness: float) -> NDArray[np.float64] | float:
-        """Return the covariance by torsion that fades in a record, which loads had left before.
+        """Return the covariance by torsion that earlier loads have left and that fades in a record.
 
-        Nobody knows how long the drive had turned on when a record began, so that any of it may be
-        left, and fade at any rate: each decay has the size of the whole force as its deviation,
-        which is so much more than the noise that a smaller one would make no difference.
+        Nobody knows how long the drive had turned when a record began, so any share of it may
+        remain and fade at any rate. Each decay has the size of the whole force as its deviation, so
+        far above the noise that a smaller one would make no difference.
         """
         size, features = self.creep / stiffness, self.features
         fading = features.conditions.fading
         if fading is None or not size:
             return 0.0
         real, imaginary = features.places(0).T
-        left = np.zeros((*fading.shape[:2], features.values.shape[1]))
-        left[..., 0] = fading[..., 0].real
-        left[..., real], left[..., imaginary] = fading[..., 1:].real, fading[..., 1:].imag
-        found = np.einsum("rki,rkj->rij", left, left)
-        # What hardly fades at all moves the mean.
-        found[:, 0, 0] += 1.0
-        each = np.arange(left.shape[2])
-        found[:, each, each] *= 1.0 + _COURSE**2
-        return np.asarray(size**2 * found)
+        decays = np.zeros((*fading.shape[:2], features.values.shape[1]))
+        decays[..., 0] = fading[..., 0].real
+        decays[..., real], decays[..., imaginary] = fading[..., 1:].real, fading[..., 1:].imag
+        covariance = np.einsum("rki,rkj->rij", decays, decays)
+        # A torsion that hardly fades moves the mean.
+        covariance[:, 0, 0] += 1.0
+        diagonal = np.arange(decays.shape[2])
+        covariance[:, diagonal, diagonal] *= 1.0 + _COURSE**2
+        return np.asarray(size**2 * covariance)
 
     def _repeatability(self, layout: Layout, start: Vector) -> NDArray[np.float64]:
         """Return the covariance by small changes of the static error for each record."""
@@ -143,48 +146,48 @@ class Observations:
         effort: Effort = PREDICTION,
     ) -> Prediction:
         """Return the prediction behind `predict`, steady states included."""
-        values = self._named(vectors)
+        values = self._values_by_name(vectors)
         believed, rig = self.campaign.believed, self.campaign.rig
         features = self.features
         orders = features.orders.tolist()
         conditions = features.conditions
         return predict(believed, rig, conditions, orders, values, effects, start, effort)
 
-    def _named(self, vectors: Vector) -> dict[str, Vector]:
+    def _values_by_name(self, vectors: Vector) -> dict[str, Vector]:
         return {p.name: column for p, column in zip(self.base, vectors.T, strict=True)}
 
     def torsion_residuals(
         self, vectors: Vector, effects: Sequence[DriveEffect]
     ) -> NDArray[np.float64]:
         """Return whitened residuals (v, n_points) of the sweeps; none where there is no sweep."""
-        groups = of_equal_numbers(self.campaign.believed.effects, self._named(vectors))
-        found = np.empty((len(vectors), self.n_sweep_residuals))
+        groups = of_equal_numbers(self.campaign.believed.effects, self._values_by_name(vectors))
+        residuals = np.empty((len(vectors), self.n_sweep_residuals))
         for rows, known in groups if self.torsion else ():
-            found[rows] = self._swept(vectors[rows], known, effects)
-        return found
+            residuals[rows] = self._sweep_residuals(vectors[rows], known, effects)
+        return residuals
 
-    def _swept(
+    def _sweep_residuals(
         self, vectors: Vector, known: Sequence[DriveEffect], effects: Sequence[DriveEffect]
     ) -> NDArray[np.float64]:
         """Return whitened residuals of the sweeps where the believed effects are ``known``."""
-        values = self._named(vectors)
+        values = self._values_by_name(vectors)
         coefficients = coefficients_of(self.campaign.believed, values, (*known, *effects), 1)
         stiffness = coefficients.stiffness * values["locked_stiffness"]
         coefficients = replace(coefficients, stiffness=stiffness)
         # Vectors with equal sensor errors have the same path of the torque.
         of_sensors: dict[tuple[float, float], list[int]] = {}
-        sensors = (values[f"output_torque_{one}"].tolist() for one in ("gain", "zero"))
+        sensors = (values[f"output_torque_{part}"].tolist() for part in ("gain", "zero"))
         for row, sensor in enumerate(zip(*sensors, strict=True)):
             of_sensors.setdefault(sensor, []).append(row)
-        found = []
+        residuals = []
         for points in self.torsion:
             torsion = np.empty((len(vectors), len(points.angle)))
             for (gain, zero), rows in of_sensors.items():
-                some = coefficients if len(of_sensors) == 1 else coefficients.rows(np.array(rows))
+                group = coefficients if len(of_sensors) == 1 else coefficients.rows(np.array(rows))
                 path = (points.path - zero) / (1.0 + gain)
-                torsion[rows] = mean_torsion(some, path)[:, points.intervals]
-            found.append((torsion - points.angle) @ points.whitening.T)
-        return np.hstack(found)
+                torsion[rows] = mean_torsion(group, path)[:, points.intervals]
+            residuals.append((torsion - points.angle) @ points.whitening.T)
+        return np.hstack(residuals)
 
     @property
     def n_sweep_residuals(self) -> int:
@@ -196,15 +199,15 @@ class Observations:
         white = np.empty_like(differences)
         for record, triangle in enumerate(self.whiteners):
             part = differences[..., record, :].reshape(-1, len(triangle)).T
-            # Unknown values are NaN here and are counted as lost afterwards. LAPACK itself, which
-            # reads columns first: SciPy's checks would take several times as long.
+            # Unknown values are NaN here and count as lost afterwards. LAPACK is called directly,
+            # with columns first, because SciPy's checks would take several times as long.
             solved, _ = dtrtrs(triangle.T, part, trans=True)
             white[..., record, :] = solved.T.reshape(differences[..., record, :].shape)
         return white.reshape(*differences.shape[:-2], -1)
 
 
 def cell_degrees_of_freedom(data: Observations) -> Values:
-    """Return those of each cell, shape (4, 1 + m)."""
+    """Return the degrees of freedom of each cell, shape (4, 1 + m)."""
     degrees_of_freedom = np.full((len(CHANNELS), 1 + len(data.features.orders)), 2.0)
     degrees_of_freedom[:, 0] = 1.0
     return degrees_of_freedom
@@ -213,38 +216,40 @@ def cell_degrees_of_freedom(data: Observations) -> Values:
 def cell_chi_square(data: Observations, difference: Values) -> Values:
     """Return the chi-square of each cell for differences of features (r, f); (r, 4, 1 + m)."""
     covariance = data.covariance
-    found = np.full((len(difference), *cell_degrees_of_freedom(data).shape), np.nan)
+    chi_square = np.full((len(difference), *cell_degrees_of_freedom(data).shape), np.nan)
     for channel in range(len(CHANNELS)):
         if channel in MEANS:
-            found[:, channel, 0] = difference[:, channel] ** 2 / covariance[:, channel, channel]
+            chi_square[:, channel, 0] = (
+                difference[:, channel] ** 2 / covariance[:, channel, channel]
+            )
         for line, pair in enumerate(data.features.places(channel)):
             block = covariance[:, pair[:, None], pair]
             part = difference[:, pair, None]
             solved = np.linalg.solve(block, part)
-            found[:, channel, 1 + line] = np.sum(part * solved, axis=(1, 2))
-    return found
+            chi_square[:, channel, 1 + line] = np.sum(part * solved, axis=(1, 2))
+    return chi_square
 
 
 def cell_noise(data: Observations) -> Values:
-    """Return the standard deviation of a part of each cell, shape (r, 4, 1 + m).
+    """Return the standard deviation of each cell, shape (r, 4, 1 + m).
 
-    Of a mean its own, of a line the root mean square of those of its real and imaginary part.
+    That of a line is the root mean square of those of its real and imaginary part.
     """
     variance = np.diagonal(data.covariance, axis1=1, axis2=2)
-    found = np.full((len(variance), *cell_degrees_of_freedom(data).shape), np.nan)
+    variances = np.full((len(variance), *cell_degrees_of_freedom(data).shape), np.nan)
     for channel in range(len(CHANNELS)):
         if channel in MEANS:
-            found[:, channel, 0] = variance[:, MEANS.index(channel)]
-        found[:, channel, 1:] = variance[:, data.features.places(channel)].mean(axis=2)
-    return np.sqrt(found)
+            variances[:, channel, 0] = variance[:, MEANS.index(channel)]
+        variances[:, channel, 1:] = variance[:, data.features.places(channel)].mean(axis=2)
+    return np.sqrt(variances)
 
 
 def as_lines(data: Observations, difference: Values) -> NDArray[np.complex128]:
     """Return differences of features (r, f) as phasors of cells (r, 4, 1 + m)."""
-    found = np.full((len(difference), *cell_degrees_of_freedom(data).shape), np.nan, dtype=complex)
+    cells = np.full((len(difference), *cell_degrees_of_freedom(data).shape), np.nan, dtype=complex)
     for channel in range(len(CHANNELS)):
         if channel in MEANS:
-            found[:, channel, 0] = difference[:, channel]
+            cells[:, channel, 0] = difference[:, channel]
         real, imaginary = data.features.places(channel).T
-        found[:, channel, 1:] = difference[:, real] + 1j * difference[:, imaginary]
-    return found
+        cells[:, channel, 1:] = difference[:, real] + 1j * difference[:, imaginary]
+    return cells

@@ -19,8 +19,6 @@ from pymoo_hdte.discrepancy._records.known_values import (
 from pymoo_hdte.effects.sentence_blanks import in_words
 from pymoo_hdte.effects.unknowns import Parameter
 
-__all__ = ["MECHANICAL", "READING", "base_parameters"]
-
 READING = (
     "offset",
     "input_torque_gain",
@@ -48,7 +46,7 @@ _UNITS = {
 }
 """SI units of the base parameters, by name; those of lines without their number."""
 ACTING_AT = {"input_damping": "input", "output_damping": "output"}
-"""Ports at which base parameters are friction, as a law there is."""
+"""Ports at which base parameters act as friction, as a law there does."""
 _OF_LINES = ("error_amplitude", "error_phase")
 
 
@@ -121,32 +119,32 @@ def base_parameters(
     offset : float
         First guess of the constant of the transmission error, rad.
     """
-    found = [
-        _within(name, getattr(believed, name), believed.tolerance_of(name)) for name in MECHANICAL
+    parameters = [
+        _bounded(name, getattr(believed, name), believed.tolerance_of(name)) for name in MECHANICAL
     ]
     for line, amplitude in enumerate(believed.error_amplitudes):
-        length = _within(f"error_amplitude_{line}", amplitude, believed.error_tolerance)
+        length = _bounded(f"error_amplitude_{line}", amplitude, believed.error_tolerance)
         name, phase = f"error_phase_{line}", phases[line]
-        # With a tenth of a radian the difference quotient by the phase of a weak line was off by
-        # 0.8 %, by what Newton's method leaves of a steady state.
+        # With a tenth of a radian the remaining error of Newton's method put the difference
+        # quotient by the phase of a weak line off by 0.8 %.
         within, scale = (phase - 9.0, phase + 9.0), 1.0
-        found += [length, Parameter(name, phase, *within, scale, phase_of=length.name)]
+        parameters += [length, Parameter(name, phase, *within, scale, phase_of=length.name)]
     for name, value in known_values(believed.effects).items():
         if name in believed.tolerances:
-            found.append(_within(name, value, believed.tolerances[name]))
-    found.append(Parameter("offset", offset, offset - 1.0, offset + 1.0, 1e-5))
+            parameters.append(_bounded(name, value, believed.tolerances[name]))
+    parameters.append(Parameter("offset", offset, offset - 1.0, offset + 1.0, 1e-5))
     # Where the input was locked, a varying stiffness differs from its mean.
-    locked = _within("locked_stiffness", 1.0, believed.tolerance_of("stiffness"))
+    locked = _bounded("locked_stiffness", 1.0, believed.tolerance_of("stiffness"))
     # The prior only determines it where no sweep does.
-    found.append(replace(locked, prior=locked.scale))
+    parameters.append(replace(locked, prior=locked.scale))
     for name in READING[1:]:
         # The stated limit of a sensor error is taken as a standard deviation, since sensors exceed
         # it.
         size = max(float(getattr(rig, name)), 1e-9)
-        found.append(Parameter(name, 0.0, -10.0 * size, 10.0 * size, size, prior=size))
-    return tuple(found)
+        parameters.append(Parameter(name, 0.0, -10.0 * size, 10.0 * size, size, prior=size))
+    return tuple(parameters)
 
 
-def _within(name: str, value: float, tolerance: float) -> Parameter:
+def _bounded(name: str, value: float, tolerance: float) -> Parameter:
     reach = max(tolerance * abs(value), 1e-12)
     return Parameter(name, value, value - reach, value + reach, reach)

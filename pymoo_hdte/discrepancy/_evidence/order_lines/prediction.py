@@ -14,14 +14,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pymoo_hdte.discrepancy._evidence.order_lines.parameters import MECHANICAL
 from pymoo_hdte.discrepancy._evidence.order_lines.steady_states import (
     PREDICTION,
     Effort,
     merged,
     steady_motions,
 )
-from pymoo_hdte.discrepancy._records.believed import BelievedDrive, Rig
+from pymoo_hdte.discrepancy._records.believed import MECHANICAL, BelievedDrive, Rig
 from pymoo_hdte.discrepancy._records.known_values import of_equal_numbers
 from pymoo_hdte.discrepancy._records.line_fit import CHANNELS
 from pymoo_hdte.drive import (
@@ -35,8 +34,8 @@ from pymoo_hdte.drive._solve.order_spectrum import sine_phasor
 _SAME = 1e-8
 """Orders nearer to each other are one; those of a torus are sums of rounded numbers."""
 _UNRESOLVED = 0.1
-"""Cycles in an output turn within which two lines are read as one; farther apart, they are lines of
-their own to records of a few turns."""
+"""Cycles in an output turn within which two lines are read as one; records of a few turns tell
+lines further apart."""
 
 
 @dataclass(frozen=True)
@@ -48,15 +47,16 @@ class Conditions:
     input_speed : ndarray
         Measured mean, rad/s.
     output_torque : ndarray
-        Measured mean, N.m: load with the sensor's gain and zero.
+        Measured mean, N.m: the load with the sensor's gain and zero error.
     elapsed : ndarray
         Middle of the record within the session, s.
     bends : complex ndarray, shape (r, 3, 1 + m)
         Contribution of a drift that is curved within a record: see `OrderLines`.
     temperature : ndarray, optional
-        In kelvin, NaN where it is not known; by default in no record.
+        Kelvin, NaN where unknown; by default in all records.
     input_angle, travel : ndarray, optional
-        Of the input in the middle of the record, and from its start to its end, rad; by default 0.
+        Angle of the input in the middle of the record, and its travel from start to end, rad; by
+        default 0.
     fading : complex ndarray, shape (r, k, 1 + m), optional
         Contribution of what fades within a record, see `OrderLines`; by default nothing fades.
     """
@@ -72,8 +72,8 @@ class Conditions:
 
     def rows(self, rows: NDArray[np.int_]) -> Conditions:
         """Return the conditions of some of the records."""
-        known = {one.name: getattr(self, one.name) for one in fields(self)}
-        of_rows = {name: one[rows] for name, one in known.items() if one is not None}
+        known = {attribute.name: getattr(self, attribute.name) for attribute in fields(self)}
+        of_rows = {name: value[rows] for name, value in known.items() if value is not None}
         return replace(self, **of_rows)
 
     def __len__(self) -> int:
@@ -116,7 +116,7 @@ def predict(
     values : dict of ndarray, shape (v,)
         Parameters by name, those of `parameters.base_parameters`.
     effects : sequence of DriveEffect
-        In addition to the believed ones; shared by all vectors.
+        Effects in addition to the believed ones, shared by all vectors.
     start : SteadyMotion, optional
         Steady states of the records for nearby values, to begin from.
     effort : Effort
@@ -125,14 +125,14 @@ def predict(
     parts = []
     groups = of_equal_numbers(believed.effects, values)
     for rows, known in groups:
-        some = {name: column[rows] for name, column in values.items()}
+        group = {name: column[rows] for name, column in values.items()}
         present = (*known, *effects)
         parts.append(
-            _predict_group(believed, rig, conditions, orders, some, present, start, effort)
+            _predict_group(believed, rig, conditions, orders, group, present, start, effort)
         )
     if len(parts) == 1:
         return parts[0]
-    return _joined(parts, [rows for rows, _ in groups], len(conditions))
+    return _in_order(parts, [rows for rows, _ in groups], len(conditions))
 
 
 def _predict_group(
@@ -152,16 +152,16 @@ def _predict_group(
     coefficients = coefficients_of(believed, values, present, records)
     if conditions.temperature is not None:
         coefficients = replace(coefficients, temperature=np.tile(conditions.temperature, count))
-    near = None if start is None else start.rows(np.tile(np.arange(records), count))
+    nearby = None if start is None else start.rows(np.tile(np.arange(records), count))
     speed = np.tile(conditions.input_speed, count)
-    balance = steady_motions(coefficients, speed, load.ravel(), rig, near, effort)
+    balance = steady_motions(coefficients, speed, load.ravel(), rig, nearby, effort)
     output_torque = balance.coupling_torque
     if rig.output_torque_at == "brake":
-        # Behind the load inertia there is no torque but that of the load, which is constant.
+        # Behind the load inertia there is only the torque of the load, which is constant.
         output_torque = output_torque * (np.arange(output_torque.shape[1]) == 0)
     channels = [
         balance.transmission_error,
-        balance.motor_torque + _driving(balance, coefficients),
+        balance.motor_torque + _motor_ripple(balance, coefficients),
         output_torque,
         balance.lead,
     ]
@@ -169,19 +169,19 @@ def _predict_group(
     means = np.array([channel[:, 0].real for channel in channels])
     phasors = lines.reshape(count, records, len(CHANNELS), len(orders))
     mean = means.T.reshape(count, records, len(CHANNELS))
-    _read(believed.ratio, conditions, orders, values, present, mean, phasors)
+    _add_sensor_errors(believed.ratio, conditions, orders, values, present, mean, phasors)
     return Prediction(mean, phasors, balance)
 
 
-def _joined(
+def _in_order(
     parts: Sequence[Prediction], places: Sequence[NDArray[np.int_]], records: int
 ) -> Prediction:
     """Return predictions of several groups of vectors as one, in the order of their places."""
     order = np.argsort(np.concatenate(places))
-    mean = np.concatenate([one.mean for one in parts])[order]
-    phasors = np.concatenate([one.phasors for one in parts])[order]
+    mean = np.concatenate([part.mean for part in parts])[order]
+    phasors = np.concatenate([part.phasors for part in parts])[order]
     cases = [np.add.outer(records * rows, np.arange(records)).ravel() for rows in places]
-    return Prediction(mean, phasors, merged([one.balance for one in parts], cases))
+    return Prediction(mean, phasors, merged([part.balance for part in parts], cases))
 
 
 def coefficients_of(
@@ -228,16 +228,16 @@ def _lines(
 
     A case that has diverged is NaN in all its harmonics, and so at all orders.
     """
-    kept = tuple(balance.torus.orders.tolist())
+    predicted_orders = tuple(balance.torus.orders.tolist())
     angle, travel = (
-        np.zeros(len(conditions)) if one is None else one
-        for one in (conditions.input_angle, conditions.travel)
+        np.zeros(len(conditions)) if column is None else column
+        for column in (conditions.input_angle, conditions.travel)
     )
-    read = _readings(kept, tuple(orders), ratio)
-    lines = np.stack([one[:, read.columns] for one in channels], axis=1)
+    read = _readings(predicted_orders, tuple(orders), ratio)
+    lines = np.stack([channel[:, read.columns] for channel in channels], axis=1)
     np.conjugate(lines, out=lines, where=read.conjugate)
     if read.beyond.any():
-        turned, passed = (np.outer(one, read.beyond) for one in (angle, travel))
+        turned, passed = (np.outer(angles, read.beyond) for angles in (angle, travel))
         seen = np.exp(1j * turned) * np.sinc(passed / (2.0 * np.pi))
         lines *= np.tile(seen, (len(lines) // len(seen), 1))[:, None]
     return np.asarray(lines @ read.places)
@@ -256,29 +256,29 @@ class _Readings(NamedTuple):
 
 
 @lru_cache(maxsize=64)
-def _readings(kept: tuple[float, ...], orders: tuple[float, ...], ratio: float) -> _Readings:
-    """Return which lines are read where.
+def _readings(predicted: tuple[float, ...], orders: tuple[float, ...], ratio: float) -> _Readings:
+    """Return the harmonics that are read, and the analysed orders at which they are read.
 
     A line is read at its own order, or at the nearest one that a record of one output turn cannot
     tell from it: errors of orders 2 and 2.02 beat at 0.02, which is 2/101 there. Over a longer
-    record it turns against that order, and the less of it is seen. Lines as near to zero as that
-    are in no analysed line, and drift in a record.
+    record it turns against that order, which reads less of it. Lines as near to zero are in no
+    analysed line, and drift in a record.
     """
-    kept_orders = np.array(kept)
-    nearest = np.abs(np.subtract.outer(np.abs(kept_orders), orders)).argmin(axis=1)
-    beyond = np.abs(kept_orders) - np.take(orders, nearest)
+    predicted_orders = np.array(predicted)
+    nearest = np.abs(np.subtract.outer(np.abs(predicted_orders), orders)).argmin(axis=1)
+    beyond = np.abs(predicted_orders) - np.take(orders, nearest)
     columns = np.flatnonzero(np.abs(beyond) * ratio < _UNRESOLVED)
     beyond = np.where(np.abs(beyond) < _SAME, 0.0, beyond)[columns]
     places = np.zeros((len(columns), len(orders)))
     places[np.arange(len(columns)), nearest[columns]] = 1.0
-    found = _Readings(columns, kept_orders[columns] < 0.0, beyond, places)
-    for one in found:
-        one.flags.writeable = False
-    return found
+    readings = _Readings(columns, predicted_orders[columns] < 0.0, beyond, places)
+    for array in readings:
+        array.flags.writeable = False
+    return readings
 
 
-def _driving(balance: SteadyMotion, coefficients: Coefficients) -> NDArray[np.complex128]:
-    """Return the harmonics of a motor's ripple, as its torque sensor reads it; (1, n_harmonics)."""
+def _motor_ripple(balance: SteadyMotion, coefficients: Coefficients) -> NDArray[np.complex128]:
+    """Return the harmonics of a motor's ripple as its torque sensor reads it, (1, n_harmonics)."""
     total = np.zeros((1, len(balance.torus.orders)), dtype=complex)
     for port, law in coefficients.laws:
         for order in law.orders if port == "input" and law.drives else ():
@@ -287,7 +287,7 @@ def _driving(balance: SteadyMotion, coefficients: Coefficients) -> NDArray[np.co
     return total
 
 
-def _read(
+def _add_sensor_errors(
     ratio: float,
     conditions: Conditions,
     orders: Sequence[float],

@@ -40,7 +40,7 @@ class Scales:
     motor_torque : float
         Largest torque at the input, N.m.
     duration : float
-        From the first record of the session to the last, s.
+        Time from the first record of the session to the last, s.
     changes : tuple of float
         Times between records, none of them near the ends of the session, s.
     swept : bool
@@ -51,7 +51,7 @@ class Scales:
     driven : bool
         Whether the load opposes the motion in some records and drives it in others.
     temperature : float
-        Mean of the records, K, if all have one and these spread enough; else 0.
+        Mean of the records, K, if all have a temperature and these spread enough; else 0.
     """
 
     speed: float
@@ -80,13 +80,13 @@ def scales_of(data: Data, base: Fit) -> Scales:
     )
     swept = base.residuals[n_running : n_running + data.n_sweep_residuals]
     if len(swept):
-        deviation = np.median(np.concatenate([one.deviation for one in data.torsion]))
+        deviation = np.median(np.concatenate([points.deviation for points in data.torsion]))
         error = max(error, float(deviation * np.sqrt(np.mean(swept**2))))
     when = features.conditions
-    # A load below what a sensor's zero is known to has no direction.
+    # A load within the uncertainty of the sensor's zero has no direction.
     least = data.campaign.torque_scale * data.rules.least_held_load
     braking = when.output_torque * np.sign(when.input_speed)
-    paths = [np.abs(one.path).max() for one in data.torsion]
+    paths = [np.abs(points.path).max() for points in data.torsion]
     return Scales(
         speed=float(np.abs(when.input_speed).max()),
         torque=float(max([np.abs(when.output_torque).max(), *paths])),
@@ -126,7 +126,7 @@ def _size(features: Features, values: NDArray[np.float64], channel: int) -> floa
 
 
 def _largest(features: Features, channel: int) -> float:
-    """Return the largest value of one channel with a mean, lines and mean added, of all records."""
+    """Return the largest sum of mean and lines of one channel in any record."""
     lines = features.values[:, features.places(channel)]
     mean = np.abs(features.values[:, MEANS.index(channel)])
     return float(np.max(mean + np.hypot(lines[..., 0], lines[..., 1]).sum(axis=1)))

@@ -38,8 +38,8 @@ class TorsionPoints:
     angle : ndarray, shape (b,)
         Mean of minus the output angle, rad: the torsion plus an unknown constant.
     covariance : ndarray, shape (b, b)
-        Of ``angle`` at given ``torque``, rad2: white noise of the encoder, and the residual torque
-        noise, which is common to the points of a leg.
+        Covariance of ``angle`` at given ``torque``, rad2: white noise of the encoder, and the
+        residual torque noise, which is common to the points of a leg.
     path : ndarray, shape (m,)
         Torques at the turning points and at the beginnings and ends of the points, N.m.
     intervals : ndarray of int, shape (b,)
@@ -69,7 +69,7 @@ class TorsionPoints:
 def torsion_points(record: TorsionRecord, rig: Rig) -> TorsionPoints:
     """Reduce a sweep to points, each the mean of about `torsion_sweep.ROWS_A_POINT` rows.
 
-    In a sweep of more than `torsion_sweep.MOST_ROWS` rows they are means of rows themselves.
+    In a sweep of more than `torsion_sweep.MOST_ROWS` rows, consecutive rows are averaged first.
 
     Parameters
     ----------
@@ -110,10 +110,11 @@ def _covariance(legs: list[TorsionLeg], rig: Rig) -> Values:
     """Return the covariance of the angles, given the torques of all legs."""
     local = [_compliance(leg, rig) for leg in legs]
     usual = float(np.median(np.concatenate(local)))
-    by_leg = [one[:, None] * _means(leg) for one, leg in zip(local, legs, strict=True)]
+    by_leg = [slopes[:, None] * _means(leg) for slopes, leg in zip(local, legs, strict=True)]
     influence = block_diag(*by_leg)
     rows, columns = (np.cumsum([0, *(part.shape[i] for part in by_leg)]) for i in (0, 1))
-    # Where the angle does not follow the load, as before breakaway, it depends on the last turn.
+    # An angle that does not follow the load, as before breakaway, depends on the last turning
+    # point.
     for i in range(1, len(legs)):
         hanging = np.maximum(usual - local[i], 0.0)
         at_turn = np.outer(hanging, _turning_torque(legs[i - 1], legs[i]))
@@ -132,12 +133,12 @@ def _compliance(leg: TorsionLeg, rig: Rig) -> Values:
     return np.array(slopes)
 
 
-def _turning_torque(one: TorsionLeg, other: TorsionLeg) -> Values:
+def _turning_torque(leg: TorsionLeg, following: TorsionLeg) -> Values:
     """Return the derivatives, by the coefficients of both legs, of the torque where they meet."""
-    before, after = one.slope(one.end), other.slope(one.end)
+    before, after = leg.slope(leg.end), following.slope(leg.end)
     # Where two lines cross, the steeper one determines the torque less; equal weights at rest.
     share = np.clip(before / (before - after), 0.0, 1.0) if before != after else 0.5
-    sides = [(1.0 - share) * one.basis(one.end)[0], share * other.basis(one.end)[0]]
+    sides = [(1.0 - share) * leg.basis(leg.end)[0], share * following.basis(leg.end)[0]]
     return np.concatenate(sides)
 
 

@@ -29,13 +29,13 @@ ROWS_A_POINT = 24
 FEWEST_ROWS = 2 * ROWS_A_POINT
 """Least number of rows of a leg."""
 MOST_ROWS = 500 * ROWS_A_POINT
-"""Rows of a sweep beyond which consecutive ones are averaged first: the covariance of the points
-and the polynomials of the legs grow with the square of their number, and 500 points show a curve of
-stiffness and friction as finely as any law of the package bends."""
+"""Rows of a sweep beyond which consecutive ones are averaged first. The covariance of the points
+and the polynomials of the legs grow with the square of their number, and 500 points resolve the
+bends of every law of the package."""
 _REVERSAL = 8.0
 """Least reversal at a turning point, in standard deviations of the torque noise."""
 _REVERSAL_SHARE = 0.05
-"""The same as a share of the swept range, for a sensor noisier than believed."""
+"""Least reversal as a share of the swept range, for a sensor noisier than believed."""
 _REFINEMENTS = 3
 _FEW_ROWS = 8
 """Rows by which a refinement may move a turning point."""
@@ -50,13 +50,13 @@ class TorsionLeg:
     Attributes
     ----------
     time, angle : ndarray, shape (n,)
-        Of the rows, s; minus the output angle, rad.
+        Time of the rows, s, and minus the output angle, rad.
     end : float
         Time of the turning point at the end, s.
     coefficients : ndarray, shape (k,)
-        Of Chebyshev polynomials over the rows, N.m.
+        Coefficients of Chebyshev polynomials over the rows, N.m.
     covariance : ndarray, shape (k, k)
-        Of the coefficients.
+        Covariance of the coefficients.
     """
 
     time: Values
@@ -91,16 +91,16 @@ class TorsionLeg:
     def edges(self) -> Values:
         """Times of the beginning of every point and of the end of the last, s."""
         middles = (self.time[1:] + self.time[:-1]) / 2.0
-        first, last = 2.0 * self.time[:1] - middles[:1], 2.0 * self.time[-1:] - middles[-1:]
+        start, end = 2.0 * self.time[:1] - middles[:1], 2.0 * self.time[-1:] - middles[-1:]
         cuts = np.cumsum([len(rows) for rows in self.split(self.time)])[:-1]
-        return np.concatenate([first, middles[cuts - 1], last])
+        return np.concatenate([start, middles[cuts - 1], end])
 
 
 def shortened(record: TorsionRecord, rig: Rig) -> tuple[TorsionRecord, Rig]:
     """Return a sweep of at most `MOST_ROWS` rows, and the rig with the noise of such a row.
 
-    A row of a long sweep becomes the mean of an equal number of consecutive rows; fewer rows than
-    make one more are left out at the end. A short sweep is returned as it is.
+    Each row becomes the mean of an equal number of consecutive rows; an incomplete last group is
+    left out. A short sweep is returned as it is.
 
     Parameters
     ----------
@@ -133,10 +133,10 @@ def torsion_legs(record: TorsionRecord, rig: Rig) -> list[TorsionLeg]:
         For a leg of fewer than `FEWEST_ROWS` rows.
     """
     corners = _turning_times(record, rig.output_torque_noise)
-    legs = _between(record, rig, corners)
+    legs = _legs_between(record, rig, corners)
     for _ in range(_REFINEMENTS):
-        corners[1:-1] = [_meeting(one, other) for one, other in pairwise(legs)]
-        legs = _between(record, rig, corners)
+        corners[1:-1] = [_meeting_time(leg, following) for leg, following in pairwise(legs)]
+        legs = _legs_between(record, rig, corners)
     return legs
 
 
@@ -166,7 +166,7 @@ def _turning_times(record: TorsionRecord, noise: float) -> Values:
     return record.time[[*rows, len(torque) - 1]]
 
 
-def _between(record: TorsionRecord, rig: Rig, corners: Values) -> list[TorsionLeg]:
+def _legs_between(record: TorsionRecord, rig: Rig, corners: Values) -> list[TorsionLeg]:
     """Fit the torque of the rows that lie wholly between two turning points."""
     half = 0.5 / record.sample_rate
     legs = []
@@ -176,11 +176,13 @@ def _between(record: TorsionRecord, rig: Rig, corners: Values) -> list[TorsionLe
         if count < FEWEST_ROWS:
             allowed = f"at least {FEWEST_ROWS} from each turning point of the torque to the next"
             raise InvalidInput("number of samples", count, allowed)
-        legs.append(_fitted(record, rows, float(end), rig.output_torque_noise))
+        legs.append(_fitted_leg(record, rows, float(end), rig.output_torque_noise))
     return legs
 
 
-def _fitted(record: TorsionRecord, rows: NDArray[np.bool_], end: float, noise: float) -> TorsionLeg:
+def _fitted_leg(
+    record: TorsionRecord, rows: NDArray[np.bool_], end: float, noise: float
+) -> TorsionLeg:
     """Fit a straight line, or a polynomial where the residual exceeds the noise."""
     time, torque = record.time[rows], record.output_torque[rows]
     flexible = max(len(time) // ROWS_A_POINT // 2, 2)
@@ -194,11 +196,11 @@ def _fitted(record: TorsionRecord, rows: NDArray[np.bool_], end: float, noise: f
     return TorsionLeg(time, -record.output_angle[rows], end, coefficients, covariance)
 
 
-def _meeting(one: TorsionLeg, other: TorsionLeg) -> float:
+def _meeting_time(leg: TorsionLeg, following: TorsionLeg) -> float:
     """Return the time at which two curves meet, within a few rows of the present turning point."""
-    closing = one.slope(one.end) - other.slope(one.end)
+    closing = leg.slope(leg.end) - following.slope(leg.end)
     if closing == 0.0:
-        return one.end
-    apart = float(other.torque(one.end)[0] - one.torque(one.end)[0])
-    most = _FEW_ROWS * float(one.time[1] - one.time[0])
-    return one.end + min(max(apart / closing, -most), most)
+        return leg.end
+    apart = float(following.torque(leg.end)[0] - leg.torque(leg.end)[0])
+    most = _FEW_ROWS * float(leg.time[1] - leg.time[0])
+    return leg.end + min(max(apart / closing, -most), most)

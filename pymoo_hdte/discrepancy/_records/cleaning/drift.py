@@ -24,23 +24,23 @@ Values = NDArray[np.float64]
 TORQUES = ("input_torque", "output_torque")
 
 _PARTS = 16
-"""Parts of a record whose means show what else is slow in it: waves of a few cycles a turn."""
+"""Parts of a record whose means show other slow changes, such as waves of a few cycles a turn."""
 
 
 def torque_drifts(fit: LineFit, residual: Values, deviations: float, rules: Rules) -> Values:
-    """Return by how much each torque rises over a record on a straight line, N.m, shape (2,).
+    """Return the rise of each torque on a straight line over a record, N.m, shape (2,).
 
-    Zero where that does not stand out of the noise, or of other slow changes, which waves of the
-    output turn may be.
+    It is zero where it does not exceed the noise and other slow changes, such as waves of the
+    output turn.
 
     Parameters
     ----------
     fit : LineFit
-        Of the order lines.
+        Fit of the order lines.
     residual : ndarray, shape (n, 4)
-        What they leave.
+        Residual of the fit.
     deviations : float
-        Least size of a drift in standard deviations of its own.
+        Least size of a drift in its standard deviations.
     rules : Rules
     """
     length = float(np.ptp(fit.record.time))
@@ -62,15 +62,15 @@ def without_drift(
 ) -> tuple[list[RunningRecord], list[RowFault], list[NoiseFinding]]:
     """Return records without the drift of a torque sensor, the drifts, and the zeros beside them.
 
-    When in a record the zero was right, nobody knows: in its middle it may be off by half the
-    drift. What most records share of that is one error of the zero, as which it is uncertain. Nor
-    need the drift be as straight as what is taken out (`ReadingError.bent`).
+    Nobody knows when in a record the zero was right: in its middle it may be off by half the drift.
+    What most records share of that makes the stated zero more uncertain. Nor need the drift be as
+    straight as the line that is taken out (`ReadingError.bent`).
 
     Parameters
     ----------
     records : sequence of RunningRecord
     drifts : sequence of ndarray, shape (2,), or None
-        Of `torque_drifts`; None where they are not known.
+        Results of `torque_drifts`; None where they are unknown.
     rig : Rig
         What is stated.
     ratio : float
@@ -86,15 +86,15 @@ def without_drift(
         Stated zeros that are replaced.
     """
     known = [np.zeros(2) if rises is None else rises for rises in drifts]
-    sizes = np.array([_of_sensors(rises, rig, ratio, rules) for rises in known]).reshape(-1, 2)
-    found, faults, zeros = list(records), list[RowFault](), list[NoiseFinding]()
+    sizes = np.array([_sensor_drifts(rises, rig, ratio, rules) for rises in known]).reshape(-1, 2)
+    steady, faults, zeros = list(records), list[RowFault](), list[NoiseFinding]()
     for channel, rises in zip(TORQUES, sizes.T, strict=True):
         if not rises.any():
             continue
         shared = float(np.median(rises))
-        found = [
-            _steadied(record, channel, rise, shared)
-            for record, rise in zip(found, rises.tolist(), strict=True)
+        steady = [
+            _without_rise(record, channel, rise, shared)
+            for record, rise in zip(steady, rises.tolist(), strict=True)
         ]
         faults += [
             RowFault(record.name, "drift", channel, 0, len(record.time), rise, "modelled")
@@ -107,11 +107,11 @@ def without_drift(
         if used > rules.noise_mismatch * stated:
             reason = f"half of its drift in {np.count_nonzero(rises)} records"
             zeros.append(NoiseFinding(name, stated, abs(shared) / 2.0, used, reason))
-    return found, faults, zeros
+    return steady, faults, zeros
 
 
-def _of_sensors(rises: Values, rig: Rig, ratio: float, rules: Rules) -> tuple[float, float]:
-    """Return how much of the rises of both torques is a drift of the sensors, N.m."""
+def _sensor_drifts(rises: Values, rig: Rig, ratio: float, rules: Rules) -> tuple[float, float]:
+    """Return how much of the rise of each torque is a drift of its sensor, N.m."""
     of_input, of_output = float(rises[0]) * ratio, float(rises[1])
     apart = of_input - of_output
     larger = max(abs(of_input), abs(of_output))
@@ -124,8 +124,8 @@ def _of_sensors(rises: Values, rig: Rig, ratio: float, rules: Rules) -> tuple[fl
     return 0.0, (-apart if abs(apart) > rig.output_torque_zero else 0.0)
 
 
-def _steadied(record: RunningRecord, channel: str, rise: float, shared: float) -> RunningRecord:
-    """Return a record without its drift, and with what its zero may differ from that of others."""
+def _without_rise(record: RunningRecord, channel: str, rise: float, shared: float) -> RunningRecord:
+    """Return a record without its drift, whose zero may differ from that of other records."""
     if rise:
         share = centred(record, slice(None)) / float(np.ptp(record.time))
         record = replace(record, **{channel: getattr(record, channel) - rise * share})

@@ -1,8 +1,7 @@
 """Spikes and jumps in one channel: rows that depart from their neighbours as no motion does.
 
-What is looked at is the residual of the order lines. It may hold motion that the lines do not
-describe, such as a vibration of fixed frequency; so a fault has to stand out of whatever else the
-residual does, not only of the noise.
+The rows are those of the order lines' residual. It may hold motion that the lines do not describe,
+such as a vibration of fixed frequency, so a fault has to stand out of that as well as of the noise.
 """
 
 from __future__ import annotations
@@ -39,17 +38,17 @@ _DEVIATION = 1.4826
 
 
 class Step(NamedTuple):
-    """A jump that may be one: its first row, its size, and how far it stands out."""
+    """A possible jump: its first row, its size, and how far it stands out of the noise."""
 
     row: int
     size: float
     deviations: float
 
 
-class Lines:
-    """What order lines leave of a step of one from a row to the end, for every row.
+class UnitSteps:
+    """Residuals of the order lines for unit steps, from any row to the end of a record.
 
-    Block by block, as `LineFit` has them.
+    They are computed block by block, as in `LineFit`.
 
     Parameters
     ----------
@@ -58,7 +57,7 @@ class Lines:
     Attributes
     ----------
     lengths : ndarray, shape (n,)
-        Square of the length of what is left.
+        Squared length of the residual of the step from each row.
     """
 
     def __init__(self, fit: LineFit) -> None:
@@ -69,14 +68,14 @@ class Lines:
             self.lengths[part] -= np.einsum("np,np->n", shares, shares)
             later = shares[0]
 
-    def left_of_step(self, row: int) -> Rows:
-        """Return what is left of the step from a row, shape (n,)."""
-        left = np.zeros(len(self.lengths))
-        left[row:] = 1.0
-        share = sum(self.fit.basis(part).T @ left[part] for part in self.fit.parts)
+    def residual_of(self, row: int) -> Rows:
+        """Return the residual of the step from a row, shape (n,)."""
+        beyond = np.zeros(len(self.lengths))
+        beyond[row:] = 1.0
+        share = sum(self.fit.basis(part).T @ beyond[part] for part in self.fit.parts)
         for part in self.fit.parts:
-            left[part] -= self.fit.basis(part) @ share
-        return left
+            beyond[part] -= self.fit.basis(part) @ share
+        return beyond
 
 
 def scatter(rows: Rows) -> float:
@@ -94,22 +93,23 @@ def spikes(residual: Rows, deviations: float, rules: Rules) -> NDArray[np.bool_]
     ----------
     residual : ndarray, shape (n,)
     deviations : float
-        Least departure, in standard deviations of the usual one.
+        Least departure, in usual departures.
     rules : Rules
     """
     median = median_filter(residual, _BESIDE, mode="nearest")
-    far = _BESIDE // 2 + 1
+    offset = _BESIDE // 2 + 1
     after, before = residual.copy(), residual.copy()
-    after[:-far] -= median[far:]
-    before[far:] -= median[:-far]
+    after[:-offset] -= median[offset:]
+    before[offset:] -= median[:-offset]
     return _outstanding(before, after, deviations, rules)
 
 
 def spikes_on_course(values: Rows, deviations: float, rules: Rules) -> NDArray[np.bool_]:
     """Return which rows of a channel that rises and falls are spikes, shape (n,).
 
-    As `spikes`, but compared with straight lines through the rows before and after: the row of a
-    turning point lies on both. Not at the ends, where a clearance may begin or end.
+    As `spikes`, but rows are compared with straight lines through the rows before and after: the
+    row of a turning point lies on both. The ends are skipped, because a clearance may begin or end
+    there.
     """
     place = np.arange(-_BESIDE, 0.0)
     middle = place.mean()
@@ -117,9 +117,9 @@ def spikes_on_course(values: Rows, deviations: float, rules: Rules) -> NDArray[n
     before, after = values.copy(), values.copy()
     before[_BESIDE:] -= np.correlate(values, weights, mode="valid")[:-1]
     after[:-_BESIDE] -= np.correlate(values, weights[::-1], mode="valid")[1:]
-    found = _outstanding(before, after, deviations, rules)
-    found[:_BESIDE] = found[-_BESIDE:] = False
-    return found
+    flags = _outstanding(before, after, deviations, rules)
+    flags[:_BESIDE] = flags[-_BESIDE:] = False
+    return flags
 
 
 def _outstanding(before: Rows, after: Rows, deviations: float, rules: Rules) -> NDArray[np.bool_]:
@@ -130,28 +130,28 @@ def _outstanding(before: Rows, after: Rows, deviations: float, rules: Rules) -> 
     """
     usual = _DEVIATION * float(np.median(np.abs(before)))
     departs = np.where(after * before > 0.0, np.minimum(np.abs(after), np.abs(before)), 0.0)
-    limits = np.full(len(departs), max(deviations * usual, _common(departs, rules)))
+    limits = np.full(len(departs), max(deviations * usual, _common_departure(departs, rules)))
     ends = np.r_[:_BESIDE, len(departs) - _BESIDE : len(departs)]
     departs[:_BESIDE], departs[-_BESIDE:] = np.abs(after[:_BESIDE]), np.abs(before[-_BESIDE:])
-    limits[ends] = max(deviations * usual, _common(np.abs(before[_BESIDE:]), rules))
-    found = departs > limits
-    return found & (usual > 0.0) & (_run_lengths(found) <= rules.longest_spike)
+    limits[ends] = max(deviations * usual, _common_departure(np.abs(before[_BESIDE:]), rules))
+    flags = departs > limits
+    return flags & (usual > 0.0) & (_run_lengths(flags) <= rules.longest_spike)
 
 
-def _common(departs: Rows, rules: Rules) -> float:
-    """Return what a spike has to exceed beside as many departures as are no spikes any more."""
+def _common_departure(departs: Rows, rules: Rules) -> float:
+    """Return what a spike has to exceed where that many departures are too many to be spikes."""
     most = max(1, int(rules.spike_share * len(departs)))
     return rules.fault_prominence * float(np.partition(departs, -1 - most)[-1 - most])
 
 
 def _run_lengths(flags: NDArray[np.bool_]) -> NDArray[np.int_]:
     """Return for each row the number of equal flags in a row that it belongs to."""
-    first = np.flatnonzero(np.r_[True, flags[1:] != flags[:-1]])
-    lengths = np.diff(np.r_[first, len(flags)])
+    starts = np.flatnonzero(np.r_[True, flags[1:] != flags[:-1]])
+    lengths = np.diff(np.r_[starts, len(flags)])
     return np.repeat(lengths, lengths)
 
 
-def step(residual: Rows, lines: Lines, deviations: float, rules: Rules) -> Step | None:
+def step(residual: Rows, steps: UnitSteps, deviations: float, rules: Rules) -> Step | None:
     """Return the clearest jump, or None.
 
     Rows before and after are compared in windows, beside a straight line, and in the whole record,
@@ -160,18 +160,22 @@ def step(residual: Rows, lines: Lines, deviations: float, rules: Rules) -> Step 
     Parameters
     ----------
     residual : ndarray, shape (n,)
-    lines : Lines
-        That were taken out.
+    steps : UnitSteps
+        Unit steps beside the lines that left the residual.
     deviations : float
-        Least size in standard deviations of its own.
+        Least size of a jump in its standard deviations.
     rules : Rules
     """
     noise = scatter(residual)
     if noise == 0.0:
         return None
-    found = [_step_in_windows(residual, noise, half, deviations, rules) for half in WINDOWS]
-    found.append(_step_in_record(residual, noise, lines, deviations, rules))
-    return max((one for one in found if one), key=lambda one: one.deviations, default=None)
+    candidates = [_step_in_windows(residual, noise, half, deviations, rules) for half in WINDOWS]
+    candidates.append(_step_in_record(residual, noise, steps, deviations, rules))
+    return max(
+        (candidate for candidate in candidates if candidate),
+        key=lambda candidate: candidate.deviations,
+        default=None,
+    )
 
 
 def _step_in_windows(
@@ -182,7 +186,7 @@ def _step_in_windows(
         return None
     contrast, deviation = _contrast(half)
     sizes = np.correlate(residual, contrast, mode="valid")
-    # Nearer to an end than this there are too few rows to tell a jump from a disturbance.
+    # Near an end there are too few rows to tell a jump from a disturbance.
     edge = max(_LEAST_ROWS - half, 0)
     sizes[:edge] = sizes[len(sizes) - edge :] = 0.0
     heights = np.abs(sizes)
@@ -203,21 +207,21 @@ def _step_in_windows(
 
 def _peaks(heights: Rows, number: int, apart: int) -> list[int]:
     """Return the places of the highest values, each further than ``apart`` from those before."""
-    left, found = heights.copy(), list[int]()
-    while len(found) < number and np.isfinite(top := left.max()) and top >= 0.0:
-        place = int(np.argmax(left))
-        found.append(place)
-        left[max(place - apart, 0) : place + apart + 1] = -np.inf
-    return found
+    remaining, places = heights.copy(), list[int]()
+    while len(places) < number and np.isfinite(top := remaining.max()) and top >= 0.0:
+        place = int(np.argmax(remaining))
+        places.append(place)
+        remaining[max(place - apart, 0) : place + apart + 1] = -np.inf
+    return places
 
 
 def _abrupt(residual: Rows, noise: float, row: int, size: float, widest: int) -> bool:
     """Return whether most of a jump happens from one row to the next, as far as noise shows it."""
     most = min(widest, row, len(residual) - row)
-    for half in {min(one, most) for one in (*WINDOWS, _WIDE)}:
+    for half in {min(rows, most) for rows in (*WINDOWS, _WIDE)}:
         contrast, deviation = _contrast(half)
-        near = float(contrast @ residual[row - half : row + half])
-        if abs(near - size) > 0.5 * abs(size) + 3.0 * deviation * noise:
+        local_size = float(contrast @ residual[row - half : row + half])
+        if abs(local_size - size) > 0.5 * abs(size) + 3.0 * deviation * noise:
             return False
     return True
 
@@ -230,16 +234,16 @@ def _contrast(half: int) -> tuple[Rows, float]:
     """
     place = np.arange(2 * half) - (half - 0.5)
     sides = np.sign(place)
-    rest = sides - place * (sides @ place) / (place @ place)
-    power = float(rest @ rest)
-    return 2.0 * rest / power, 2.0 / np.sqrt(power)
+    weights = sides - place * (sides @ place) / (place @ place)
+    power = float(weights @ weights)
+    return 2.0 * weights / power, 2.0 / np.sqrt(power)
 
 
 def _step_in_record(
-    residual: Rows, noise: float, lines: Lines, deviations: float, rules: Rules
+    residual: Rows, noise: float, steps: UnitSteps, deviations: float, rules: Rules
 ) -> Step | None:
-    """Return the jump that explains most of a residual, if hardly anything else is left then."""
-    lengths = lines.lengths
+    """Return the jump that explains most of a residual, if it leaves hardly anything else."""
+    lengths = steps.lengths
     known = lengths > 1.0
     known[:_LEAST_ROWS] = known[len(known) - _LEAST_ROWS + 1 :] = False
     if not known.any():
@@ -250,13 +254,13 @@ def _step_in_record(
     if not clear > deviations:
         return None
     size = float(strength[row] * noise / np.sqrt(lengths[row]))
-    rest = residual - size * lines.left_of_step(row)
-    left = float(np.abs(_strength(rest, lengths, known)).max()) / noise
-    alone = clear > rules.fault_prominence * left
+    remainder = residual - size * steps.residual_of(row)
+    strongest = float(np.abs(_strength(remainder, lengths, known)).max()) / noise
+    alone = clear > rules.fault_prominence * strongest
     return Step(row, size, clear) if alone and _abrupt(residual, noise, row, size, _WIDE) else None
 
 
 def _strength(residual: Rows, lengths: Rows, known: NDArray[np.bool_]) -> Rows:
-    """Return how strongly a residual speaks for a step at each row; white noise gives its own."""
+    """Return how strongly a residual speaks for a step at each row, in units of the residual."""
     sums = np.cumsum(residual[::-1])[::-1]
     return np.where(known, sums, 0.0) / np.sqrt(np.where(known, lengths, 1.0))

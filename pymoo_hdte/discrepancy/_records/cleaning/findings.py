@@ -29,26 +29,25 @@ class RowFault:
         Name of the record.
     kind : str
         ``"spike"``, ``"jump"``, ``"gap"``, ``"repeated"``, ``"stuck"``, ``"saturated"``,
-        ``"drift"``, ``"new zero"`` or ``"settling"``:
-        one to a few rows that depart from both sides; a constant offset from a row on; rows that
-        are missing; rows that repeat the one before; rows in which one channel does not change,
-        though it does elsewhere; rows at the end of what a channel can read; a torque that rises on
-        a straight line while the other one does not; a constant offset of this record, or from it
-        on; a decay at the first rows.
+        ``"drift"``, ``"new zero"`` or ``"settling"``. In this order: one to a few rows that depart
+        from both sides; a constant offset from a row on; rows that are missing; rows that repeat
+        the previous one; rows in which one channel does not change, though it does elsewhere; rows
+        at the end of a channel's range; a torque that rises on a straight line while the other one
+        does not; a constant offset of this record, or from it on; a decay at the first rows.
     channel : str
         ``"input_angle"``, ``"output_angle"``, ``"input_torque"``, ``"output_torque"``; ``"time"``
         where both encoders agree that the time of the rows is wrong; ``"rows"`` for all of them,
         and for a decay that other records show and the noise of this one hides.
     row : int
-        First row concerned, from 0 in the file.
+        First row concerned, counted from 0 in the file.
     rows : int
-        How many; of a gap, how many are missing; of a jump, all rows to the end of the record, of a
-        new zero, to the end of the session; of a decay, three time constants.
+        Number of rows: for a gap, those missing; for a jump, all to the end of the record; for a
+        new zero, to the end of the session; for a decay, three time constants.
     size : float
         Largest departure, the offset, the reading that does not change, or the length of a gap or
         of a hidden decay, in `UNITS` of the channel.
     treatment : {"left out", "modelled", "none needed"}
-        What became of the rows; where a record is left out, that of its faults is ``"left out"``.
+        What became of the rows; all faults of a record that is left out are ``"left out"``.
     """
 
     record: str
@@ -75,12 +74,12 @@ class NoiseFinding:
     stated : float
         rad or N.m, of one raw sample.
     found : float or None
-        The same from the records; None where they cannot tell.
+        Its value in the records, in the same unit; None where they do not show it.
     used : float
-        What the covariance is made of: ``found`` where it differs significantly and by more than
+        Value that enters the covariance: ``found`` where it differs significantly and by more than
         `Rules.noise_mismatch`, otherwise ``stated``.
     reason : str
-        What it was found from, or why it was not.
+        How it was found, or why it was not.
     """
 
     name: str
@@ -140,4 +139,4 @@ class RowFindings:
             "records_left_out": list(self.left_out),
             "faults": [fault.as_dict() for fault in self.faults],
         }
-        return {"rows": rows, "noise": [one.as_dict() for one in self.noise]}
+        return {"rows": rows, "noise": [finding.as_dict() for finding in self.noise]}

@@ -1,9 +1,8 @@
 """The noise of the sensors as the records show it, beside the one that the campaign states.
 
-What the order lines leave of a channel is noise, and perhaps motion that they do not describe. The
-noise is what is at all frequencies alike: the median of the residual's spectrum up to the highest
-order looked at, where the noise of the lines comes from, and the median of that over the records,
-whose speeds put any further line elsewhere.
+The residual of the order lines is noise, and perhaps motion that they do not describe. Noise is
+alike at all frequencies, so it is the median of the residual's spectrum up to the highest order
+analysed. The median over the records follows, because their speeds move any further line.
 """
 
 from __future__ import annotations
@@ -38,7 +37,7 @@ _MEDIAN_SPREAD = 1.0 / np.log(2.0)
 _MEDIAN_OF_NORMAL = 0.6745
 
 _ROUNDING = 1e-6
-"""Differences of changes that are none, as a share of their range."""
+"""Differences between changes that are rounding, as a share of their range."""
 
 _THIRD_DIFFERENCES = np.sqrt(20.0)
 """Third differences of white noise have 1 + 9 + 9 + 1 times its variance."""
@@ -59,7 +58,7 @@ def running_noise(
     ----------
     records : sequence of RunningRecord
     residuals : sequence of ndarray, shape (n, 4), or None
-        Of their order lines, by channel as in `LineFit`; None where they are not known.
+        Residuals of their order lines, by channel as in `LineFit`; None where they are unknown.
     rig : Rig
         What is stated.
     ratio : float
@@ -71,13 +70,13 @@ def running_noise(
         for record, residual in zip(records, residuals, strict=True)
         if residual is not None
     ]
-    known = [one for one in shown if one is not None]
+    known = [estimate for estimate in shown if estimate is not None]
     if not known:
         reason = "the records are too short to show it"
         names = ("angle_noise", "input_torque_noise", "output_torque_noise")
         return [_unknown(rig, name, reason) for name in names]
-    powers = np.array([one[0] for one in known])
-    deviations = np.array([one[1] for one in known])
+    powers = np.array([estimate[0] for estimate in known])
+    deviations = np.array([estimate[1] for estimate in known])
     power = np.median(powers, axis=0)
     # The median of r values scatters by sqrt(pi / 2) more than their mean.
     deviation = float(np.sqrt(np.pi / 2.0 * np.mean(deviations**2) / len(known)))
@@ -85,14 +84,14 @@ def running_noise(
     encoders = float(max(power[0], power[3]))
     quantised = rig.angle_quantisation**2 / 12.0
     angle = encoders * (rig.angle_noise**2 + quantised) - quantised
-    found = [
+    estimates = [
         ("angle_noise", encoders, np.sqrt(angle) if angle > 0.0 else 0.0),
         ("input_torque_noise", power[1], rig.input_torque_noise * np.sqrt(power[1])),
         ("output_torque_noise", power[2], rig.output_torque_noise * np.sqrt(power[2])),
     ]
     return [
-        _judged(rig, name, float(size), abs(np.log(times)) / deviation, reason, rules)
-        for name, times, size in found
+        _finding(rig, name, float(size), abs(np.log(times)) / deviation, reason, rules)
+        for name, times, size in estimates
     ]
 
 
@@ -105,15 +104,14 @@ def coarse_readings(
 ) -> tuple[list[RunningRecord], list[NoiseFinding]]:
     """Return records and noise where channels are read in steps that hide the stated noise.
 
-    The noise is at least that of the steps, step / sqrt(12). Angles turn on through many steps;
-    of a torque steps also hide what is small beside them, so that its mean and each of its lines
-    are as uncertain.
+    The noise is at least that of the steps, step / sqrt(12). Angles pass through many steps. Steps
+    of a torque also hide what is small beside them, which makes its mean and lines uncertain.
 
     Parameters
     ----------
     records : sequence of RunningRecord
     findings : sequence of NoiseFinding
-        Of `running_noise`.
+        Results of `running_noise`.
     rig : Rig
         What is stated.
     ratio : float
@@ -127,16 +125,16 @@ def coarse_readings(
         ("input_torque", "input_torque_noise", rig.input_torque_noise, 1.0),
         ("output_torque", "output_torque_noise", rig.output_torque_noise, 1.0),
     )
-    found, noise = list(records), {one.name: one for one in findings}
+    read, noise = list(records), {finding.name: finding for finding in findings}
     for channel, name, stated, scale in channels:
-        steps = np.array([_step(getattr(one, channel), rules) for one in found])
+        steps = np.array([_step(getattr(record, channel), rules) for record in read])
         # Of one raw sample, as the stated noise.
-        coarse = steps * np.sqrt([one.samples_averaged for one in found])
+        coarse = steps * np.sqrt([record.samples_averaged for record in read])
         hides = coarse > rules.noise_mismatch * stated * np.sqrt(12.0)
         if name != "angle_noise":
-            found = [
-                _with_hidden(one, channel, step, stated * step / of_sample) if hidden else one
-                for one, step, of_sample, hidden in zip(found, steps, coarse, hides, strict=True)
+            read = [
+                _with_hidden(record, channel, step, stated * step / of_sample) if hidden else record
+                for record, step, of_sample, hidden in zip(read, steps, coarse, hides, strict=True)
             ]
         if np.mean(hides) > 0.5:
             used = np.median(coarse) / np.sqrt(12.0) / scale
@@ -147,11 +145,11 @@ def coarse_readings(
             used = float(max(used, noise[name].used))
             reason = f"{channel.replace('_', ' ')} is read in steps of {size}"
             noise[name] = replace(noise[name], found=used, used=used, reason=reason)
-    return found, list(noise.values())
+    return read, list(noise.values())
 
 
 def _step(values: Rows, rules: Rules) -> float:
-    """Return the step in which a channel is read; zero where its changes are not in steps."""
+    """Return the step in which a channel is read, or zero if its changes are not in steps."""
     changes = np.diff(values)
     # Whole turns that were added, or digits of a file, leave equal changes apart by rounding.
     rounding = float(np.ptp(changes)) * _ROUNDING
@@ -162,11 +160,12 @@ def _step(values: Rows, rules: Rules) -> float:
 
 
 def _with_hidden(record: RunningRecord, channel: str, step: float, noise: float) -> RunningRecord:
-    """Return a record whose mean and lines are uncertain by what the steps of a channel hide.
+    """Return a record whose mean and lines are as uncertain as the steps of a channel make them.
 
     Rounding adds waves of the reading over a step, the first one of step / pi, which noise beside
     it averages out by exp(-2 (pi noise / step)^2) (Carbone and Petri, IEEE Transactions on
-    Instrumentation and Measurement 43, 1994). A part of it has the root mean square.
+    Instrumentation and Measurement 43, 1994). Real and imaginary part of a line have its root mean
+    square.
     """
     wave = step / np.pi * np.exp(-2.0 * (np.pi * noise / step) ** 2)
     error = ReadingError(channel, float(wave / np.sqrt(2.0)), of_lines=True)
@@ -181,7 +180,7 @@ def _powers(
     taper = np.hanning(n)
     spectrum = np.abs(np.fft.rfft(residual * taper[:, None], axis=0)) ** 2 / (taper @ taper)
     highest = rules.highest_order * abs(record.input_speed) / (2.0 * np.pi)
-    # Below, a straight line was taken out.
+    # The lowest frequencies lost a straight line.
     used = spectrum[2 : int(min(highest / record.sample_rate, 0.5) * n)]
     if len(used) < _FEWEST_FREQUENCIES:
         return None
@@ -199,13 +198,13 @@ def sweep_noise(sweeps: Sequence[TorsionRecord], rig: Rig, rules: Rules) -> list
     if not sweeps:
         return []
     thirds = np.concatenate([np.diff(sweep.output_angle, 3) for sweep in sweeps])
-    found = float(np.median(np.abs(thirds)) / _MEDIAN_OF_NORMAL / _THIRD_DIFFERENCES)
-    if found == 0.0 or len(thirds) < _FEWEST_FREQUENCIES:
+    noise = float(np.median(np.abs(thirds)) / _MEDIAN_OF_NORMAL / _THIRD_DIFFERENCES)
+    if noise == 0.0 or len(thirds) < _FEWEST_FREQUENCIES:
         return [_unknown(rig, name, "the steps of the sensor hide it")]
     # Relative deviation of the median of n magnitudes, 1.17 / sqrt(n), correlated over three rows.
     deviation = 1.17 * np.sqrt(3.0 / len(thirds))
-    significance = abs(np.log(found / rig.torsion_angle_noise)) / deviation
-    return [_judged(rig, name, found, significance, "differences of the sweep's rows", rules)]
+    significance = abs(np.log(noise / rig.torsion_angle_noise)) / deviation
+    return [_finding(rig, name, noise, significance, "differences of the sweep's rows", rules)]
 
 
 def repeatability(
@@ -213,8 +212,8 @@ def repeatability(
 ) -> NoiseFinding:
     """Return what repeated conditions show of the changes of the static error between records.
 
-    Records of equal speed and load differ by them and by the noise of the sensors only. The
-    response of the drive at that speed counts as one, as it does far below the resonance.
+    Records of equal speed and load differ by these changes and by the noise of the sensors only.
+    The response of the drive counts as 1, as it is far below the resonance.
     """
     name, n_lines = "repeatability", len(believed.error_orders)
     groups = [list(group) for _, group in groupby(sorted(records, key=_condition), key=_condition)]
@@ -223,19 +222,21 @@ def repeatability(
         return _unknown(rig, name, "no condition was recorded twice")
     power, sensors, number = 0.0, 0.0, 0
     for group in groups:
-        lines = [order_lines(one, rig, believed.ratio, believed.error_orders) for one in group]
-        phasors = np.array([one.phasors[0] for one in lines])
+        lines = [
+            order_lines(record, rig, believed.ratio, believed.error_orders) for record in group
+        ]
+        phasors = np.array([fit.phasors[0] for fit in lines])
         power += float(np.sum(np.abs(phasors - phasors.mean(axis=0)) ** 2))
-        variances = [np.diag(one.covariance[0])[1:].sum() for one in lines]
+        variances = [np.diag(fit.covariance[0])[1:].sum() for fit in lines]
         sensors += float(np.mean(variances)) * (len(group) - 1)
         number += 2 * n_lines * (len(group) - 1)
     # Each part of each line has this variance; see `Observations._repeatability`.
     stated = rig.repeatability**2 / n_lines + sensors / number
-    found = float(np.sqrt(max(power / number - sensors / number, 0.0) * n_lines))
+    estimate = float(np.sqrt(max(power / number - sensors / number, 0.0) * n_lines))
     chance = 2.0 * min(chi2.sf(power / stated, number), chi2.cdf(power / stated, number))
     significance = float(norm.isf(max(chance, 1e-300) / 2.0))
     reason = f"{sum(map(len, groups))} records of conditions that were recorded more than once"
-    return _judged(rig, name, found, significance, reason, rules)
+    return _finding(rig, name, estimate, significance, reason, rules)
 
 
 def _condition(record: RunningRecord) -> tuple[float, float]:
@@ -243,8 +244,10 @@ def _condition(record: RunningRecord) -> tuple[float, float]:
 
 
 def with_noise(rig: Rig, findings: Sequence[NoiseFinding]) -> Rig:
-    """Return a rig with the noise that is used; the same rig if all is as stated."""
-    changed: dict[str, Any] = {one.name: one.used for one in findings if one.replaced}
+    """Return a rig with the noise that is used; the same object if all is as stated."""
+    changed: dict[str, Any] = {
+        finding.name: finding.used for finding in findings if finding.replaced
+    }
     return replace(rig, **changed) if changed else rig
 
 
@@ -253,12 +256,12 @@ def _unknown(rig: Rig, name: str, reason: str) -> NoiseFinding:
     return NoiseFinding(name, stated, None, stated, reason)
 
 
-def _judged(
-    rig: Rig, name: str, found: float, significance: float, reason: str, rules: Rules
+def _finding(
+    rig: Rig, name: str, estimate: float, significance: float, reason: str, rules: Rules
 ) -> NoiseFinding:
-    """Use what was found if it differs from what is stated by too much, and not by chance."""
+    """Return a finding that uses an estimate if it differs from the stated value significantly."""
     stated = float(getattr(rig, name))
     least = float(norm.isf(rules.row_fault_chance / 2.0))
-    far = found > rules.noise_mismatch * stated or found * rules.noise_mismatch < stated
-    replaced = far and found > 0.0 and significance > least
-    return NoiseFinding(name, stated, found, found if replaced else stated, reason)
+    differs = estimate > rules.noise_mismatch * stated or estimate * rules.noise_mismatch < stated
+    replaced = differs and estimate > 0.0 and significance > least
+    return NoiseFinding(name, stated, estimate, estimate if replaced else stated, reason)

@@ -2,8 +2,8 @@
 
 Spikes and repeated rows are left out: the order lines are fitted over the measured angle and do not
 need evenly spaced rows. A jump of a sensor is taken out of the rows after it and fitted again with
-the lines (`records.Jump`). Where both encoders jump alike, the drive has moved on while the time
-has not: rows are missing, and the time is set right.
+the lines (`records.Jump`). Where both encoders jump alike, rows are missing: the drive has moved
+on, and the time is corrected.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy._records.cleaning.drift import torque_drifts
 from pymoo_hdte.discrepancy._records.cleaning.faults import (
     WINDOWS,
-    Lines,
     Step,
+    UnitSteps,
     spikes,
     spikes_on_course,
     step,
@@ -50,7 +50,7 @@ class RowSearch(Generic[Record]):
     Attributes
     ----------
     record : RunningRecord or TorsionRecord
-        As it is by now.
+        Without the faults removed so far.
     channels : tuple of str
         Its columns beside the time.
     deviations : float
@@ -74,15 +74,15 @@ class RowSearch(Generic[Record]):
         table = np.column_stack([getattr(self.record, channel) for channel in self.channels])
         again = np.r_[False, np.all(table[1:] == table[:-1], axis=1)]
         if again.any() and np.count_nonzero(~again) >= FEWEST_SAMPLES:
-            for first, last in _runs(again):
-                length = float(self.record.time[last] - self.record.time[first - 1])
-                self.note("repeated", "rows", first, last - first + 1, length, "left out")
-            self._keep(~again)
+            for start, end in _runs(again):
+                length = float(self.record.time[end] - self.record.time[start - 1])
+                self.note("repeated", "rows", start, end - start + 1, length, "left out")
+            self._keep_rows(~again)
 
     def take_stuck(self) -> bool:
         """Leave out rows in which a channel is saturated, or stays the same for far too long.
 
-        Not if too few rows would be left, of which it tells.
+        None is left out if too few would remain. Returns whether enough remain.
         """
         every, saturated = np.zeros(len(self.rows), dtype=bool), 0
         for channel in self.channels:
@@ -90,50 +90,52 @@ class RowSearch(Generic[Record]):
             for reading in (float(values.max()), float(values.min())):
                 flags = self._saturated(values, reading)
                 if flags.any():
-                    first, rows = int(np.argmax(flags)), int(np.count_nonzero(flags))
-                    self.note("saturated", channel, first, rows, reading, "left out")
+                    start, rows = int(np.argmax(flags)), int(np.count_nonzero(flags))
+                    self.note("saturated", channel, start, rows, reading, "left out")
                     saturated += rows
                 every |= flags
             stuck = self._stuck(values) & ~every
-            for first, last in _runs(stuck):
-                value = float(values[first])
-                self.note("stuck", channel, first, last - first + 1, value, "left out")
+            for start, end in _runs(stuck):
+                value = float(values[start])
+                self.note("stuck", channel, start, end - start + 1, value, "left out")
             every |= stuck
         enough = bool(np.count_nonzero(~every) >= FEWEST_SAMPLES)
         enough &= saturated <= self.rules.saturated_share * len(every)
         if every.any() and enough:
-            self._keep(~every)
+            self._keep_rows(~every)
         return enough
 
     def _saturated(self, values: Rows, reading: float) -> NDArray[np.bool_]:
-        """Return in which rows a channel is at the end of its range, as at no other reading.
+        """Return which rows are at the end of a channel's range, if far more are than next to it.
 
-        With the rows beside them, of which noise has taken others to that end. One run alone is a
-        channel that is stuck.
+        The rows beside them are included, because the noise decides which of those reach the end. A
+        single run is no saturation but a channel that is stuck.
         """
         rules, at_end = self.rules, values == reading
         inside = values[~at_end]
         next_to_it = inside[np.argmin(np.abs(inside - reading))]
         number, others = np.count_nonzero(at_end), np.count_nonzero(inside == next_to_it)
         lively = len(np.unique(inside)) >= rules.stuck_rows
-        many = number >= rules.stuck_rows and number >= rules.stuck_ratio * others
-        if not (lively and many and len(_runs(at_end)) > 1):
+        frequent = number >= rules.stuck_rows and number >= rules.stuck_ratio * others
+        if not (lively and frequent and len(_runs(at_end)) > 1):
             return np.zeros_like(at_end)
         return np.asarray(binary_dilation(at_end, iterations=rules.longest_spike))
 
     def _stuck(self, values: Rows) -> NDArray[np.bool_]:
-        """Return in which rows a channel has one reading for too long."""
+        """Return the rows in which a channel keeps one reading for too long."""
         rules, changes = self.rules, np.r_[True, values[1:] != values[:-1]]
         lengths = np.diff(np.r_[np.flatnonzero(changes), len(values)])
-        # A rest that the record cuts off tells how long rests are only where it is long.
+        # A rest that the record cuts off counts as a whole one only if it is long.
         whole = np.ones(len(lengths), dtype=bool)
         whole[[0, -1]] = lengths[[0, -1]] >= rules.stuck_rows
         ranked = np.sort(lengths[whole])[::-1][: rules.most_jumps + 1]
         longest, others = ranked[:-1], ranked[1:]
-        far = longest[(longest >= rules.stuck_ratio * others) & (longest >= rules.stuck_rows)]
-        stuck = np.repeat(lengths >= min(far, default=np.inf), lengths)
-        left = changes[~stuck]
-        fine = len(left) >= rules.stuck_rows and left.mean() >= rules.changing_share
+        outstanding = longest[
+            (longest >= rules.stuck_ratio * others) & (longest >= rules.stuck_rows)
+        ]
+        stuck = np.repeat(lengths >= min(outstanding, default=np.inf), lengths)
+        remaining = changes[~stuck]
+        fine = len(remaining) >= rules.stuck_rows and remaining.mean() >= rules.changing_share
         return stuck if fine else np.zeros_like(stuck)
 
     def note_gaps(self) -> None:
@@ -145,26 +147,26 @@ class RowSearch(Generic[Record]):
                 length = lost / self.record.sample_rate
                 self.note("gap", "rows", int(place) + 1, lost, length, "none needed")
 
-    def take_spikes(self, found: Sequence[Spikes]) -> None:
+    def take_spikes(self, channels: Sequence[Spikes]) -> None:
         """Leave out the rows of spikes: name of the channel, rows, and how far they depart."""
-        for channel, flags, departures in found:
-            for first, last in _runs(flags):
-                run = departures[first : last + 1]
+        for channel, flags, departures in channels:
+            for start, end in _runs(flags):
+                run = departures[start : end + 1]
                 size = float(run[np.argmax(np.abs(run))])
-                self.note("spike", channel, first, last - first + 1, size, "left out")
-        self._keep(~np.any([flags for _, flags, _ in found], axis=0))
+                self.note("spike", channel, start, end - start + 1, size, "left out")
+        self._keep_rows(~np.any([flags for _, flags, _ in channels], axis=0))
 
     def note(
-        self, kind: str, channel: str, first: int, rows: int, size: float, treatment: str
+        self, kind: str, channel: str, place: int, rows: int, size: float, treatment: str
     ) -> None:
-        """Note a fault at rows as they are by now."""
-        row = int(self.rows[first])
+        """Note a fault from a place in the remaining rows on."""
+        row = int(self.rows[place])
         self.faults.append(RowFault(self.record.name, kind, channel, row, rows, size, treatment))
 
-    def _keep(self, kept: NDArray[np.bool_]) -> None:
-        columns = {name: getattr(self.record, name)[kept] for name in ("time", *self.channels)}
+    def _keep_rows(self, flags: NDArray[np.bool_]) -> None:
+        columns = {name: getattr(self.record, name)[flags] for name in ("time", *self.channels)}
         self.record = replace(self.record, **columns)
-        self.rows = self.rows[kept]
+        self.rows = self.rows[flags]
 
 
 def _runs(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
@@ -176,8 +178,8 @@ def _runs(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
 RUNNING = ("input_angle", "output_angle", "input_torque", "output_torque")
 SWEPT = ("output_angle", "output_torque")
 
-FoundStep = tuple[Step, str, float]
-"""A jump in what the lines leave, the channel of the record that jumps, and by how much."""
+ChannelStep = tuple[Step, str, float]
+"""A jump in the residual of the lines, the channel of the record that jumps, and by how much."""
 
 _ROUNDS = 20
 """Most rounds of a search, each of which removes what hides smaller faults."""
@@ -195,12 +197,12 @@ class RepairedRun:
     record : RunningRecord
     faults : tuple of RowFault
     residual : ndarray, shape (n, 4), or None
-        Of the order lines, by channel as in `LineFit`; None where they cannot be fitted.
+        Residual of the order lines, by channel as in `LineFit`; None where they cannot be fitted.
     usable : bool
-        False if several channels jump at once: not a sensor has changed then, but the test. And if
-        too few rows are left in which no channel has failed.
+        False if several channels jump at once, since then the test has changed and not a sensor;
+        also if too few rows remain in which no channel has failed.
     drifts : ndarray, shape (2,), or None
-        See `torque_drifts`; None where the lines cannot be fitted.
+        Result of `torque_drifts`; None where the lines cannot be fitted.
     """
 
     record: RunningRecord
@@ -221,7 +223,7 @@ def repaired_run(
     ratio : float
         Transmission ratio N, dimensionless.
     orders : sequence of float
-        Lines that are taken out first, cycles per input turn.
+        Lines that are fitted first, cycles per input turn.
     deviations : float
         Least size of a fault, in standard deviations.
     rules : Rules
@@ -236,8 +238,8 @@ def repaired_run(
     try:
         residual = search.run(orders)
     except InvalidInput:
-        # A record that cannot tell these lines apart is judged, and refused, where it is measured,
-        # unless that is so only without the rows in which a channel has failed.
+        # A record that cannot tell these lines apart is refused where its lines are measured,
+        # unless only the rows lost to a failed channel keep it from that.
         return RepairedRun(record, failed, None, not failed)
     drifts = torque_drifts(search.fitted(orders), residual, deviations, rules)
     return RepairedRun(search.record, tuple(search.faults), residual, search.usable, drifts)
@@ -263,7 +265,7 @@ def repaired_sweep(
 
 
 class _RunSearch(RowSearch[RunningRecord]):
-    """The same for a running record, by what its order lines leave."""
+    """A `RowSearch` of a running record, in the residual of its order lines."""
 
     def __init__(
         self, record: RunningRecord, ratio: float, deviations: float, rules: Rules
@@ -271,28 +273,28 @@ class _RunSearch(RowSearch[RunningRecord]):
         super().__init__(record, RUNNING, deviations, rules)
         self.ratio = ratio
         self.usable = True
-        self._asked: RunningRecord | None = None
+        self._searched: RunningRecord | None = None
         self._fit: LineFit | None = None
 
     def run(self, orders: Sequence[float]) -> Rows:
         """Take out spikes, jumps and a decay until there are none; return the lines' residual.
 
-        Where jumps do not end, they are a motion, and none is taken out.
+        If there are too many jumps, they are a motion, and none is taken out.
         """
-        # Its first rows depart from each other as spikes do.
+        # A decay comes first, because its rows depart from each other as spikes do.
         self._take_settling(self.fitted(orders), ())
         rough: tuple[RunningRecord, NDArray[np.int_], list[RowFault]] | None = None
         for taken in range(self.rules.most_jumps + 1):
             fit = self._without_spikes(orders)
-            found = self._steps(fit)
-            if self._take_settling(fit, found):
+            steps = self._steps(fit)
+            if self._take_settling(fit, steps):
                 fit = self._without_spikes(orders)
-                found = self._steps(fit)
-            if not found:
+                steps = self._steps(fit)
+            if not steps:
                 return fit.whole_residual
-            self._compare(found)
+            self._note_simultaneous_jumps(steps)
             rough = rough or (self.record, self.rows, list(self.faults))
-            if taken == self.rules.most_jumps or not self._take_step(*found[0], orders):
+            if taken == self.rules.most_jumps or not self._take_step(*steps[0], orders):
                 break
         if rough is not None:
             self.record, self.rows, self.faults = rough
@@ -300,22 +302,22 @@ class _RunSearch(RowSearch[RunningRecord]):
         return self.fitted(orders).whole_residual
 
     def fitted(self, orders: Sequence[float]) -> LineFit:
-        """Return the lines of the rows as they are by now, fitted once for the same rows."""
+        """Return the lines of the remaining rows, fitted once for the same rows."""
         if self._fit is None or self._fit.record is not self.record:
             self._fit = LineFit.of(self.record, self.ratio, orders)
         return self._fit
 
-    def _take_settling(self, fit: LineFit, steps: Sequence[FoundStep]) -> bool:
-        """Have a decay at the first rows fitted with the lines, if it is clearer than all steps."""
-        if self.record.settling is not None or self.record is self._asked:
+    def _take_settling(self, fit: LineFit, steps: Sequence[ChannelStep]) -> bool:
+        """Fit a decay of the first rows with the lines, if it is clearer than all steps."""
+        if self.record.settling is not None or self.record is self._searched:
             return False
-        self._asked = self.record
-        found = settling(fit, self.deviations, self.rules)
-        if found is None or any(found.deviations < one.deviations for one, _, _ in steps):
+        self._searched = self.record
+        decay = settling(fit, self.deviations, self.rules)
+        if decay is None or any(decay.deviations < jump.deviations for jump, _, _ in steps):
             return False
-        channel = ("output_angle", "input_torque", "output_torque", "input_angle")[found.place]
-        size = -found.size if channel == "output_angle" else found.size
-        self.record = replace(self.record, settling=found.constant)
+        channel = ("output_angle", "input_torque", "output_torque", "input_angle")[decay.place]
+        size = -decay.size if channel == "output_angle" else decay.size
+        self.record = replace(self.record, settling=decay.constant)
         self.note("settling", channel, 0, unsettled_rows(self.record), size, "modelled")
         return True
 
@@ -323,15 +325,15 @@ class _RunSearch(RowSearch[RunningRecord]):
         """Leave out spikes, the small ones once the large ones are gone, and return the fit."""
         for _ in range(_ROUNDS):
             fit = self.fitted(orders)
-            found = self._spikes(fit.whole_residual)
-            if not found:
+            channels = self._spikes(fit.whole_residual)
+            if not channels:
                 break
-            self.take_spikes(found)
+            self.take_spikes(channels)
         return fit
 
     def _spikes(self, residual: Rows) -> list[Spikes]:
         """Return channels with spikes, which rows they are, and the departures there."""
-        flags = [spikes(one, self.deviations, self.rules) for one in residual.T]
+        flags = [spikes(channel, self.deviations, self.rules) for channel in residual.T]
         if not np.any(flags):
             return []
         departures = residual - median_filter(residual, (_SMOOTHED, 1), mode="mirror")
@@ -340,75 +342,80 @@ class _RunSearch(RowSearch[RunningRecord]):
         angle = flags[0] | flags[3]
         together = angle & (np.abs(departures[:, 0]) < 0.5 * np.abs(read_in))
         lost = departures[:, 3] / self.record.input_speed
-        # A drive whose angles depart by less than a row's way has moved so.
+        # Where both angles depart by less than the way of a row, the drive has moved.
         angle &= ~together | self._is_of_rows(lost)
         together &= angle
         of_input = angle & ~together & (np.abs(read_in) > np.abs(read_out))
-        found = [
+        candidates = [
             ("time", together, lost),
             ("input_angle", of_input, departures[:, 3]),
             ("output_angle", angle & ~together & ~of_input, read_out),
-            # Where the input angle is wrong, so is what the lines say about the torques.
+            # A wrong input angle also shifts the lines of the torques.
             ("input_torque", flags[1] & ~of_input, departures[:, 1]),
             ("output_torque", flags[2] & ~of_input, departures[:, 2]),
         ]
-        return [one for one in found if one[1].any()]
+        return [candidate for candidate in candidates if candidate[1].any()]
 
     def _is_of_rows(self, time: Any) -> Any:
         """Return whether a time is that of lost or repeated rows, not of a motion."""
         return np.abs(time) * self.record.sample_rate > self.rules.gap_of_rows - 1.0
 
-    def _steps(self, fit: LineFit) -> list[FoundStep]:
+    def _steps(self, fit: LineFit) -> list[ChannelStep]:
         """Return the jump of each channel that stands out most, the clearest first."""
-        residual, found = fit.whole_residual, list[FoundStep]()
-        lines = Lines(fit)
+        residual, jumps = fit.whole_residual, list[ChannelStep]()
+        unit_steps = UnitSteps(fit)
         for place in range(residual.shape[1]):
-            one = step(residual[:, place], lines, self.deviations, self.rules)
-            if one is None:
+            jump = step(residual[:, place], unit_steps, self.deviations, self.rules)
+            if jump is None:
                 continue
-            channel, size = self._jumped(place, one, residual)
+            channel, size = self._jumping_channel(place, jump, residual)
             if channel != "time" or self._is_of_rows(size):
-                found.append((one, channel, size))
-        return sorted(found, key=lambda one: -one[0].deviations)
+                jumps.append((jump, channel, size))
+        return sorted(jumps, key=lambda jump: -jump[0].deviations)
 
-    def _compare(self, found: Sequence[FoundStep]) -> None:
-        """Note jumps of further channels at the row of the first: the record is of two tests."""
+    def _note_simultaneous_jumps(self, steps: Sequence[ChannelStep]) -> None:
+        """Note jumps of other channels at the row of the clearest: a record of two tests."""
         angles = ("time", "input_angle", "output_angle")
-        best, *further = found
-        for one, channel, size in further:
+        best, *further = steps
+        for jump, channel, size in further:
             both_angles = channel in angles and best[1] in angles
-            if channel != best[1] and not both_angles and abs(one.row - best[0].row) <= WINDOWS[1]:
-                self.note("jump", channel, one.row, len(self.rows) - one.row, size, "modelled")
+            if channel != best[1] and not both_angles and abs(jump.row - best[0].row) <= WINDOWS[1]:
+                self.note("jump", channel, jump.row, len(self.rows) - jump.row, size, "modelled")
                 self.usable = False
 
-    def _take_step(self, found: Step, channel: str, size: float, orders: Sequence[float]) -> bool:
+    def _take_step(
+        self, detected: Step, channel: str, size: float, orders: Sequence[float]
+    ) -> bool:
         """Take a jump out of the rows; return whether that was possible."""
-        rows = len(self.rows) - found.row
+        rows = len(self.rows) - detected.row
         if channel == "time":
             time = self.record.time.copy()
-            time[found.row :] += size
-            if not time[found.row] > time[found.row - 1]:
+            time[detected.row :] += size
+            if not time[detected.row] > time[detected.row - 1]:
                 return False
             self.record = replace(self.record, time=time)
         else:
-            jump = Jump(float(self.record.time[found.row]), channel, 0.0)
+            jump = Jump(float(self.record.time[detected.row]), channel, 0.0)
             self.record = replace(self.record, jumps=(*self.record.jumps, jump))
             self._shift(len(self.record.jumps) - 1, size)
             size = self._refined(orders)
-        self.note("jump", channel, found.row, rows, size, "modelled")
+        self.note("jump", channel, detected.row, rows, size, "modelled")
         return True
 
-    def _jumped(self, place: int, found: Step, residual: Rows) -> tuple[str, float]:
+    def _jumping_channel(self, place: int, detected: Step, residual: Rows) -> tuple[str, float]:
         """Return which channel of the record jumps at a step, and by how much."""
         if place in (1, 2):
-            return RUNNING[place + 1], found.size
-        near = min(WINDOWS[1], found.row, len(residual) - found.row)
-        before, after = residual[found.row - near : found.row], residual[found.row :][:near]
+            return RUNNING[place + 1], detected.size
+        half = min(WINDOWS[1], detected.row, len(residual) - detected.row)
+        before, after = (
+            residual[detected.row - half : detected.row],
+            residual[detected.row :][:half],
+        )
         error, read_in = (np.median(after, axis=0) - np.median(before, axis=0))[[0, 3]]
         if place == 3:
-            read_in = found.size
+            read_in = detected.size
         else:
-            error = found.size
+            error = detected.size
         if abs(error) < 0.5 * abs(read_in) / self.ratio:
             return "time", read_in / self.record.input_speed
         if abs(read_in) > 0.5 * abs(error) * self.ratio:
@@ -417,17 +424,17 @@ class _RunSearch(RowSearch[RunningRecord]):
 
     def _refined(self, orders: Sequence[float]) -> float:
         """Return the size of the last jump, fitted with the lines of the shifted rows."""
-        last = len(self.record.jumps) - 1
+        place = len(self.record.jumps) - 1
         for _ in range(2):
-            jump = self.record.jumps[last]
-            left = LineFit.of(self.record, self.ratio, orders).coefficients[-1]
-            sizes = {"input_angle": self.ratio * left[0], "output_angle": -left[0],
-                     "input_torque": left[1], "output_torque": left[2]}  # fmt: skip
-            self._shift(last, float(sizes[jump.channel]))
-        return self.record.jumps[last].size
+            jump = self.record.jumps[place]
+            corrections = LineFit.of(self.record, self.ratio, orders).coefficients[-1]
+            sizes = {"input_angle": self.ratio * corrections[0], "output_angle": -corrections[0],
+                     "input_torque": corrections[1], "output_torque": corrections[2]}  # fmt: skip
+            self._shift(place, float(sizes[jump.channel]))
+        return self.record.jumps[place].size
 
     def _shift(self, place: int, size: float) -> None:
-        """Take so much more of a jump out of the rows."""
+        """Take a further ``size`` of a jump out of the rows."""
         jumps = list(self.record.jumps)
         jump = jumps[place]
         jumps[place] = replace(jump, size=jump.size + size)

@@ -1,11 +1,11 @@
 """A sensor whose zero changes between the records of a session.
 
-The mean transmission error follows the load; what is left of it may step once, at a change of the
-zero of an encoder, be off in one record, or drift with the temperature. It is a change of the zero
-if a step or one record, and no smooth drift, leaves hardly more than noise.
+The mean transmission error follows the load. Its residual may step once where the zero of an
+encoder changes, be off in one record, or drift with the temperature. It is a change of the zero if
+a step or one record, but no smooth drift, leaves hardly more than noise.
 
-The mean input torque less that of the load is friction: a level at each speed, and a share of the
-load. A record that alone departs from that, by more than its stated zero, has another zero.
+The mean input torque beyond that of the load is friction: a level at each speed, and a share of the
+load. A single record that departs from this by more than the stated zero has another zero.
 """
 
 from __future__ import annotations
@@ -33,18 +33,18 @@ _LEAST_FREEDOM = 4
 _FEWEST = 2
 """Least number of records before and after a change that stays."""
 
-_OWN = 0.1
-"""Least square of what levels leave of one record's departure: half where two share one."""
+_LEAST_OWN_SQUARE = 0.1
+"""Least squared residual of one record's departure from the levels: 0.5 where two share one."""
 
-_FOLLOWED = 1e-9
-"""Directions of levels that are none, as a share of the largest: of a load that never changes."""
+_LEAST_SINGULAR_VALUE = 1e-9
+"""Least singular value of the levels, as a share of the largest; a constant load adds none."""
 
 _WARMING = (0.03, 0.1, 0.3, 1.0)
 """Time constants of drifts that are compared, in lengths of the session."""
 
 
 class _Means(NamedTuple):
-    """Mean transmission errors by rising time in the session, whitened with what explains them."""
+    """Mean transmission errors in the order of the session, with their loads and weights."""
 
     lines: list[OrderLines]
     values: Values
@@ -64,12 +64,12 @@ class _Change(NamedTuple):
 def with_one_zero(
     records: Sequence[RunningRecord], believed: BelievedDrive, rig: Rig, rules: Rules
 ) -> tuple[tuple[RunningRecord, ...], tuple[RowFault, ...]]:
-    """Return records without a zero that differs between them, and where it does.
+    """Return records without the differences between their zeros, and where these are.
 
     Parameters
     ----------
     records : sequence of RunningRecord
-        Of one session, in any order.
+        Records of one session, in any order.
     believed : BelievedDrive
     rig : Rig
     rules : Rules
@@ -81,7 +81,7 @@ def with_one_zero(
     faults : tuple of RowFault
         At most one of a torque, in one record, and one of an encoder, in one or from it on.
     """
-    ordered = sorted(records, key=lambda one: one.elapsed)
+    ordered = sorted(records, key=lambda record: record.elapsed)
     if len(ordered) < _LEAST_FREEDOM:
         return tuple(records), ()
     faults = []
@@ -90,12 +90,12 @@ def with_one_zero(
         change = change_of(ordered, means, believed, rig, rules)
         if change is not None:
             changed = ordered[change.records]
-            n_rows = sum(len(one.time) for one in changed)
+            n_rows = sum(len(record.time) for record in changed)
             size = (change.channel, 0, n_rows, change.size)
             faults.append(RowFault(changed[0].name, "new zero", *size, "modelled"))
-            ordered[change.records] = [_shifted(one, change, len(changed)) for one in changed]
-    by_name = {one.name: one for one in ordered}
-    return tuple(by_name[one.name] for one in records), tuple(faults)
+            ordered[change.records] = [_shifted(record, change, len(changed)) for record in changed]
+    by_name = {record.name: record for record in ordered}
+    return tuple(by_name[record.name] for record in records), tuple(faults)
 
 
 def _shifted(record: RunningRecord, change: _Change, number: int) -> RunningRecord:
@@ -108,57 +108,59 @@ def _shifted(record: RunningRecord, change: _Change, number: int) -> RunningReco
 
 def _means(records: Sequence[RunningRecord], believed: BelievedDrive, rig: Rig) -> _Means:
     orders = [1.0 / believed.ratio, *believed.error_orders]
-    lines = [order_lines(one, rig, believed.ratio, orders) for one in records]
-    torque = np.array([one.mean[2] for one in lines])
+    lines = [order_lines(record, rig, believed.ratio, orders) for record in records]
+    torque = np.array([fit.mean[2] for fit in lines])
     shared = rig.repeatability**2 / max(len(believed.error_orders), 1)
-    variance = shared + np.array([one.covariance[0, 0, 0] for one in lines])
-    # Every load has a level of its own, since how the torsion grows with it is not known here; but
-    # small deviations of the load from what was set turn the drive by one stiffness.
+    variance = shared + np.array([fit.covariance[0, 0, 0] for fit in lines])
+    # Every load has a level of its own, since the torsion curve is unknown here; one stiffness
+    # covers the small deviations of the load from its set value.
     states = _states(records)
-    levels = np.array([[one == other for other in dict.fromkeys(states)] for one in states])
-    beside = torque - np.array([one.load_torque for one in records])
+    levels = np.array(
+        [[state == distinct for distinct in dict.fromkeys(states)] for state in states]
+    )
+    beside = torque - np.array([record.load_torque for record in records])
     return _Means(
         lines,
-        np.array([one.mean[0] for one in lines]) - torque / believed.stiffness,
+        np.array([fit.mean[0] for fit in lines]) - torque / believed.stiffness,
         np.column_stack([levels, beside / believed.stiffness]),
         1.0 / np.sqrt(variance),
-        np.array([one.elapsed for one in records]),
+        np.array([record.elapsed for record in records]),
     )
 
 
 def _outlier(
     records: Sequence[RunningRecord], values: Values, design: Values, weights: Values, rules: Rules
 ) -> tuple[int, float] | None:
-    """Return the record whose value alone departs from the others, and by how much, or None.
+    """Return the one record whose value departs from the others, and by how much, or None.
 
-    From a level at each speed, beside further columns of a design (n, p). What fits nearly as well
-    is a doubt: another record, as where two share one level, or a session that warms up.
+    The others have a level at each speed, and the columns of a design (n, p). There is none where
+    another record fits nearly as well, or a session that warms up.
     """
     number = len(records)
-    speeds = np.array([one.input_speed for one in records])
+    speeds = np.array([record.input_speed for record in records])
     levels = np.column_stack([speeds[:, None] == np.unique(speeds), design])
     axes, sizes, _ = np.linalg.svd(levels * weights[:, None], full_matrices=False)
-    axes = axes[:, sizes > _FOLLOWED * sizes[0]]
+    axes = axes[:, sizes > _LEAST_SINGULAR_VALUE * sizes[0]]
     freedom = number - axes.shape[1] - 1
     if freedom < _LEAST_FREEDOM:
         return None
-    left = values * weights
-    left = left - axes @ (axes.T @ left)
-    elapsed = np.array([one.elapsed for one in records])
+    residual = values * weights
+    residual = residual - axes @ (axes.T @ residual)
+    elapsed = np.array([record.elapsed for record in records])
     constants = (float(np.ptp(elapsed)) or 1.0) * np.array(_WARMING)
     warming = np.exp(-np.divide.outer(elapsed - elapsed[0], constants))
     courses = np.column_stack([np.eye(number), warming * weights[:, None]])
     courses -= axes @ (axes.T @ courses)
     own = np.sum(courses**2, axis=0)
-    known = own > _OWN
-    gains = np.where(known, (left @ courses) ** 2 / np.where(known, own, 1.0), 0.0)
+    known = own > _LEAST_OWN_SQUARE
+    gains = np.where(known, (residual @ courses) ** 2 / np.where(known, own, 1.0), 0.0)
     place = int(np.argmax(gains[:number]))
     least = float(student.isf(rules.row_fault_chance / number / 2.0, freedom)) ** 2
-    # What is left may be more than noise, as an effect may move the mean.
-    rest = max(float(left @ left - gains[place]) / freedom, 1.0)
-    if not gains[place] - np.delete(gains, place).max() > least * rest:
+    # The residual may be more than noise, as an effect may move the mean.
+    excess = max(float(residual @ residual - gains[place]) / freedom, 1.0)
+    if not gains[place] - np.delete(gains, place).max() > least * excess:
         return None
-    return place, float(left[place] / own[place] / weights[place])
+    return place, float(residual[place] / own[place] / weights[place])
 
 
 def _torque_change(
@@ -168,21 +170,21 @@ def _torque_change(
     rig: Rig,
     rules: Rules,
 ) -> _Change | None:
-    """Return the torque whose zero differs in one record."""
+    """Return the change of a torque's zero, in one record."""
     ratio = believed.ratio
-    of_input, of_output = np.array([one.mean[1:3] for one in means.lines]).T
-    variance = np.array([one.covariance[1:3, 0, 0] @ [1.0, ratio**-2] for one in means.lines])
-    forward = np.sign([one.input_speed for one in records])
+    of_input, of_output = np.array([fit.mean[1:3] for fit in means.lines]).T
+    variance = np.array([fit.covariance[1:3, 0, 0] @ [1.0, ratio**-2] for fit in means.lines])
+    forward = np.sign([record.input_speed for record in records])
     loads = np.column_stack([of_output, forward * np.abs(of_output)])
     friction = of_input - of_output / ratio
-    found = _outlier(records, friction, loads, 1.0 / np.sqrt(variance), rules)
-    if found is None:
+    outlier = _outlier(records, friction, loads, 1.0 / np.sqrt(variance), rules)
+    if outlier is None:
         return None
-    place, size = found
+    place, size = outlier
     channel = "input_torque"
     turned = size * ratio / believed.stiffness
-    others = np.delete(means.values, place)[_alike(records, place)]
-    # A load that is read wrong departs from the transmission error of others, too.
+    others = np.delete(means.values, place)[_of_same_state(records, place)]
+    # A load that is read wrong also moves the transmission error away from that of the others.
     if others.size and abs(departs := means.values[place] - np.mean(others)) > abs(
         departs - turned
     ):
@@ -193,31 +195,31 @@ def _torque_change(
 
 def _states(records: Sequence[RunningRecord]) -> list[tuple[float, bool]]:
     """Return the load of each record, and whether it turns forward."""
-    return [(one.load_torque, one.input_speed > 0.0) for one in records]
+    return [(record.load_torque, record.input_speed > 0.0) for record in records]
 
 
-def _alike(records: Sequence[RunningRecord], place: int) -> list[bool]:
-    """Return which of the other records have the load and direction of one, shape (n - 1,)."""
+def _of_same_state(records: Sequence[RunningRecord], place: int) -> list[bool]:
+    """Return which other records have the load and direction of one, shape (n - 1,)."""
     states = _states(records)
-    return [one == states[place] for one in (*states[:place], *states[place + 1 :])]
+    return [state == states[place] for state in (*states[:place], *states[place + 1 :])]
 
 
 def places_of_change(elapsed: Values) -> NDArray[np.int_]:
     """Return the first records after a possible change, for rising times of records (n,), s.
 
-    Not between records taken at once, nor near the ends of the session.
+    There are none between records taken at once, nor near the ends of the session.
     """
     places = np.flatnonzero(np.diff(elapsed) > 0.0) + 1
     return places[(places >= _FEWEST) & (places <= len(elapsed) - _FEWEST)]
 
 
-def _left(means: _Means, *courses: Values) -> tuple[float, float]:
-    """Return the chi-square beside loads and further courses, and the size of the last one."""
+def _chi_square(means: _Means, *courses: Values) -> tuple[float, float]:
+    """Return the chi-square of a fit of loads and courses (n,), and the size of the last course."""
     design = np.column_stack([means.loads, *courses]) * means.weights[:, None]
     values = means.values * means.weights
     sizes = np.linalg.lstsq(design, values)[0]
-    left = values - design @ sizes
-    return float(left @ left), float(sizes[-1])
+    residual = values - design @ sizes
+    return float(residual @ residual), float(sizes[-1])
 
 
 def _step(means: _Means, rules: Rules) -> tuple[int, float] | None:
@@ -229,17 +231,17 @@ def _step(means: _Means, rules: Rules) -> tuple[int, float] | None:
     places = places_of_change(means.elapsed)
     if not places.size:
         return None
-    steps = [_left(means, (np.arange(number) >= place).astype(float)) for place in places]
+    steps = [_chi_square(means, (np.arange(number) >= place).astype(float)) for place in places]
     best = int(np.argmin([chi_square for chi_square, _ in steps]))
     chi_square, size = steps[best]
     least = float(norm.isf(rules.row_fault_chance / number / 2.0)) ** 2
     length = float(np.ptp(means.elapsed))
     times = means.elapsed / length
-    smooth = [_left(means, times, times**2)[0]]
-    smooth += [_left(means, np.exp(-times / constant))[0] for constant in _WARMING]
-    # What is left may be more than noise, as an effect may move the mean with the speed.
-    left = max(chi_square / freedom, 1.0)
-    clear = left < rules.contradicting_chi_square and min(smooth) - chi_square > least * left
+    smooth = [_chi_square(means, times, times**2)[0]]
+    smooth += [_chi_square(means, np.exp(-times / constant))[0] for constant in _WARMING]
+    # The residual may be more than noise, as an effect may move the mean with the speed.
+    excess = max(chi_square / freedom, 1.0)
+    clear = excess < rules.contradicting_chi_square and min(smooth) - chi_square > least * excess
     return (int(places[best]), size) if clear else None
 
 
@@ -250,19 +252,19 @@ def _encoder_change(
     rig: Rig,
     rules: Rules,
 ) -> _Change | None:
-    """Return the encoder whose zero changes, in one record or from it on."""
-    found = _step(means, rules)
-    if found is not None:
-        place, size = found
+    """Return the change of an encoder's zero, in one record or from it on."""
+    change = _step(means, rules)
+    if change is not None:
+        place, size = change
         where = slice(place, len(records))
     else:
-        found = _outlier(records, means.values, means.loads, means.weights, rules)
+        change = _outlier(records, means.values, means.loads, means.weights, rules)
         # Without load the torsion stays where a hysteresis left it: no sensor has moved.
-        if found is None or not records[found[0]].load_torque:
+        if change is None or not records[change[0]].load_torque:
             return None
-        place, size = found
+        place, size = change
         where = slice(place, place + 1)
-    speeds = np.array([one.input_speed for one in records])
+    speeds = np.array([record.input_speed for record in records])
     if _is_of_input(means, believed, speeds, where, size):
         return _Change(where, "input_angle", size * believed.ratio)
     return _Change(where, "output_angle", -size)
@@ -271,8 +273,8 @@ def _encoder_change(
 def _is_of_input(
     means: _Means, believed: BelievedDrive, speeds: Values, where: slice, size: float
 ) -> bool:
-    """Tell whether the zero of the input changed: with it all phases turn."""
-    phasors = np.array([one.phasors[0, 1:] for one in means.lines])
+    """Tell whether the zero of the input changed, which turns all phases."""
+    phasors = np.array([fit.phasors[0, 1:] for fit in means.lines])
     turns = np.exp(1j * np.array(believed.error_orders) * size * believed.ratio)
     late, others = phasors[where], np.ones(len(speeds), dtype=bool)
     others[where] = False
@@ -281,7 +283,8 @@ def _is_of_input(
 
     def apart(some: NDArray[np.complex128]) -> float:
         middle, before = (
-            np.median(one.real, axis=0) + 1j * np.median(one.imag, axis=0) for one in (some, usual)
+            np.median(group.real, axis=0) + 1j * np.median(group.imag, axis=0)
+            for group in (some, usual)
         )
         return float(np.sum(np.abs(middle - before) ** 2))
 

@@ -1,8 +1,8 @@
 """A record that begins before the drive has settled: its first rows run out into the motion.
 
 A controller that was just switched on, or a friction that builds up, leaves an exponential decay
-from the first row on. Over the angle it is no line, but the slow lines take a part of it. It is
-fitted with the lines, and no rows are lost (`records.RunningRecord.settling`).
+from the first row on. It is no order line, but the slow lines take a part of it. So it is fitted
+with the lines, and no rows are lost (`records.RunningRecord.settling`).
 """
 
 from __future__ import annotations
@@ -21,17 +21,17 @@ from pymoo_hdte.discrepancy._selection.rules import Rules
 Rows = NDArray[np.float64]
 
 SETTLED = 3.0
-"""Time constants after which a twentieth of a decay is left: its rows are those before."""
+"""Time constants after which a twentieth of a decay remains, and its rows end."""
 
 # Shapes of the search; that a decay stands out is a matter of rules.
 _SHORTEST = 16
-"""Rows; what is shorter may be a jump after the first rows, as `faults` has them."""
+"""Shortest time constant in rows; a shorter one may be a jump after the first rows."""
 _LONGEST = 0.5
-"""Share of the record, far beyond what counts as settling: a slow drift must not pass for it."""
+"""Longest time constant as a share of the record: far longer than settling, to see slow drifts."""
 _CONSTANTS = 25
 """Time constants that are compared at once."""
 _NARROWED = 3
-"""Times that as many are compared between the neighbours of the best one: to 1e-4 of it."""
+"""Number of searches between the neighbours of the best one, which find it to 1e-4."""
 _COARSE = 0.95
 """Least share of a decay's size that the nearest constant of the first comparison shows."""
 _INDEPENDENT = 1e-3
@@ -39,10 +39,18 @@ _INDEPENDENT = 1e-3
 
 
 class Settling(NamedTuple):
-    """A decay.
+    """A decay, by the channel of the lines that shows it best.
 
-    Its time constant in s, the channel of the lines that shows it best, its size there, and how
-    far it stands out of the noise in standard deviations.
+    Attributes
+    ----------
+    constant : float
+        Time constant, s.
+    place : int
+        Index of the channel.
+    size : float
+        Size at the first row, rad or N.m.
+    deviations : float
+        Size in standard deviations of the noise.
     """
 
     constant: float
@@ -63,14 +71,14 @@ def settling(fit: LineFit, deviations: float, rules: Rules) -> Settling | None:
     Parameters
     ----------
     fit : LineFit
-        Of the order lines.
+        Fit of the order lines.
     deviations : float
-        Least size of a decay in standard deviations of its own.
+        Least size of a decay in its standard deviations.
     rules : Rules
     """
     record, residual = fit.record, fit.whole_residual
     length = float(record.time[-1] - record.time[0])
-    noise = np.array([scatter(one) for one in residual.T])
+    noise = np.array([scatter(channel) for channel in residual.T])
     shortest = low = _SHORTEST / record.sample_rate
     high = _LONGEST * length
     if low >= high:
@@ -89,8 +97,8 @@ def settling(fit: LineFit, deviations: float, rules: Rules) -> Settling | None:
     size = float(shape @ residual[:, place] / (shape @ shape))
     later = _as_from_each_row(record, residual[:, place] - size * shape, constant)
     later[record.time < record.time[0] + SETTLED * constant] = 0.0
-    first = _as_from_each_row(record, residual[:, place], constant)[0]
-    if abs(first) < rules.fault_prominence * np.abs(later).max():
+    initial = _as_from_each_row(record, residual[:, place], constant)[0]
+    if abs(initial) < rules.fault_prominence * np.abs(later).max():
         return None
     return Settling(constant, place, size, clear)
 
@@ -98,7 +106,7 @@ def settling(fit: LineFit, deviations: float, rules: Rules) -> Settling | None:
 def _strength(fit: LineFit, residual: Rows, noise: Rows, constants: Rows) -> Rows:
     """Return how strongly each channel speaks for each decay, (k, 4), in standard deviations.
 
-    Zero for a channel without noise, and for decays that the lines follow.
+    It is zero for a channel without noise, and for decays that the lines follow.
     """
     power, products = np.zeros(len(constants)), np.zeros((len(constants), residual.shape[1]))
     lines = np.zeros((len(fit.triangle), len(constants)))
@@ -107,14 +115,16 @@ def _strength(fit: LineFit, residual: Rows, noise: Rows, constants: Rows) -> Row
         power += np.sum(some**2, axis=0)
         lines += fit.basis(part).T @ some
         products += some.T @ residual[part]
-    left = power - np.sum(lines**2, axis=0)
-    known = (left > _INDEPENDENT * power)[:, None] & (noise > 0.0)
-    scale = np.sqrt(np.where(left > 0.0, left, 1.0))[:, None] * np.where(noise > 0.0, noise, 1.0)
+    independent = power - np.sum(lines**2, axis=0)
+    known = (independent > _INDEPENDENT * power)[:, None] & (noise > 0.0)
+    scale = np.sqrt(np.where(independent > 0.0, independent, 1.0))[:, None] * np.where(
+        noise > 0.0, noise, 1.0
+    )
     return np.where(known, np.abs(products) / scale, 0.0)
 
 
 def _beyond_lines(fit: LineFit, constant: float) -> Rows:
-    """Return what the lines leave of a decay of one at the first row, shape (n,)."""
+    """Return the residual of the lines for a decay from 1 at the first row, shape (n,)."""
     shape = decays(fit.record, slice(None), np.array([constant]))[:, 0]
     share = sum(fit.basis(part).T @ shape[part] for part in fit.parts)
     for part in fit.parts:
@@ -124,5 +134,5 @@ def _beyond_lines(fit: LineFit, constant: float) -> Rows:
 
 def _as_from_each_row(record: RunningRecord, values: Rows, constant: float) -> Rows:
     """Return the products of values (n,) with a decay from each row on, as rows in one step."""
-    kept = np.exp(-1.0 / (record.sample_rate * constant))
-    return np.asarray(lfilter([1.0], [1.0, -kept], values[::-1])[::-1])
+    retained = np.exp(-1.0 / (record.sample_rate * constant))
+    return np.asarray(lfilter([1.0], [1.0, -retained], values[::-1])[::-1])

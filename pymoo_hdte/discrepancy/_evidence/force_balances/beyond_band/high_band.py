@@ -1,9 +1,9 @@
 """Forces beyond the band of the motion, whitened, over the position and the speed of a port.
 
-Beyond the cutoff a motion is too small to be measured, and so are its forces; but where a machine
-is, and how fast it moves, is known there as well. What varies with the position shows as a line of
-a frequency in proportion to the speed, up to half the sampling rate of the force, or less where
-its rows lie between those that were measured.
+Beyond the cutoff a motion is too small to be measured, and so are its forces, but position and
+speed of the machine are known all the same. A force that varies with the position shows as a line
+whose frequency is proportional to the speed, up to half the sampling rate of the force, or less
+where its rows are interpolated.
 """
 
 from __future__ import annotations
@@ -25,16 +25,16 @@ from pymoo_hdte.mechanism.port_motion import motion_at_port
 Values = NDArray[np.float64]
 
 FEWEST_ROWS = 30
-"""For sums of fewer the power of noise has no exponential distribution."""
+"""Least number of rows: in sums of fewer, the power of noise is not exponential."""
 _PADDED = 4
 """Length of a transform over that of its signal, so that powers between its lines are known."""
 _CHANGES = 3
-"""Powers of the position, 0 on, with which the amplitude of what is taken out may change."""
+"""Powers of the position, from 0, with which the amplitude of a removed order may change."""
 _BEYOND = 1.25
-"""Lowest frequency over the cutoff: there the slow part, which is taken away, is below 3 %."""
+"""Lowest frequency over the cutoff: the slow part that is removed is below 3 % there."""
 _SEGMENT, _SEGMENTS = 512, 8
-"""Most samples in a window, and fewest windows of a record: for its spectrum, and to tell what
-has one frequency from what follows the position."""
+"""Most samples in a window, and fewest windows of a record: for its spectrum, and to tell a fixed
+frequency from an order of the position."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,15 +44,15 @@ class HighBand:
     Attributes
     ----------
     time, position, speed : ndarray, shape (n,)
-        s, and of the port, SI.
+        Time, s, and position and speed of the port, SI.
     plain : ndarray, shape (n,)
         Force of the inputs at the port, N or N.m.
     force : ndarray, shape (n,)
-        The same, whitened: noise has the same power at each frequency.
+        The whitened force, whose noise has the same power at each frequency.
     lowest, highest : float
-        Hz, of what is looked at.
+        Frequencies of the band, Hz.
     window : int
-        Samples.
+        Samples of a window.
     """
 
     time: Values
@@ -74,7 +74,7 @@ class HighBand:
     def gain(self, order: float) -> Values:
         """Return the factor of the whitening at the frequency of an order, 1/SI, shape (n,).
 
-        Zero where that is not between ``lowest`` and ``highest``.
+        It is zero where that is not between ``lowest`` and ``highest``.
         """
         frequency = order * np.abs(self.speed) / (2.0 * np.pi)
         return np.interp(frequency, self._frequency, self._gain) * self.inside(order)
@@ -96,7 +96,7 @@ class HighBand:
         return np.interp(frequencies, np.fft.rfftfreq(size, self.step), power)
 
     def without_order(self, order: float) -> HighBand:
-        """Return it without an order, the amplitude of which may change slowly with position."""
+        """Return the band without an order, whose amplitude may change slowly with position."""
         gain, force = self.gain(order), self.force.copy()
         middle, half = np.mean(self.position), max(0.5 * float(np.ptp(self.position)), 1e-300)
         for way in self.ways():
@@ -110,7 +110,7 @@ class HighBand:
         return replace(self, force=force)
 
     def without_frequency(self, frequency: float) -> HighBand:
-        """Return it without a frequency in Hz, window by window."""
+        """Return the band without a frequency in Hz, which is removed window by window."""
         angle, force = 2.0 * np.pi * frequency * self.time, self.force.copy()
         for start in range(0, len(self.time), self.window):
             rows = slice(start, start + self.window)
@@ -133,17 +133,17 @@ def high_bands(
     mechanism : Mechanism
     port : Port
     records : sequence of Record
-        As they were sampled.
+        Records as they were sampled.
     cutoff : float
-        Hz, up to which the motion is known.
+        Frequency up to which the motion is known, Hz.
     rules : Rules
 
     Returns
     -------
     list of HighBand
-        Without records that have little beyond the cutoff, are short, or have no such force.
+        One for each record that is long enough and has such a force well beyond the cutoff.
     """
-    found = []
+    bands = []
     for record in records:
         lowest, share = _BEYOND * cutoff, 0.5 * rules.nyquist_share
         if record.interpolated:
@@ -161,16 +161,17 @@ def high_bands(
         }
         motion = motion_at_port(
             port,
-            {name: one.position for name, one in motions.items()},
-            {name: one.speed for name, one in motions.items()},
+            {name: coordinate.position for name, coordinate in motions.items()},
+            {name: coordinate.speed for name, coordinate in motions.items()},
         )
         force = _force_at(mechanism, port, record)
-        # Half, as smoothing passes all up to the frequency that it is given.
+        # At half the cutoff, because smoothing passes everything up to the frequency that it is
+        # given.
         force = (force - smooth(force, record.step, 0.5 * cutoff))[inner]
         if np.ptp(force) == 0.0:
             continue
         frequency, gain = _whitening(force, record.step, window, lowest)
-        found.append(
+        bands.append(
             HighBand(
                 record.time[inner],
                 motion.position[inner],
@@ -184,23 +185,23 @@ def high_bands(
                 gain,
             )
         )
-    return found
+    return bands
 
 
 def _force_at(mechanism: Mechanism, port: Port, record: Record) -> Values:
     """Return the force at a port that the inputs balance, (n,); zero where they drive none of it.
 
-    A force F at a port enters the balance of a coordinate as its share times F: F is the solution
-    by least squares of the balances of those coordinates that an input drives.
+    A force F at a port enters the balance of a coordinate as its share times F, so F is the
+    least-squares solution of the balances of those coordinates that an input drives.
     """
-    driven = {name for one in mechanism.inputs for name, acts in one.acts.items() if acts}
+    driven = {name for signal in mechanism.inputs for name, acts in signal.acts.items() if acts}
     shares = {name: share for name, share in port.motion.items() if share and name in driven}
     size = sum(share**2 for share in shares.values())
     force = np.zeros(len(record.time))
-    for one in mechanism.inputs:
-        acts = sum(share * one.acts.get(name, 0.0) for name, share in shares.items())
+    for signal in mechanism.inputs:
+        acts = sum(share * signal.acts.get(name, 0.0) for name, share in shares.items())
         if acts:
-            force += acts / size * one.gain.value * record.channel(one.name)
+            force += acts / size * signal.gain.value * record.channel(signal.name)
     return force
 
 
@@ -216,21 +217,21 @@ def _whitening(force: Values, step: float, window: int, lowest: float) -> tuple[
 def _filtered(force: Values, step: float, frequency: Values, gain: Values) -> Values:
     """Return a force with a factor at each frequency, without delay."""
     spectrum = np.fft.rfft(force)
-    there = np.fft.rfftfreq(len(force), step)
-    return np.asarray(np.fft.irfft(spectrum * np.interp(there, frequency, gain), len(force)))
+    bins = np.fft.rfftfreq(len(force), step)
+    return np.asarray(np.fft.irfft(spectrum * np.interp(bins, frequency, gain), len(force)))
 
 
 def ports_apart(mechanism: Mechanism) -> list[Port]:
     """Return one port for each motion at which forces of inputs act; one with a gear, if any.
 
-    Motions in proportion are one: a force at one of these ports is a force at each.
+    Proportional motions count as one, because a force at one of their ports is a force at each.
     """
-    found: dict[frozenset[tuple[str, float]], Port] = {}
+    ports: dict[frozenset[tuple[str, float]], Port] = {}
     for port in mechanism.ports:
         motion = _direction(port)
-        if not port.read and (motion not in found or (port.gear and not found[motion].gear)):
-            found[motion] = port
-    return list(found.values())
+        if not port.read and (motion not in ports or (port.gear and not ports[motion].gear)):
+            ports[motion] = port
+    return list(ports.values())
 
 
 def _shares(port: Port) -> dict[str, float]:
@@ -238,18 +239,18 @@ def _shares(port: Port) -> dict[str, float]:
 
 
 def _direction(port: Port) -> frozenset[tuple[str, float]]:
-    """Return the shares of a port's motion over the first of them, but for rounding."""
+    """Return the shares of a port's motion over the first of them, rounded."""
     shares = _shares(port)
-    first = next(iter(shares.values()))
-    return frozenset((name, float(f"{share / first:.9g}")) for name, share in shares.items())
+    scale = next(iter(shares.values()))
+    return frozenset((name, float(f"{share / scale:.9g}")) for name, share in shares.items())
 
 
 def known_orders(mechanism: Mechanism, port: Port, effects: Collection[LawAt]) -> list[float]:
     """Return the orders of effects at ports of the same motion, per turn of this port."""
-    found = []
-    for one in effects:
-        there, order = mechanism.port(one.port), place_of(one)[2]
-        if order and _direction(there) == _direction(port):
-            theirs, ours = (next(iter(_shares(each).values())) for each in (there, port))
-            found.append(abs(order * theirs / ours))
-    return found
+    orders = []
+    for effect in effects:
+        place, order = mechanism.port(effect.port), place_of(effect)[2]
+        if order and _direction(place) == _direction(port):
+            theirs, ours = (next(iter(_shares(end).values())) for end in (place, port))
+            orders.append(abs(order * theirs / ours))
+    return orders

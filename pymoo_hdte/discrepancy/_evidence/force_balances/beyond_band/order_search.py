@@ -1,9 +1,9 @@
-"""Orders at which a whitened force varies with the position, told from lines of one frequency.
+"""Orders at which a whitened force varies with the position, as against fixed frequencies.
 
-The power of an order is compared with that of its neighbours, so that no noise of whatever colour
-makes one; and an order has to explain more than any frequency does, in windows with a phase of
-their own: mains and the switching of a motor's power stage have one frequency at all speeds, and
-look like an order while the speed is constant.
+The power of an order is compared with that of its neighbours, so that noise of no colour makes one.
+An order also has to explain more than any frequency, in windows with a phase of their own: mains
+and the switching of a motor's power stage have one frequency at all speeds, and look like an order
+while the speed is constant.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ SURROUNDINGS = 101
 
 
 def over_noise(power: Values) -> Values:
-    """Return the power of orders, (n,), over that of noise: the median of those around each."""
+    """Return the power of orders, (n,), over that of noise, the median of those around each."""
     around = median_filter(power, min(SURROUNDINGS, len(power)), mode="reflect")
     # Powers of noise are exponential, with a median of log 2.
     return np.asarray(power / np.maximum(around, 1e-300) * np.log(2.0))
@@ -49,18 +49,18 @@ def phasors(position: Values, signal: Values, orders: Values) -> Phasors:
 
 
 _BLOCK = 1.1
-"""Ratio of the last to the first order of a block, for all of which the same rows are taken."""
+"""Ratio of the last to the first order of a block, which shares its rows."""
 NEIGHBOURS = np.concatenate([np.arange(-14.0, -3.5, 0.5), np.arange(4.0, 14.5, 0.5)])
-"""Distances, in resolutions, of the orders the power of which is the noise of one between them."""
+"""Distances, in resolutions, of the orders whose power is the noise of the one between them."""
 _SEGMENTS = 12
 """Windows of a record with phases of their own."""
 _TRIES = 3
-"""Searches per order that may be kept: some find what has one frequency."""
+"""Searches per order that a search may return, since some find a frequency."""
 
 
 @dataclass(frozen=True)
 class SeenOrder:
-    """An order that was seen.
+    """An order with a significant line.
 
     Attributes
     ----------
@@ -69,7 +69,7 @@ class SeenOrder:
     resolution : float
         Change of the order by which the longest travel gets one more cycle.
     power : float
-        Over the least that is significant.
+        Power over the least significant one.
     """
 
     order: float
@@ -79,23 +79,23 @@ class SeenOrder:
 
 @dataclass(frozen=True)
 class SeenOrders:
-    """What a search found.
+    """The orders of a port, and the lines that are none.
 
     Attributes
     ----------
-    kept : tuple of SeenOrder
-        The strongest first.
+    orders : tuple of SeenOrder
+        Significant orders, the strongest first.
     undecided : tuple of float
-        Orders that may be frequencies.
+        Orders that may be frequencies instead.
     fixed : tuple of float
         Frequencies that are no orders, Hz.
     highest : float
-        Order up to which all were tried.
+        Highest order of the search.
     cut : bool
-        Whether the records could show higher ones.
+        Whether the records could show higher orders.
     """
 
-    kept: tuple[SeenOrder, ...]
+    orders: tuple[SeenOrder, ...]
     undecided: tuple[float, ...]
     fixed: tuple[float, ...]
     highest: float
@@ -108,83 +108,83 @@ def seen_orders(
     known: Sequence[float],
     rules: Rules,
 ) -> SeenOrders:
-    """Return the orders at which the force of bands varies, told from frequencies.
+    """Return the orders at which the force of bands varies, as against frequencies.
 
     Parameters
     ----------
     bands : sequence of HighBand
-        Of one port.
+        Bands of one port.
     expected : sequence of float
-        Orders that a gear is known to have, which share a chance of a false alarm of their own.
+        Orders that a gear is known to have; they share a probability of false alarms of their own.
     known : sequence of float
-        Orders that are known already, and not looked for.
+        Orders that are known already and not searched for.
     rules : Rules
     """
     for order in known:
-        bands = [one.without_order(order) for one in bands]
-    grids, resolution, cut = _tried(bands, expected, rules)
+        bands = [band.without_order(order) for band in bands]
+    grids, resolution, cut = _order_grids(bands, expected, rules)
     orders = np.concatenate(grids)
-    kept: list[SeenOrder] = []
+    seen: list[SeenOrder] = []
     fixed: list[float] = []
     undecided: list[float] = []
     for _ in range(_TRIES * rules.most_position_orders):
-        if not orders.size or len(kept) == rules.most_position_orders:
+        if not orders.size or len(seen) == rules.most_position_orders:
             break
         power = _significance(bands, grids, expected, resolution, rules)
-        for taken in (*known, *undecided, *(one.order for one in kept)):
+        for taken in (*known, *undecided, *(line.order for line in seen)):
             power[np.abs(orders - taken) <= rules.side_lines * resolution] = 0.0
         place = int(np.argmax(power))
         if power[place] <= 1.0:
             break
         order = _refined(bands, float(orders[place]), 0.5 * resolution)
-        one = SeenOrder(order, resolution, float(power[place]))
-        alone, frequency = told_from_frequencies(bands, order, rules)
-        if alone and _at_two_speeds(bands, one, rules):
-            kept.append(one)
-            bands = [one.without_order(order) for one in bands]
+        line = SeenOrder(order, resolution, float(power[place]))
+        no_frequency, frequency = differs_from_frequencies(bands, order, rules)
+        if no_frequency and _at_two_speeds(bands, line, rules):
+            seen.append(line)
+            bands = [band.without_order(order) for band in bands]
         elif frequency is None:
             undecided.append(order)
         else:
             fixed.append(frequency)
-            bands = [one.without_frequency(frequency) for one in bands]
+            bands = [band.without_frequency(frequency) for band in bands]
     highest = float(grids[0][-1]) if grids[0].size else 0.0
-    return SeenOrders(tuple(kept), tuple(undecided), tuple(sorted(set(fixed))), highest, cut)
+    return SeenOrders(tuple(seen), tuple(undecided), tuple(sorted(set(fixed))), highest, cut)
 
 
-def _tried(
+def _order_grids(
     bands: Sequence[HighBand], expected: Sequence[float], rules: Rules
 ) -> tuple[list[Values], float, bool]:
     """Return grids of orders that are searched, their resolution, and whether the range was cut.
 
-    The first is from orders with enough periods in the travel to those beyond the force's band in
-    most rows. Expected orders that it steps over, or ends below, have grids of their own.
+    The first grid begins at orders with enough periods in the travel, and ends where most rows are
+    beyond the force's band. Expected orders between its steps or above it have grids of their own.
     """
-    widest = max((float(np.ptp(one.position)) for one in bands), default=0.0)
+    widest = max((float(np.ptp(band.position)) for band in bands), default=0.0)
     if widest == 0.0:
         return [np.empty(0)], 1.0, False
     resolution = 2.0 * np.pi / widest
-    speed = np.concatenate([np.abs(one.speed) for one in bands])
-    # The slow tail of the rows would ask for orders that the others cannot show.
+    speed = np.concatenate([np.abs(band.speed) for band in bands])
+    # The slowest rows would require orders that the others cannot show.
     slow = np.quantile(speed[speed > 0.01 * speed.max()], rules.slow_rows_share)
-    highest = max(one.highest for one in bands) * 2.0 * np.pi / slow
+    highest = max(band.highest for band in bands) * 2.0 * np.pi / slow
     lowest = max(
         resolution * rules.fewest_periods,
-        min(one.lowest for one in bands) * 2.0 * np.pi / float(speed.max()),
+        min(band.lowest for band in bands) * 2.0 * np.pi / float(speed.max()),
     )
     step = 0.5 * resolution
     if (highest - lowest) / step > rules.most_tried_orders:
-        # As for a shaft with parts of which there are whole numbers.
+        # Whole numbers, as for a shaft with whole numbers of teeth, poles or rollers.
         step = max(step, 1.0)
         lowest = step * np.ceil(lowest / step)
-    last = min(highest, lowest + rules.most_tried_orders * step)
-    grids = [np.arange(lowest, last, step)]
+    end = min(highest, lowest + rules.most_tried_orders * step)
+    grids = [np.arange(lowest, end, step)]
     around = 0.5 * resolution * np.arange(-(SURROUNDINGS // 2), SURROUNDINGS // 2 + 1)
     for order in expected:
-        missed = order >= last or step > 0.5 * resolution
+        missed = order >= end or step > 0.5 * resolution
         if missed and lowest <= order <= highest:
-            near = order + around
-            grids.append(near[near >= resolution * rules.fewest_periods])
-    return grids, resolution, bool(last < highest)
+            grid = order + around
+            grids.append(grid[grid >= resolution * rules.fewest_periods])
+    return grids, resolution, bool(end < highest)
 
 
 def _significance(
@@ -196,21 +196,23 @@ def _significance(
 ) -> Values:
     """Return the ratio of the power of each order to the least that is significant, (n_orders,).
 
-    ``grids`` have evenly spaced orders each; n_orders is that of all.
+    Each of the ``grids`` has evenly spaced orders; n_orders counts those of all.
     """
-    found = [_over_noise(bands, orders) for orders in grids]
-    total, counted = (np.concatenate(parts) for parts in zip(*found, strict=True))
+    powers = [_over_noise(bands, orders) for orders in grids]
+    total, counted = (np.concatenate(parts) for parts in zip(*powers, strict=True))
     orders = np.concatenate(grids)
-    near = np.zeros(len(orders), dtype=bool)
-    for one in expected:
-        near |= np.abs(orders - one) <= resolution
-    chance = np.where(near, 1.0 / max(int(near.sum()), 1), 1.0 / max(int((~near).sum()), 1))
+    is_expected = np.zeros(len(orders), dtype=bool)
+    for order in expected:
+        is_expected |= np.abs(orders - order) <= resolution
+    chance = np.where(
+        is_expected, 1.0 / max(int(is_expected.sum()), 1), 1.0 / max(int((~is_expected).sum()), 1)
+    )
     limit = gamma.isf(rules.position_order_chance * chance, np.maximum(counted, 1))
     return np.asarray(total / limit)
 
 
 def _over_noise(bands: Sequence[HighBand], orders: Values) -> tuple[Values, Values]:
-    """Return the power of orders over that of their surroundings, and in how many sums it is."""
+    """Return the power of orders over that of their surroundings, and its number of addends."""
     total, counted = np.zeros((2, len(orders)))
     for band in bands:
         for way in band.ways():
@@ -225,15 +227,15 @@ def _over_noise(bands: Sequence[HighBand], orders: Values) -> tuple[Values, Valu
 
 def _powers(band: HighBand, way: NDArray[np.bool_], orders: Values) -> Values:
     """Return the power of each order per unit of its noise, (n_orders,); 0 where nothing shows."""
-    found = np.zeros(len(orders))
-    first = 0
-    while first < len(orders):
-        last = int(np.searchsorted(orders, max(_BLOCK * orders[first], orders[first] + 1e-9)))
-        last = max(last, first + 1)
-        gain = band.gain(float(orders[(first + last) // 2])) * way
-        found[first:last] = _power(band, gain, orders[first:last])
-        first = last
-    return found
+    power = np.zeros(len(orders))
+    start = 0
+    while start < len(orders):
+        end = int(np.searchsorted(orders, max(_BLOCK * orders[start], orders[start] + 1e-9)))
+        end = max(end, start + 1)
+        gain = band.gain(float(orders[(start + end) // 2])) * way
+        power[start:end] = _power(band, gain, orders[start:end])
+        start = end
+    return power
 
 
 def _power(band: HighBand, gain: Values, orders: Values) -> Values:
@@ -247,32 +249,32 @@ def _power(band: HighBand, gain: Values, orders: Values) -> Values:
 
 def _refined(bands: Sequence[HighBand], order: float, step: float) -> float:
     """Return the order of largest power near one of a grid with a step."""
-    near = order + step * np.linspace(-1.0, 1.0, 41)
-    power = np.zeros(len(near))
+    fine_grid = order + step * np.linspace(-1.0, 1.0, 41)
+    power = np.zeros(len(fine_grid))
     for band in bands:
         for way in band.ways():
-            power += _power(band, band.gain(order) * way, near)
+            power += _power(band, band.gain(order) * way, fine_grid)
     top = int(np.argmax(power))
-    if not 0 < top < len(near) - 1:
-        return float(near[top])
-    # Powers are a parabola at their top: the steps are no limit of an order.
+    if not 0 < top < len(fine_grid) - 1:
+        return float(fine_grid[top])
+    # The top of the power is a parabola, so that an order may lie between the steps.
     before, middle, after = power[top - 1 : top + 2]
     bend = max(2.0 * middle - before - after, 1e-300)
-    return float(near[top] + 0.5 * (near[1] - near[0]) * (after - before) / bend)
+    return float(fine_grid[top] + 0.5 * (fine_grid[1] - fine_grid[0]) * (after - before) / bend)
 
 
-def told_from_frequencies(
+def differs_from_frequencies(
     bands: Sequence[HighBand], order: float, rules: Rules
 ) -> tuple[bool, float | None]:
-    """Return whether an order explains more than any frequency, and one in Hz that is significant.
+    """Return whether an order explains more than any frequency, or else a significant one in Hz.
 
-    Once over whole records, as mains are coherent for hours, and once with a phase of its own in
-    every window, as a switching frequency drifts. Where the speed changes, one of them explains
-    clearly more.
+    They are compared over whole records, because mains are coherent for hours, and with a phase of
+    its own in every window, because a switching frequency drifts. Where the speed changes, one of
+    them explains clearly more.
     """
-    lowest, highest = min(one.lowest for one in bands), max(one.highest for one in bands)
+    lowest, highest = min(band.lowest for band in bands), max(band.highest for band in bands)
     for windows in (1, _SEGMENTS):
-        longest = max(len(one.time) // windows * one.step for one in bands)
+        longest = max(len(band.time) // windows * band.step for band in bands)
         frequencies = np.arange(lowest, highest, 0.25 / longest)
         of_frequency, n_windows = np.zeros(len(frequencies)), 0
         of_order, n_order = 0.0, 0
@@ -282,30 +284,30 @@ def told_from_frequencies(
                 of_frequency += band.line_power(rows, frequencies)
                 n_windows += 1
                 for way in band.ways():
-                    here = (turned * way)[rows]
-                    size = float(np.sum(np.abs(here) ** 2))
+                    wave = (turned * way)[rows]
+                    size = float(np.sum(np.abs(wave) ** 2))
                     if size > 0.0:
-                        of_order += abs(band.force[rows] @ here) ** 2 / size
+                        of_order += abs(band.force[rows] @ wave) ** 2 / size
                         n_order += 1
         noise = float(np.median(of_frequency)) / gamma.median(n_windows)
         place = int(np.argmax(of_frequency))
         gain_of_order = of_order / noise - n_order
         gain_of_frequency = float(of_frequency[place]) / noise - n_windows
         limit = gamma.isf(rules.position_order_chance / len(frequencies), n_windows) - n_windows
-        doubt = gamma.isf(rules.second_speed_chance, n_windows) - n_windows
+        margin = gamma.isf(rules.second_speed_chance, n_windows) - n_windows
         significant = gain_of_frequency > limit
-        if gain_of_order <= gain_of_frequency + doubt and (windows == 1 or significant):
+        if gain_of_order <= gain_of_frequency + margin and (windows == 1 or significant):
             return False, float(frequencies[place]) if significant else None
     return True, None
 
 
 def _at_two_speeds(bands: Sequence[HighBand], seen: SeenOrder, rules: Rules) -> bool:
-    """Tell whether an order is seen without the rows of its commonest speed, too.
+    """Tell whether an order is significant even without the rows of its commonest speed.
 
-    What rings at a frequency after a start, and starts at the same places again and again, follows
-    the position as well as an order does, but at one speed only.
+    A ringing of one frequency that starts at the same places again and again follows the position
+    as an order does, but at one speed only.
     """
-    speed = np.sort(np.concatenate([np.abs(one.speed)[one.inside(seen.order)] for one in bands]))
+    speed = np.sort(np.concatenate([np.abs(band.speed)[band.inside(seen.order)] for band in bands]))
     width = rules.fixed_frequency_range * float(speed[-1])
     commonest = int(np.argmax(np.searchsorted(speed, speed + width) - np.arange(len(speed))))
     slowest = float(speed[commonest])

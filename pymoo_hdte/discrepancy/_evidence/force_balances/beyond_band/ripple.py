@@ -1,7 +1,7 @@
 """Ripple beyond the band of the motion: its orders, sizes, and how it changes with the speed.
 
-A verdict compares forces up to the frequency at which a motion can be measured. Beyond, forces that
-vary with the position are still seen, because positions are known, up to half the sampling rate.
+A verdict compares forces up to the frequency at which a motion can be measured. Beyond it, up to
+half the sampling rate, forces that vary with the position still show, because positions are known.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from pymoo_hdte.discrepancy._evidence.force_balances.beyond_band.order_search im
 )
 from pymoo_hdte.discrepancy._evidence.force_balances.beyond_band.ripple_size import (
     Part,
-    gap_of,
+    force_before_and_after,
     over_speed,
     size_of,
     trend_of,
@@ -45,7 +45,7 @@ _CENTRAL = float(norm.ppf(0.975))
 
 @dataclass(frozen=True)
 class Terms:
-    """Words for what varies with the position of a port, and for its lines."""
+    """Words for a quantity that varies with the position of a port, and for its lines."""
 
     at_port: str = "force at"
     of_records: str = "forces"
@@ -60,7 +60,7 @@ OF_TORSION = Terms("torsion of", "torsion", "An error of", "error", "an error")
 
 @dataclass(frozen=True, eq=False)
 class Ripple:
-    """What varies with the position of a port beyond the band of the motion.
+    """A force or an error that varies with the position of a port beyond the band of the motion.
 
     Attributes
     ----------
@@ -69,13 +69,13 @@ class Ripple:
         Cycles per turn of an angle in rad; of a length, radians per m. The resolution is the change
         of the order by which the longest travel has one cycle more.
     variance : float
-        Of the order.
+        Variance of the order.
     ratio : float
         Turns of the gear's input per turn of the port; 0 where no gear is stated.
     meaning : str
-        What the gear says of the order; empty if nothing.
+        Meaning of the order for the gear, in words; empty for none.
     frequencies : (float, float)
-        Hz, between which it was seen.
+        Lowest and highest frequency at which it was seen, Hz.
     parts : tuple of Part
     ways : int
         Directions, 1 or 2, in which it was seen.
@@ -84,10 +84,10 @@ class Ripple:
     trend : str
         How the amplitude changes with the speed, in words.
     fitted : (float, float)
-        Root mean square beyond the band before and after the ripple is taken away, N or N.m, while
-        its frequency is between those.
+        Root mean square beyond the band before and after the ripple is removed, N or N.m, in the
+        rows in which its frequency is between ``frequencies``.
     held_out : (float, float) or None
-        The same in records that were not fitted.
+        The same as ``fitted`` in records that were not fitted.
     """
 
     port: str
@@ -106,29 +106,29 @@ class Ripple:
 
     @property
     def words(self) -> str:
-        """Its order, how often that is in a turn of the input, and what the gear says of it."""
-        told = "; ".join(filter(None, (_per_input_turn(self.order, self.ratio), self.meaning)))
-        return f"{self.order:.5g} ({told})" if told else f"{self.order:.5g}"
+        """Its order, cycles per input turn, and meaning for the gear, in words."""
+        remarks = "; ".join(filter(None, (_per_input_turn(self.order, self.ratio), self.meaning)))
+        return f"{self.order:.5g} ({remarks})" if remarks else f"{self.order:.5g}"
 
     @property
     def sentence(self) -> str:
-        """What it is."""
-        names = [one.law.name for one in self.parts]
+        """Sentences that describe the ripple."""
+        names = [part.law.name for part in self.parts]
         words = effect_named(names[0]).sentence
-        told = [sentence_at(words, self.port, f"{self.order:.5g}", "force")]
+        sentences = [sentence_at(words, self.port, f"{self.order:.5g}", "force")]
         if len(names) > 1:
             same = "is the same in both directions"
             turns = "turns with the direction, as friction"
-            told.append(f"A part of it {same if effect_named(names[1]).drives else turns}.")
+            sentences.append(f"A part of it {same if effect_named(names[1]).drives else turns}.")
         if self.ways == 1:
-            told.append(_one_way(self.port))
+            sentences.append(_one_way(self.port))
         if self.ratio:
-            told.append(f"That is {_per_input_turn(self.order, self.ratio)}.")
+            sentences.append(f"That is {_per_input_turn(self.order, self.ratio)}.")
         if self.meaning:
-            told.append(f"Within the resolution of the travel, {self.meaning}.")
+            sentences.append(f"Within the resolution of the travel, {self.meaning}.")
         low, high = self.frequencies
-        told.append(f"It was seen from {low:.3g} to {high:.3g} Hz. {self.trend}")
-        return " ".join(told)
+        sentences.append(f"It was seen from {low:.3g} to {high:.3g} Hz. {self.trend}")
+        return " ".join(sentences)
 
     def as_dicts(self) -> list[dict[str, Any]]:
         """Return its effects as a verdict has them, with plain values."""
@@ -138,9 +138,9 @@ class Ripple:
                 "port": self.port,
                 "sentence": self.sentence,
                 "parameters": {
-                    "order": _value(self.order, self.variance),
+                    "order": _value_with_interval(self.order, self.variance),
                     **{
-                        name: _value(value, variance)
+                        name: _value_with_interval(value, variance)
                         for name, (value, variance) in part.values.items()
                     },
                 },
@@ -160,38 +160,38 @@ class Ripple:
 
 @dataclass(frozen=True)
 class Ripples:
-    """What a search beyond the band found.
+    """The ripples of all ports beyond the band of the motion.
 
     Attributes
     ----------
-    found : tuple of Ripple
+    lines : tuple of Ripple
         The strongest first, port by port.
     limits : tuple of str
-        What was seen and is none, or cannot be told, in sentences.
+        Sentences about lines that are no ripple, or that the records cannot tell from one.
     """
 
-    found: tuple[Ripple, ...] = ()
+    lines: tuple[Ripple, ...] = ()
     limits: tuple[str, ...] = ()
 
     @property
     def laws(self) -> tuple[LawAt, ...]:
-        """All laws."""
-        return tuple(part.law for one in self.found for part in one.parts)
+        """Laws of all ripples."""
+        return tuple(part.law for ripple in self.lines for part in ripple.parts)
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of their effects."""
-        return tuple(dict.fromkeys(one.name for one in self.laws))
+        """Names of the effects of all ripples."""
+        return tuple(dict.fromkeys(law.name for law in self.laws))
 
     @property
     def sentence(self) -> str:
-        """What was found, in words; empty for nothing."""
-        ports = dict.fromkeys(one.port for one in self.found)
-        orders = {p: [one.words for one in self.found if one.port == p] for p in ports}
+        """Sentences that name the ripples; empty for none."""
+        ports = dict.fromkeys(ripple.port for ripple in self.lines)
+        orders = {p: [ripple.words for ripple in self.lines if ripple.port == p] for p in ports}
         return " ".join(
             f"Beyond the band of the motion the force at the {port} varies with its position, "
-            f"order{'s'[: len(here) - 1]} {listed(here)}."
-            for port, here in orders.items()
+            f"order{'s'[: len(words) - 1]} {listed(words)}."
+            for port, words in orders.items()
         )
 
 
@@ -206,28 +206,31 @@ def find_ripples(
     rules: Rules = RULES,
     terms: Terms = OF_FORCES,
 ) -> Ripples:
-    """Return what varies with the position of ports beyond the band of the motion.
+    """Return the ripples of a mechanism's ports beyond the band of the motion.
 
     Parameters
     ----------
     mechanism : Mechanism
     records : sequence of Record
-        As they were sampled; those held out judge what the others show.
+        Records as they were sampled; the held-out ones validate the ripples of the others.
     cutoff : float
-        Hz, up to which the motion is known.
+        Frequency up to which the motion is known, Hz.
     effects : collection of LawAt
-        That are known already; their orders are not looked for.
+        Effects that are known already; their orders are not searched for.
     rules : Rules
     terms : Terms
-        Words for what the records of the mechanism hold.
+        Words for the quantity that the records of the mechanism hold.
 
     Returns
     -------
     Ripples
     """
-    found: list[Ripple] = []
+    ripples: list[Ripple] = []
     limits: list[str] = []
-    of_role = {role: [one for one in records if one.role == role] for role in ("train", "held_out")}
+    of_role = {
+        role: [record for record in records if record.role == role]
+        for role in ("train", "held_out")
+    }
     for port in ports_apart(mechanism):
         train, held_out = (
             high_bands(mechanism, port, of_role[role], cutoff, rules) for role in of_role
@@ -235,30 +238,30 @@ def find_ripples(
         known = known_orders(mechanism, port, effects)
         expected = port.gear.expected if port.gear else ()
         search = seen_orders(train, tuple(expected), known, rules)
-        here: list[Ripple] = []
+        shown: list[Ripple] = []
         lost: list[Ripple] = []
-        for one in search.kept:
-            ripple = _ripple(port, one, train, held_out, rules)
+        for line in search.orders:
+            ripple = _ripple(port, line, train, held_out, rules)
             if _share(ripple.fitted) < rules.ripple_share:
                 continue
-            shown = ripple.held_out is None or _share(ripple.held_out) >= rules.ripple_share
-            (here if shown else lost).append(ripple)
-        found += here
-        limits += _limits(port, search, here, lost, terms)
-    return Ripples(tuple(found), tuple(limits))
+            remains = ripple.held_out is None or _share(ripple.held_out) >= rules.ripple_share
+            (shown if remains else lost).append(ripple)
+        ripples += shown
+        limits += _limits(port, search, shown, lost, terms)
+    return Ripples(tuple(ripples), tuple(limits))
 
 
 def _limits(
     port: Port,
     search: SeenOrders,
-    found: Sequence[Ripple],
+    ripples: Sequence[Ripple],
     lost: Sequence[Ripple],
     terms: Terms,
 ) -> list[str]:
-    """Return what was seen at a port and is not named, or cannot be told, in sentences."""
+    """Return sentences about the lines at a port that are not named, or not told apart."""
 
-    def ripple(orders: Sequence[float]) -> str:
-        turns = listed([_per_input_turn(one, ratio) for one in orders])
+    def named(orders: Sequence[float]) -> str:
+        turns = listed([_per_input_turn(order, ratio) for order in orders])
         words = f"{orders_in_words(orders)}{f' ({turns})' if ratio else ''}"
         return f"{terms.lines_at} the {name}, {words},"
 
@@ -267,20 +270,20 @@ def _limits(
     if search.cut:
         highest = np.format_float_positional(search.highest, 4, fractional=False, trim="-")
         limits.append(f"Orders at the {name} were searched up to {highest} only.")
-    if any(one.ways == 1 for one in found):
+    if any(ripple.ways == 1 for ripple in ripples):
         limits.append(_one_way(name, terms))
     if lost:
         limits.append(
-            f"{ripple([one.order for one in lost])} is seen, but to take it away makes the "
+            f"{named([ripple.order for ripple in lost])} is seen, but to take it away makes the "
             f"{terms.of_records} of the held-out records no smaller: it is not named."
         )
     if search.undecided:
         limits.append(
-            f"{ripple(search.undecided)} is seen at one speed or is weak, so that "
+            f"{named(search.undecided)} is seen at one speed or is weak, so that "
             "these records do not tell it from a frequency: it is not named."
         )
     if search.fixed:
-        lines = ", ".join(f"{one:.3g}" for one in search.fixed)
+        lines = ", ".join(f"{frequency:.3g}" for frequency in search.fixed)
         limits.append(
             f"The {terms.at_port} the {name} has lines at {lines} Hz, which these records show as "
             "frequencies and not as orders of its position."
@@ -289,7 +292,7 @@ def _limits(
 
 
 def _per_input_turn(order: float, ratio: float) -> str:
-    """Return how often an order is in a turn of the gear's input; empty without a gear."""
+    """Return the cycles of an order per input turn in words, or nothing without a gear."""
     return f"{order / ratio:.4g} per input turn" if ratio else ""
 
 
@@ -308,11 +311,13 @@ def _ripple(
     rules: Rules,
 ) -> Ripple:
     size = size_of(port.name, seen, train, rules)
-    rows = [one.inside(seen.order) for one in train]
-    speed = np.concatenate([np.abs(one.speed)[here] for one, here in zip(train, rows, strict=True)])
+    rows = [band.inside(seen.order) for band in train]
+    speed = np.concatenate(
+        [np.abs(band.speed)[moving] for band, moving in zip(train, rows, strict=True)]
+    )
     per_speed = seen.order / (2.0 * np.pi)
     speeds = over_speed(seen, train, speed)
-    laws = [one.law for one in size.parts]
+    laws = [part.law for part in size.parts]
     half = _CENTRAL * size.variance**0.5
     return Ripple(
         port.name,
@@ -326,17 +331,17 @@ def _ripple(
         size.ways,
         speeds,
         trend_of(speeds, rules),
-        gap_of(seen.order, laws, train) or (0.0, 0.0),
-        gap_of(seen.order, laws, held_out),
+        force_before_and_after(seen.order, laws, train) or (0.0, 0.0),
+        force_before_and_after(seen.order, laws, held_out),
     )
 
 
 def _share(gap: Pair) -> float:
-    """Return the share of the power that is taken away between two root mean squares."""
+    """Return the share of the power that is removed between two root mean squares."""
     before, after = gap
     return 1.0 - (after / before) ** 2 if before > 0.0 else 0.0
 
 
-def _value(value: float, variance: float) -> dict[str, Any]:
+def _value_with_interval(value: float, variance: float) -> dict[str, Any]:
     half = _CENTRAL * variance**0.5
     return {"value": value, "interval95": [value - half, value + half], "at_bound": False}

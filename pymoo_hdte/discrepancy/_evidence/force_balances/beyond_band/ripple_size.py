@@ -28,8 +28,8 @@ from pymoo_hdte.mechanism.port_motion import PortMotion, law_force
 Values = NDArray[np.float64]
 Pair = tuple[float, float]
 
-_NEAR = np.linspace(-1.0, 1.0, 81)
-"""Distances, in resolutions, between which the order of one direction is looked for."""
+_OFFSETS = np.linspace(-1.0, 1.0, 81)
+"""Distances, in resolutions, at which the order of one direction is searched for."""
 _SPEEDS = 6
 """Groups of equally many rows by speed."""
 
@@ -60,7 +60,8 @@ class _Line:
     amplitude : complex
         N or N.m.
     variance : float
-        Of it, real and imaginary part together, by the powers of the neighbouring orders.
+        Variance of the amplitude, real and imaginary part together, from the powers of the
+        neighbouring orders.
     middle, spread : float
         Mean and variance of the positions.
     """
@@ -72,13 +73,13 @@ class _Line:
 
     @property
     def known(self) -> float:
-        """Inverse of the variance of the order: it is the slope of a phase over the position."""
+        """Inverse variance of the order, which is the slope of the phase over the position."""
         return 2.0 * abs(self.amplitude) ** 2 * self.spread / self.variance
 
 
 @dataclass(frozen=True, eq=False)
 class Size:
-    """What a line of an order is.
+    """The parts of a line of an order, and their uncertainty.
 
     Attributes
     ----------
@@ -87,7 +88,7 @@ class Size:
     ways : int
         Directions, 1 or 2, in which it was seen.
     variance : float
-        Of the order, its unit squared.
+        Variance of the order, in the square of its unit.
     """
 
     parts: tuple[Part, ...]
@@ -96,48 +97,48 @@ class Size:
 
 
 def size_of(port: str, seen: SeenOrder, bands: Sequence[HighBand], rules: Rules) -> Size:
-    """Return the parts of a line; while a port moves one way, all of it counts as a torque."""
+    """Return the parts of a line; if a port moves one way only, all of it counts as a torque."""
     lines = [_line(seen, bands, way) for way in (1.0, -1.0)]
-    both = [one for one in lines if one is not None]
-    variance = 1.0 / sum(one.known for one in both)
-    if len(both) == 2:
-        # Several orders that the travel does not resolve add up otherwise in either direction.
-        apart = (_nearest(seen, bands, 1.0) - _nearest(seen, bands, -1.0)) ** 2
-        if apart > chi2.isf(rules.second_speed_chance, 1) * sum(1.0 / one.known for one in both):
+    known = [line for line in lines if line is not None]
+    variance = 1.0 / sum(line.known for line in known)
+    if len(known) == 2:
+        # Several orders that the travel does not resolve add up differently in the two directions.
+        apart = (_strongest_order(seen, bands, 1.0) - _strongest_order(seen, bands, -1.0)) ** 2
+        if apart > chi2.isf(rules.second_speed_chance, 1) * sum(1.0 / line.known for line in known):
             variance += apart / 4.0
-    return Size(_parts(port, seen, both, variance, rules), len(both), variance)
+    return Size(_parts(port, seen, known, variance, rules), len(known), variance)
 
 
-def _nearest(seen: SeenOrder, bands: Sequence[HighBand], way: float) -> float:
+def _strongest_order(seen: SeenOrder, bands: Sequence[HighBand], way: float) -> float:
     """Return the order of largest power within the resolution while the port moves one way."""
-    near = seen.order + seen.resolution * _NEAR
-    powers = np.abs(phasors(*_moving(seen, bands, way), near))
-    return float(near[np.argmax(powers)])
+    orders = seen.order + seen.resolution * _OFFSETS
+    powers = np.abs(phasors(*_rows_of_line(seen, bands, way), orders))
+    return float(orders[np.argmax(powers)])
 
 
 def _parts(
-    port: str, seen: SeenOrder, both: Sequence[_Line], of_order: float, rules: Rules
+    port: str, seen: SeenOrder, known: Sequence[_Line], of_order: float, rules: Rules
 ) -> tuple[Part, ...]:
-    mean = sum(one.amplitude for one in both) / len(both)
-    variance = sum(one.variance for one in both) / len(both) ** 2
-    middle = sum(one.middle for one in both) / len(both)
+    mean = sum(line.amplitude for line in known) / len(known)
+    variance = sum(line.variance for line in known) / len(known) ** 2
+    middle = sum(line.middle for line in known) / len(known)
     # A driving torque acts with the motion, a force of friction against it.
     lines = [("torque_ripple", "amplitude", -mean)]
-    if len(both) == 2:
-        turning = 0.5 * (both[0].amplitude - both[1].amplitude)
+    if len(known) == 2:
+        turning = 0.5 * (known[0].amplitude - known[1].amplitude)
         lines.append(("position_dependent_friction", "level", turning))
     strongest = max(abs(line) for _, _, line in lines)
     least = min(strongest, (-np.log(rules.position_order_chance) * variance) ** 0.5)
-    found = []
+    sized = []
     for name, size, line in lines:
         if abs(line) >= least:
             amplitude, phase = line_with_variance(line.real, line.imag, 0.5 * variance * np.eye(2))
-            # The phase is that at position 0, as far from the rows as their mean position.
+            # The phase is that at position 0, which lies the mean position away from the rows.
             phase = phase[0], float(phase[1] + of_order * middle**2)
             numbers = {"order": seen.order, size: amplitude[0], "phase": phase[0]}
             law = LawAt(name, port, effect_named(name).law_of(numbers))
-            found.append((abs(line), Part(law, {size: amplitude, "phase": phase})))
-    return tuple(part for _, part in sorted(found, key=lambda one: -one[0]))
+            sized.append((abs(line), Part(law, {size: amplitude, "phase": phase})))
+    return tuple(part for _, part in sorted(sized, key=lambda entry: -entry[0]))
 
 
 def _line(
@@ -157,22 +158,22 @@ def _line(
     slowest, fastest : float
         Speeds between which rows are taken.
     """
-    position, signal = _moving(seen, bands, way, slowest, fastest)
+    position, signal = _rows_of_line(seen, bands, way, slowest, fastest)
     if len(signal) < FEWEST_ROWS:
         return None
     line = np.exp(1j * seen.order * position)
     amplitude = complex(2.0 * np.mean(signal * line.conj()))
-    # Without the line, which would leak into its neighbours.
-    left = signal - (amplitude * line).real
+    # The line is removed, because it would leak into its neighbours.
+    residual = signal - (amplitude * line).real
     orders = seen.order + seen.resolution * NEIGHBOURS
-    around = np.abs(np.exp(-1j * np.outer(orders, position)) @ left) ** 2
+    around = np.abs(np.exp(-1j * np.outer(orders, position)) @ residual) ** 2
     # Powers of noise are exponential, with a median of log 2.
     variance = 4.0 * float(np.median(around)) / np.log(2.0) / len(signal) ** 2
     middle, spread = float(np.mean(position)), float(np.var(position))
     return _Line(amplitude, max(variance, 1e-300), middle, spread)
 
 
-def _moving(
+def _rows_of_line(
     seen: SeenOrder,
     bands: Sequence[HighBand],
     way: float,
@@ -191,22 +192,22 @@ def _moving(
 
 def over_speed(seen: SeenOrder, bands: Sequence[HighBand], speed: Values) -> Values:
     """Return the amplitude over the speed: (n, 3), see `Ripple`; ``speed`` is that of all rows."""
-    found = []
+    rows = []
     edges = np.quantile(speed, np.linspace(0.0, 1.0, _SPEEDS + 1))
     edges[0] = 0.0
     for slowest, fastest in pairwise(edges):
-        here = [_line(seen, bands, way, slowest, fastest) for way in (1.0, -1.0)]
-        lines = [one for one in here if one is not None]
+        by_way = [_line(seen, bands, way, slowest, fastest) for way in (1.0, -1.0)]
+        lines = [line for line in by_way if line is not None]
         if lines:
             power = np.mean([abs(line.amplitude) ** 2 for line in lines])
             variance = np.mean([line.variance for line in lines]) / (2.0 * len(lines))
             middle = np.mean(speed[(speed > slowest) & (speed <= fastest)])
-            found.append((middle, power**0.5, variance**0.5))
-    return np.array(found).reshape(len(found), 3)
+            rows.append((middle, power**0.5, variance**0.5))
+    return np.array(rows).reshape(len(rows), 3)
 
 
 def trend_of(speeds: Values, rules: Rules) -> str:
-    """Return in words how an amplitude changes with the speed, and what may be its cause."""
+    """Return sentences on how an amplitude changes with the speed, and on its possible cause."""
     unknown = "How it changes with the speed cannot be told."
     if len(speeds) < 4 or speeds[-1, 0] <= rules.growth_ratio * speeds[0, 0]:
         return unknown
@@ -216,9 +217,11 @@ def trend_of(speeds: Values, rules: Rules) -> str:
     way = way - np.average(way, weights=weight)
     size = np.log(speeds[:, 1])
     power = float(np.sum(weight * way * size) / np.sum(weight * way**2))
-    left = size - np.average(size, weights=weight) - power * way
+    residual = size - np.average(size, weights=weight) - power * way
     degrees = len(speeds) - 2
-    spread = max(float(np.sum(weight * left**2)) / degrees, 1.0) / float(np.sum(weight * way**2))
+    spread = max(float(np.sum(weight * residual**2)) / degrees, 1.0) / float(
+        np.sum(weight * way**2)
+    )
     reach = float(t.isf(0.5 * rules.growth_chance, degrees)) * spread**0.5
     range_ = float(np.log(speeds[-1, 0] / speeds[0, 0]))
     least = float(np.log(rules.growth_ratio))
@@ -242,8 +245,10 @@ def trend_of(speeds: Values, rules: Rules) -> str:
     return unknown
 
 
-def gap_of(order: float, laws: Sequence[LawAt], bands: Sequence[HighBand]) -> Pair | None:
-    """Return the root mean square in other records before and after laws are taken away."""
+def force_before_and_after(
+    order: float, laws: Sequence[LawAt], bands: Sequence[HighBand]
+) -> Pair | None:
+    """Return the root mean square of other records before and after laws are removed."""
     before = after = 0.0
     count = 0
     for band in bands:
@@ -252,7 +257,7 @@ def gap_of(order: float, laws: Sequence[LawAt], bands: Sequence[HighBand]) -> Pa
             continue
         motion = PortMotion(band.position[rows], band.speed[rows])
         force = band.plain[rows]
-        left = force - np.sum([law_force(one.law, motion, 0.0) for one in laws], axis=0)
-        before, after = before + float(np.sum(force**2)), after + float(np.sum(left**2))
+        residual = force - np.sum([law_force(law.law, motion, 0.0) for law in laws], axis=0)
+        before, after = before + float(np.sum(force**2)), after + float(np.sum(residual**2))
         count += len(force)
     return ((before / count) ** 0.5, (after / count) ** 0.5) if count else None
