@@ -121,7 +121,7 @@ def test_nothing_is_worked_out_twice(analysis, reported, monkeypatch):
 
 
 def test_other_things_are_not_analysed():
-    with pytest.raises(InvalidInput, match="measured is 'str', allowed: a Campaign or"):
+    with pytest.raises(InvalidInput, match="measured is 'str', allowed: a Campaign, a"):
         analyse("campaign")
 
 

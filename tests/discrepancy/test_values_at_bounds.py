@@ -1,12 +1,14 @@
 """Every value at both of its bounds goes through fit, validation, report and revised model."""
 
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pytest
 from analysed_campaigns import ripple_analysis
 from made_verdicts import made_verdict
 from measured_oscillator import nothing, with_held_out
+from night import others_at_night
 
 from pymoo_hdte.discrepancy import read_mechanism_model
 from pymoo_hdte.discrepancy._answers.next_test_mechanism import next_test
@@ -24,6 +26,7 @@ from pymoo_hdte.mechanism.believed import LARGEST_FACTOR, SMALLEST_SHARE
 
 CUTOFF = 20.0
 QUANTITIES = ("inertia of x", "stiffness of spring", "damping of spring", "gain of force")
+LIMITS = {"tolerance": 1.0, "factor": LARGEST_FACTOR}
 BOUNDS = pytest.mark.parametrize("bound", ["lower", "upper"])
 
 
@@ -37,12 +40,20 @@ def oscillator(**limits):
     )
 
 
-@pytest.mark.parametrize("limits", [{"tolerance": 1.0}, {"factor": LARGEST_FACTOR}], ids=str)
-@pytest.mark.parametrize("quantity", QUANTITIES)
-@BOUNDS
-def test_a_mechanism_is_proved_reported_and_believed_again(quantity, bound, limits, tmp_path):
+@pytest.mark.parametrize(
+    "case",
+    others_at_night(
+        product(QUANTITIES, ("lower", "upper"), ("tolerance", "factor")),
+        # Zero is the bound at which something may end; a factor bounds all quantities alike.
+        *product(QUANTITIES, ("lower",), ("tolerance",)),
+        ("stiffness of spring", "upper", "factor"),
+    ),
+    ids="-".join,
+)
+def test_a_mechanism_is_proved_reported_and_believed_again(case, tmp_path):
     """An inertia that a fit took to zero ended the analysis: "inertia of x is 0.0"."""
-    mechanism, records = oscillator(**limits), tuple(with_held_out(nothing))
+    quantity, bound, kind = case
+    mechanism, records = oscillator(**{kind: LIMITS[kind]}), tuple(with_held_out(nothing))
     data = measured_data(mechanism, records[:1], CUTOFF)
     start = np.array([getattr(p, bound if p.name == quantity else "start") for p in data.base])
     base = fit(data, (), start, steps=0)

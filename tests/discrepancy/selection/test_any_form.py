@@ -105,6 +105,7 @@ def test_a_small_effect_shows_beside_a_law_of_another_form():
     assert {one.label for one in found.chosen.candidates} == {SPRING, DRIFT}
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(("go_on", "labels"), [(False, {SPRING}), (True, {SPRING, DRIFT})])
 def test_a_search_goes_on_from_known_sets_only_where_that_is_asked_for(go_on, labels):
     """Resonances beside an inertia hid a friction: with their noise it alone was judged."""
@@ -126,6 +127,7 @@ def judged_with_a_gain(*beside):
     return judge(data, fit(data), of_labels("coulomb_friction:input", FRICTION, DRIFT))
 
 
+@pytest.mark.nightly
 def test_a_gain_that_stands_for_the_form_of_a_law_is_no_caveat():
     found = judged_with_a_gain(*small_drift())
     assert (found.status, found.chosen.label) == ("named", f"{FRICTION}+{DRIFT}")
@@ -133,6 +135,7 @@ def test_a_gain_that_stands_for_the_form_of_a_law_is_no_caveat():
     assert found.chosen.fit.bound_sides[names.index("output_torque_gain")] != 0.0
 
 
+@pytest.mark.nightly
 def test_a_gain_beside_one_law_is_a_caveat():
     """In any form it follows too much."""
     assert GAIN in judged_with_a_gain().reasons
@@ -145,7 +148,7 @@ DRAG, DRY = "nonlinear_drag:input", "coulomb_friction:input"
     ("dry", "status", "labels"),
     [
         (0.0, "named", [DRAG]),
-        (0.04, "class", [f"{DRAG}+{DRY}", DRAG]),
+        pytest.param(0.04, "class", [f"{DRAG}+{DRY}", DRAG], marks=pytest.mark.nightly),
         (0.08, "named", [f"{DRY}+{DRAG}"]),
     ],
 )

@@ -5,7 +5,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from night import others_at_night
 from places import DOCS
 from planted_features import known_data
 from quick_campaigns import quick_campaign
@@ -35,7 +34,8 @@ def misses(entry, truth):
     return abs(truth - (low + high) / 2.0) / ((high - low) / 2.0)
 
 
-@pytest.mark.parametrize("seed", others_at_night(SEEDS, 1))
+@pytest.mark.nightly
+@pytest.mark.parametrize("seed", SEEDS)
 def test_a_ripple_and_the_drive_are_as_they_were_made(seed):
     """With its second harmonic above all lines the ripple was 15 half-widths off, for 97 %."""
     rng = np.random.default_rng(seed)

@@ -111,6 +111,7 @@ def test_a_free_joint_is_simulated_until_it_drifts_and_its_name_stands():
     assert sentence in validation_sentence(finding, [simulated])
 
 
+@pytest.mark.nightly
 def test_the_worse_the_model_the_shorter_the_windows():
     lengths = [found_on_joint(one).simulated[0].extent.length for one in (0.05, 0.8)]
     assert lengths[1] < 0.8 * lengths[0]

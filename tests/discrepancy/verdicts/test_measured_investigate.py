@@ -96,6 +96,7 @@ def test_a_force_that_jumps_between_samples_is_no_missing_effect(seed, force_noi
     assert np.all(finding.base_misfit > 0.5 * finding.sensor_noise)
 
 
+@pytest.mark.nightly
 def test_a_force_that_jumps_finds_the_damper_that_was_forgotten():
     (port,) = OSCILLATOR.ports
     forgetful = replace(OSCILLATOR, ports=(replace(port, damping=BelievedValue(0.0)),))
@@ -240,6 +241,7 @@ def test_a_repetition_is_told_by_its_travel_its_rate_and_the_speed_that_they_mak
     assert "with 3 times its travel (3 times its speed)" in alone.description
 
 
+@pytest.mark.nightly
 def test_a_gain_of_the_wrong_sign_is_the_first_thing_to_check():
     record = rig.record_of(nothing)
     channels = {**record.channels, "force": -record.channels["force"]}

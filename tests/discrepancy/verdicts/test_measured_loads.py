@@ -173,6 +173,7 @@ def test_a_ripple_is_found_beside_gravity_and_friction_that_hide_it():
     assert ripple.amplitude == pytest.approx(1.2, rel=0.02)
 
 
+@pytest.mark.nightly
 def test_at_the_bound_of_a_form_no_name_is_plain():
     finding = found(lambda q, v: 4.0 * np.sign(v) * np.abs(v) ** 0.12)
     assert finding.verdict.status == "partial"

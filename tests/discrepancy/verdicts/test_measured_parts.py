@@ -111,6 +111,7 @@ def test_one_direction_is_said_and_the_reverse_run_proposed():
     assert next_test(both).rate > 0.0
 
 
+@pytest.mark.nightly
 def test_friction_and_an_offset_are_told_apart_by_two_directions():
     def offset(q, v):
         return 0.8 + 0.0 * q

@@ -43,6 +43,7 @@ def test_a_stiffness_stated_far_too_high_hides_no_discrepancy():
     assert finding.verdict.status == "named"
 
 
+@pytest.mark.nightly
 def test_a_stiffness_outside_its_tolerance_makes_no_torsion_of_its_own():
     joint = roughly_stiff(5.0 * STIFFNESS, 2.0)
     half = torsion_half(joint, [record(Hidden(), "train")], ())
@@ -76,7 +77,9 @@ def test_the_held_out_test_does_not_depend_on_the_stated_stiffness():
     [
         pytest.param(Hidden(), {"motor": -1.0}, "motor is -0.999", marks=pytest.mark.nightly),
         pytest.param(Hidden(), {"motor": 1.01}, "motor is 1.009", marks=pytest.mark.nightly),
-        (Hidden(), {"torque": -1.0}, "falls as the torque rises"),
+        pytest.param(
+            Hidden(), {"torque": -1.0}, "falls as the torque rises", marks=pytest.mark.nightly
+        ),
         (Hidden(late=-1e-3), {}, "motor may be read 1 ms after"),
     ],
     ids=("sign", "ratio", "torque", "late"),

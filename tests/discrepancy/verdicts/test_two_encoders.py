@@ -88,6 +88,7 @@ def resting(seconds, seed):
     return time, position, speed, np.gradient(speed, made_joint.STEP)
 
 
+@pytest.mark.nightly
 def test_rests_that_are_left_out_are_told_and_count_as_no_prediction(monkeypatch):
     """Dry friction ahead of the gear is known: what it holds at rest is in no force balance."""
     monkeypatch.setattr(made_joint, "motion", resting)
@@ -243,6 +244,7 @@ def test_the_delay_of_an_encoder_is_not_told_from_friction():
     assert "in the other order" in torsion_test(finding)
 
 
+@pytest.mark.nightly
 def test_effects_that_make_the_held_out_torsion_worse_are_not_named():
     train, _ = records(Hidden(WINDUP))
     _, other = records(Hidden())
