@@ -71,6 +71,7 @@ def equations_of_motion(
     """Return the right-hand side of Eq. (9) for the first design in ``coefficients``."""
     if coefficients.load_rates:
         raise InvalidInput("load_rates", coefficients.load_rates, "none in the time domain")
+    coefficients = coefficients.at_loads(coefficients.load_torque)
     ratio, load = coefficients.ratio, coefficients.load_torque
     stiffness, damping = float(coefficients.stiffness[0]), float(coefficients.damping[0])
     depth, phase = coefficients.stiffness_depth, coefficients.stiffness_phase

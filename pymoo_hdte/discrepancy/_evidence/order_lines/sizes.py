@@ -52,6 +52,8 @@ class Scales:
         Whether the load opposes the motion in some records and drives it in others.
     temperature : float
         Mean of the records, K, if all have a temperature and these spread enough; else 0.
+    loads_differ : bool
+        Whether the records are taken under different loads.
     """
 
     speed: float
@@ -65,6 +67,7 @@ class Scales:
     temperature: float = 0.0
     changes: tuple[float, ...] = ()
     swept: bool = False
+    loads_differ: bool = False
 
 
 def scales_of(data: Data, base: Fit) -> Scales:
@@ -99,6 +102,7 @@ def scales_of(data: Data, base: Fit) -> Scales:
         temperature=_temperature(data),
         changes=_changes(when.elapsed),
         swept=bool(data.torsion),
+        loads_differ=bool(np.ptp(when.output_torque) > least),
     )
 
 
@@ -190,6 +194,7 @@ def port_sizes(
         duration=scales.duration,
         temperature=scales.temperature,
         changes=scales.changes,
+        loads_differ=scales.loads_differ,
     )
     slower = {"input": 1.0, "mesh": 1.0, "output": believed.ratio, "sensor": believed.ratio}
     return {
