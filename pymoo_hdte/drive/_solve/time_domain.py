@@ -119,7 +119,7 @@ def equations_of_motion(
         torsion_rate = error_rate - envelope_rate * static - envelope * slope * rate
         varying = 1.0 + depth * math.cos(2.0 * position + phase)
         mesh_torque = stiffness * varying * torsion + damping * torsion_rate
-        mesh_torque += laws("mesh", torsion, torsion_rate, position)
+        mesh_torque += laws("mesh", torsion, torsion_rate, position, load * envelope)
         memory_states = np.split(state[:of_clutches], of_laws)[1:] if remembering else []
         slips = state[of_clutches:].tolist()
         for law, states in zip(remembering, memory_states, strict=True):

@@ -172,6 +172,8 @@ def port_sizes(
         "mesh": scales.torque,
         "sensor": 0.0,
     }
+    damping = dict.fromkeys(residual, 0.0)
+    damping |= {"input": believed.input_damping, "mesh": believed.damping}
     lines = zip(believed.error_orders, believed.error_amplitudes, strict=True)
     shared = DriveSizes(
         force=0.0,
@@ -206,7 +208,7 @@ def port_sizes(
             residual=residual[port],
             largest=largest[port],
             speed=shared.speed / slower[port],
-            damping=believed.input_damping if port == "input" else 0.0,
+            damping=damping[port],
             load=scales.torque / believed.ratio if port == "input" else 0.0,
             swept=scales.swept and port == "output",
             slower=slower[port],
