@@ -219,6 +219,11 @@ class DriveAnalysis(Analysis):
     ----------
     finding : DriveFinding
         Campaign, features of its records and verdict.
+
+    Examples
+    --------
+    >>> analysis = analyse(read_campaign("campaign"))  # doctest: +SKIP
+    >>> problem = RobustDTE(model=analysis.revised_model())  # doctest: +SKIP
     """
 
     finding: DriveFinding
@@ -291,6 +296,11 @@ class MechanismAnalysis(Analysis):
         The mechanism as it is believed, and its records.
     finding : MechanismFinding
         Force balances of the records, verdict, and unexplained residual.
+
+    Examples
+    --------
+    >>> analysis = analyse(read_rig("my_rig"))  # doctest: +SKIP
+    >>> analysis.revised_model().effects  # doctest: +SKIP
     """
 
     finding: MechanismFinding
@@ -383,6 +393,11 @@ class MachineAnalysis(Analysis):
     machine : Machine
     finding : MachineFinding
         Evidence and verdict.
+
+    Examples
+    --------
+    >>> analysis = analyse(Oscillator(...))  # doctest: +SKIP
+    >>> analysis.revised_model().values  # doctest: +SKIP
     """
 
     finding: MachineFinding

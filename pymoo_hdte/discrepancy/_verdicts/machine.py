@@ -24,6 +24,14 @@ class Machine(Protocol):
     """A kind of machine of your own: its records, and how they are compared with its model.
 
     Where it has a ``title``, reports begin with it.
+
+    Examples
+    --------
+    >>> class Oscillator:
+    ...     records = ()
+    ...     def evidence(self, records): ...
+    >>> isinstance(Oscillator(), Machine)
+    True
     """
 
     @property
