@@ -150,9 +150,8 @@ class Analysis(ABC):
 
     Examples
     --------
-    >>> analysis = analyse(read_campaign("campaign"))  # doctest: +SKIP
-    >>> analysis.verdict.status, analysis.locate().sentence  # doctest: +SKIP
-    >>> analysis.report("report")  # doctest: +SKIP
+    >>> issubclass(DriveAnalysis, Analysis), issubclass(MachineAnalysis, Analysis)
+    (True, True)
     """
 
     finding: Any
@@ -396,8 +395,19 @@ class MachineAnalysis(Analysis):
 
     Examples
     --------
-    >>> analysis = analyse(Oscillator(...))  # doctest: +SKIP
-    >>> analysis.revised_model().values  # doctest: +SKIP
+    >>> from types import SimpleNamespace
+    >>> from pymoo_hdte.effects import unknown
+    >>> class Pulls(ModelEvidence):
+    ...     base = (unknown("stiffness", 90.0, 110.0, 100.0),)
+    ...     def residuals(self, values, effects):
+    ...         return [{"force": (values["stiffness"] - 98.0) * np.ones(8)}]
+    ...     def sizes(self, fitted):
+    ...         return {}
+    >>> record = SimpleNamespace(name="pull", role="train")
+    >>> machine = SimpleNamespace(records=[record], evidence=lambda records: Pulls())
+    >>> analysis = analyse(machine)
+    >>> analysis.verdict.status, round(analysis.revised_model().values["stiffness"], 6)
+    ('adequate', 98.0)
     """
 
     finding: MachineFinding

@@ -64,7 +64,10 @@ def read_revised_values(path: str | Path) -> RevisedValues:
 
     Examples
     --------
-    >>> read_revised_values("report/revised_model.toml").values  # doctest: +SKIP
+    >>> from pathlib import Path
+    >>> text = RevisedValues("ring-down tests", {"damping": 0.8}).to_toml()
+    >>> _ = Path("revised_model.toml").write_text(text)
+    >>> read_revised_values("revised_model.toml").values
     {'damping': 0.8}
     """
     with toml_with_lines(Path(path)) as top:
