@@ -406,7 +406,7 @@ class MachineAnalysis(Analysis):
     >>> record = SimpleNamespace(name="pull", role="train")
     >>> machine = SimpleNamespace(records=[record], evidence=lambda records: Pulls())
     >>> analysis = analyse(machine)
-    >>> analysis.verdict.status, round(analysis.revised_model().values["stiffness"], 6)
+    >>> analysis.verdict.status, round(analysis.revised_model().values["stiffness"], 1)
     ('adequate', 98.0)
     """
 
