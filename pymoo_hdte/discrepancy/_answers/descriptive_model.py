@@ -29,6 +29,7 @@ from pymoo_hdte.discrepancy._evidence.force_balances.unexplained import (
     root_mean_square,
 )
 from pymoo_hdte.discrepancy._records.rig_model import MechanismModel
+from pymoo_hdte.discrepancy._records.rig_records import SPLIT
 from pymoo_hdte.discrepancy._selection.candidate import Candidate
 from pymoo_hdte.discrepancy._verdicts.held_out import laws_of
 from pymoo_hdte.discrepancy._verdicts.mechanism_finding import MechanismFinding
@@ -36,7 +37,7 @@ from pymoo_hdte.effects.effect import effect_named
 from pymoo_hdte.effects.friction import CoulombFriction
 from pymoo_hdte.effects.gravity import Gravity
 from pymoo_hdte.effects.linear import ConstantForce, LinearDamper
-from pymoo_hdte.mechanism import LawAt
+from pymoo_hdte.mechanism import LawAt, Mechanism
 from pymoo_hdte.mechanism.balances import ForceBalance, quantity_names
 from pymoo_hdte.mechanism.believed import SMALLEST_SHARE
 from pymoo_hdte.mechanism.port_motion import PortMotion, law_force
@@ -46,14 +47,17 @@ Values = NDArray[np.float64]
 
 DESCRIPTIVE_FILE = "descriptive_model.toml"
 
-_FOLDS = 10
-"""Blocks of time that are predicted from the others, at least."""
+_BLOCKS = 10
+"""Blocks of time of the training records, at least."""
+_LEFT_OUT = 1.0 - SPLIT
+"""Share of the blocks, one after the other, that is predicted from the others: as much as is held
+out of a record by default, so that a model is judged by how far it has to reach."""
 _WHOLE_RECORDS = 5
 """Number of training records from which each is a block."""
 _ROWS_PER_PERIOD = 5.0
 """Rows of a balance in a period of the cutoff: 2.5 times as many as determine it."""
 _RIDGE = 1e-10
-"""Keeps apart columns that are the same in a fold, in units of their own power."""
+"""Keeps apart columns that are the same in some blocks, in units of their own power."""
 _SUBSAMPLE = 200
 """Rows of a motion on which it is seen whether a law is linear in an unknown."""
 _SAME = 1e-6
@@ -66,7 +70,7 @@ _OF_BASE = ("inertia", "damping", "stiffness")
 
 @dataclass(frozen=True)
 class DescribedValue:
-    """A number of the model; ``interval95`` is None for one that was not fitted.
+    """A number of the model; ``interval95`` is None for one that is held, or ends at its bound.
 
     Attributes
     ----------
@@ -164,7 +168,7 @@ class _Term:
     ----------
     columns : tuple of int
         Places of its coefficients among all columns.
-    lower : ndarray, shape (len(columns),)
+    lower, upper : ndarray, shape (len(columns),)
     fixed : int or None
         Column of the force that it has whatever its coefficients.
     quantity : str
@@ -179,6 +183,7 @@ class _Term:
 
     columns: tuple[int, ...]
     lower: Values
+    upper: Values
     fixed: int | None = None
     quantity: str = ""
     candidate: Candidate | None = None
@@ -211,7 +216,7 @@ class _Term:
     def holds(self, term: _Term) -> bool:
         """Tell whether another effect is a special case of this one, or the same effect."""
         if self.candidate is None or term.candidate is None:
-            return False
+            return self.quantity != "" and self.quantity == term.quantity
         ours, theirs = self.candidate, term.candidate
         same = ours.name == theirs.name and ours.order == theirs.order
         return ours.port == theirs.port and (same or ours.holds(theirs))
@@ -239,6 +244,7 @@ class _Design:
         self._columns: list[list[Values]] = []
         """By column and record, shape (n_balances, n_bins)."""
         self.terms: list[_Term] = []
+        """What may be added: candidates of held shapes."""
         self._add([b.constant - b.forces(self.data.known, *self._sprung) for b in self.spectra])
         self._add_base()
         self._add_six()
@@ -273,6 +279,8 @@ class _Design:
         measured = bool(self.mechanism.inputs) or any(port.read for port in self.mechanism.ports)
         self.fixed = {0: 1.0}
         self.base: list[_Term] = []
+        self.within: list[_Term] = []
+        """The quantities released from their tolerances, and within them."""
         for row, name in enumerate(self.quantities):
             column = self._add([balance.terms[:, row] for balance in self.spectra])
             self.fixed[column] = self.nominal.get(name, 0.0)
@@ -280,8 +288,14 @@ class _Design:
             # Without a measured force the quantities that are known exactly set the scale.
             known = believed is not None and believed.known and not measured
             if (kind in _OF_BASE and not known) or kind == "zero":
-                lower = -np.inf if believed is None else SMALLEST_SHARE * believed.value
-                self.base.append(_Term((column,), np.array([lower]), quantity=name))
+                # A mass cannot be negative. What a damper describes may fall with the speed.
+                least = (
+                    SMALLEST_SHARE * believed.value if believed and kind != "damping" else -np.inf
+                )
+                self.base.append(_quantity(column, name, least, np.inf))
+                if believed is None or not believed.known:
+                    limits = believed.fit_limits if believed else (-np.inf, np.inf)
+                    self.within.append(_quantity(column, name, *limits))
 
     def _add_six(self) -> None:
         """Add the columns of least squares with six terms."""
@@ -352,7 +366,8 @@ class _Design:
         lower = [candidate.parameters[place].lower for place in free]
         bounds = np.where(np.array(lower) == 0.0, 0.0, -np.inf)
         fixed = self._add(constant) if moving else None
-        return _Term(tuple(columns), bounds, fixed, "", candidate, shape, tuple(free), bends)
+        above = np.full(len(bounds), np.inf)
+        return _Term(tuple(columns), bounds, above, fixed, "", candidate, shape, tuple(free), bends)
 
     def _linear(self, candidate: Candidate, start: tuple[float, ...]) -> tuple[list[int], bool]:
         """Return the unknowns in which a force is linear, and whether it depends on a stiffness."""
@@ -391,7 +406,7 @@ class _Design:
         """Products of all columns, by block and balance; shape (n_blocks, n_balances, p, p)."""
         each = 1
         if len(self.spectra) < _WHOLE_RECORDS:
-            each = -(-_FOLDS // len(self.spectra))
+            each = -(-_BLOCKS // len(self.spectra))
         found = []
         for record, balance in enumerate(self.spectra):
             signals = np.array(
@@ -436,15 +451,20 @@ class _Selection:
     def __init__(self, design: _Design) -> None:
         self.design = design
         # Each balance in units of what six terms leave of it, so that N and N.m can be added.
-        blocks = design.blocks
-        total = blocks.sum(axis=0)
+        total = design.blocks.sum(axis=0)
         left = self._six_coefficients(total.sum(axis=0))
         power = np.einsum("p,bpq,q->b", left, total, left)
         self.weight = 1.0 / np.maximum(power, 1e-300)
-        self.folds = np.einsum("b,kbpq->kpq", self.weight, blocks)
-        whole = self.folds.sum(axis=0)
-        self.parts = np.concatenate([whole - self.folds, whole[None]])
-        """What the folds are fitted to, and everything."""
+        self.blocks = np.einsum("b,kbpq->kpq", self.weight, design.blocks)
+        whole = self.blocks.sum(axis=0)
+        count = len(self.blocks)
+        width = max(round(_LEFT_OUT * count), 1)
+        self.windows = [slice(first, first + width) for first in range(count - width + 1)]
+        without = [whole - self.blocks[window].sum(axis=0) for window in self.windows]
+        self.parts = np.array([*without, whole])
+        """What the windows are predicted from, and everything."""
+        self.without_one = np.array([*(whole - self.blocks), whole])
+        """Everything but a block, and everything."""
 
     def _six_coefficients(self, product: Values) -> Values:
         design = self.design
@@ -461,12 +481,13 @@ class _Selection:
         return full
 
     def six_terms(self) -> Values:
-        """Return the coefficients of least squares with six terms, (n_folds + 1, p)."""
+        """Return the coefficients of least squares with six terms, (n_windows + 1, p)."""
         return np.array([self._six_coefficients(product) for product in self.parts])
 
-    def coefficients(self, terms: Sequence[_Term]) -> Values:
-        """Return the bounded least squares of terms by part, (n_folds + 1, p)."""
-        full = np.zeros((len(self.parts), self.parts.shape[1]))
+    def coefficients(self, terms: Sequence[_Term], parts: Values | None = None) -> Values:
+        """Return the bounded least squares of terms by part, by default (n_windows + 1, p)."""
+        parts = self.parts if parts is None else parts
+        full = np.zeros(parts.shape[:2])
         for column, value in self.design.fixed.items():
             full[:, column] = value
         for term in terms:
@@ -476,21 +497,31 @@ class _Selection:
         if not len(columns):
             return full
         lower = np.concatenate([term.lower for term in terms])
+        upper = np.concatenate([term.upper for term in terms])
         full[:, columns] = 0.0
-        pull = -np.einsum("kpq,kq->kp", self.parts[:, columns], full)
-        inner = self.parts[:, columns[:, None], columns]
-        size = np.sqrt(np.maximum(np.diag(self.parts[-1])[columns], 1e-300))
-        inner = inner / np.outer(size, size) + _RIDGE * np.eye(len(columns))
+        pull = -np.einsum("kpq,kq->kp", parts[:, columns], full)
+        size = np.sqrt(np.maximum(np.diag(parts[-1])[columns], 1e-300))
+        inner = parts[:, columns[:, None], columns] / np.outer(size, size)
+        inner += _RIDGE * np.eye(len(columns))
         found = np.linalg.solve(inner, (pull / size)[:, :, None])[:, :, 0] / size
-        for part in np.flatnonzero(np.any(found < lower, axis=1)):
-            found[part] = _bounded(inner[part], pull[part] / size, lower * size) / size
+        for part in np.flatnonzero(np.any((found < lower) | (found > upper), axis=1)):
+            limits = lower * size, upper * size
+            found[part] = _bounded(inner[part], pull[part] / size, *limits) / size
         full[:, columns] = found
         return full
 
     def errors(self, coefficients: Values) -> Values:
-        """Return the errors of the folds, each predicted from the others, shape (n_folds,)."""
-        parts = coefficients[:-1]
-        return len(parts) * np.einsum("kp,kpq,kq->k", parts, self.folds, parts)
+        """Return the errors of the blocks, each predicted from windows without it, (n_blocks,)."""
+        return np.einsum("b,kb->k", self.weight, self.errors_by_balance(coefficients))
+
+    def errors_by_balance(self, coefficients: Values) -> Values:
+        """Return the sums of squares of the blocks, (n_blocks, n_balances)."""
+        blocks = self.design.blocks
+        total, counted = np.zeros(blocks.shape[:2]), np.zeros((len(blocks), 1))
+        for values, window in zip(coefficients[:-1], self.windows, strict=True):
+            total[window] += (blocks[window] @ values) @ values
+            counted[window] += 1.0
+        return total / counted
 
     def of(self, terms: Sequence[_Term]) -> Values:
         """Return the errors of the folds with terms."""
@@ -509,7 +540,7 @@ class _Selection:
             if not extended:
                 break
             _, trial, best = min(extended, key=lambda each: each[0])
-            if not _falls(errors, trial):
+            if not _falls(errors, trial, len(extended)):
                 break
             chosen, errors = best, trial
         return self._pruned(chosen)
@@ -530,7 +561,7 @@ class _Selection:
             least = float(self.of(terms).mean())
             without = [[one for one in terms if one is not term] for term in terms]
             means = [float(self.of(one).mean()) for one in without]
-            if min(means) >= least:
+            if min(means) > least:
                 break
             terms = without[int(np.argmin(means))]
         return terms
@@ -554,29 +585,43 @@ def descriptive_model(title: str, finding: MechanismFinding) -> DescriptiveModel
         *(term for term in design.base if not term.quantity.startswith("stiffness")),
         *_simple(design.terms),
     ]
-    sets = [selection.grown(start) for start in (design.accepted, simple)]
-    terms = min([*sets, simple], key=lambda one: float(selection.of(one).mean()))
-    coefficients = selection.coefficients(terms)
+    accepted = [*design.within, *design.accepted]
+    terms, further = (selection.grown(start) for start in (simple, accepted))
+    if _falls(selection.of(terms), selection.of(further)):
+        terms = further
+    coefficients = selection.coefficients(terms, selection.without_one)
     laws = [law for term in terms for law in term.laws(coefficients[-1])]
-    values = {
-        name: float(coefficients[-1, 1 + row]) for row, name in enumerate(design.quantities)
-    }
-    mechanism = finding.mechanism
-    stated = {name: value for name, value in values.items() if name in mechanism.quantities}
+    values = {name: float(coefficients[-1, 1 + row]) for row, name in enumerate(design.quantities)}
     model = MechanismModel(
         f"{title}, descriptive",
-        mechanism.with_values(stated, exactly=False),
-        (*finding.believed, *laws, *finding.ripples.laws),
+        *_mechanism(finding.mechanism, values, (*finding.believed, *laws, *finding.ripples.laws)),
         finding.cutoff,
     )
-    six_values = selection.six_terms()
+    base, six_terms = design.within, selection.six_terms()
+    compared = [selection.coefficients(one) for one in (base, accepted, terms)]
     return DescriptiveModel(
         model,
         _values(design, terms, coefficients),
         _effects(finding, terms, coefficients),
-        _cross_validated(selection, coefficients, six_values),
-        _held_out(finding, values, laws, design, six_values[-1]),
+        _cross_validated(selection, [*compared, six_terms]),
+        _held_out(finding, values, laws, design, six_terms[-1]),
     )
+
+
+def _mechanism(
+    mechanism: Mechanism, values: Mapping[str, float], laws: Sequence[LawAt]
+) -> tuple[Mechanism, tuple[LawAt, ...]]:
+    """Return the mechanism with values and laws; a damper below zero is a law at its port."""
+    stated = {name: value for name, value in values.items() if name in mechanism.quantities}
+    falling = []
+    for port in mechanism.ports:
+        name = f"damping of {port.name}"
+        if stated.get(name, 1.0) <= 0.0:
+            least = SMALLEST_SHARE * port.damping.value
+            damper = LinearDamper(stated[name] - least)
+            falling.append(LawAt("viscous_friction", port.name, damper))
+            stated[name] = least
+    return mechanism.with_values(stated, exactly=False), (*laws, *falling)
 
 
 def _candidates(finding: MechanismFinding, design: _Design, six: Values) -> list[Candidate]:
@@ -602,7 +647,8 @@ def _simple(terms: Sequence[_Term]) -> list[_Term]:
             if candidate is None or candidate.name != name or candidate.form:
                 continue
             weight = any(
-                one.candidate and (one.candidate.name, one.candidate.port) == ("gravity", candidate.port)
+                one.candidate
+                and (one.candidate.name, one.candidate.port) == ("gravity", candidate.port)
                 for one in found
             )
             if not (name == "linear_stiffness" and weight):
@@ -610,26 +656,32 @@ def _simple(terms: Sequence[_Term]) -> list[_Term]:
     return found
 
 
-def _falls(before: Values, after: Values) -> bool:
-    """Tell whether the error falls by more than the standard error of its change."""
+def _falls(before: Values, after: Values, tried: int = 1) -> bool:
+    """Tell whether errors of blocks, (n_blocks,), fall by more than the standard error of that.
+
+    Of several that were ``tried`` the best falls by chance by so many standard errors as is
+    expected of the largest of as many normal numbers (Donoho and Johnstone, Biometrika 81, 1994).
+    """
     change = before - after
-    return bool(change.mean() > change.std(ddof=1) / len(change) ** 0.5)
+    chance = max(1.0, (2.0 * np.log(tried)) ** 0.5)
+    return bool(change.mean() > chance * change.std(ddof=1) / len(change) ** 0.5)
 
 
-def _bounded(inner: Values, pull: Values, lower: Values) -> Values:
-    """Return the least squares with lower bounds: what goes below one stays at it."""
+def _quantity(column: int, name: str, lower: float, upper: float) -> _Term:
+    return _Term((column,), np.array([lower]), np.array([upper]), quantity=name)
+
+
+def _bounded(inner: Values, pull: Values, lower: Values, upper: Values) -> Values:
+    """Return the least squares within bounds: what goes beyond one stays at it."""
     found, free = np.zeros(len(pull)), np.ones(len(pull), dtype=bool)
     while free.any():
-        held = np.where(free, 0.0, np.where(np.isfinite(lower), lower, 0.0))
-        rows = np.ix_(free, free)
-        found = held.copy()
-        found[free] = np.linalg.solve(inner[rows], (pull - inner @ held)[free])
-        below = free & (found < lower)
-        if not below.any():
+        held = np.where(free, 0.0, found)
+        found[free] = np.linalg.solve(inner[np.ix_(free, free)], (pull - inner @ held)[free])
+        beyond = free & ((found < lower) | (found > upper))
+        found = np.clip(found, lower, upper)
+        if not beyond.any():
             break
-        free &= ~below
-    else:
-        found = lower.copy()
+        free &= ~beyond
     return found
 
 
@@ -664,14 +716,19 @@ def _interval(values: Values) -> tuple[float, float]:
 def _values(
     design: _Design, terms: Sequence[_Term], coefficients: Values
 ) -> dict[str, DescribedValue]:
-    free = {column for term in terms for column in term.columns}
+    limits = {
+        term.quantity: (float(term.lower[0]), float(term.upper[0]))
+        for term in terms
+        if term.quantity
+    }
     found = {}
     for row, name in enumerate(design.quantities):
-        column = coefficients[:, 1 + row]
-        interval = _interval(column) if 1 + row in free else None
-        found[name] = DescribedValue(
-            float(column[-1]), interval, base_unit(design.mechanism, name)
-        )
+        column, interval = coefficients[:, 1 + row], None
+        value = float(column[-1])
+        if name in limits and not np.isclose(value, limits[name], rtol=1e-9, atol=0.0).any():
+            lower, upper = np.clip(_interval(column), *limits[name]).tolist()
+            interval = lower, upper
+        found[name] = DescribedValue(value, interval, base_unit(design.mechanism, name))
     return found
 
 
@@ -698,21 +755,16 @@ def _effects(
 
 
 def _cross_validated(
-    selection: _Selection, coefficients: Values, six: Values
+    selection: _Selection, compared: Sequence[Values]
 ) -> tuple[BalanceErrors, ...]:
     """Return the errors of the training records, each block predicted from the others."""
     design = selection.design
-    data, verdict = design.data, design.finding.verdict
-    fitted = [root_mean_square(data, one.residuals) for one in (verdict.base, verdict.accepted)]
     rms = [
-        np.sqrt(
-            np.einsum("kp,kbpq,kq->b", one[:-1], design.blocks, one[:-1]) / design.samples
-        )
-        for one in (coefficients, six)
+        np.sqrt(selection.errors_by_balance(one).sum(axis=0) / design.samples) for one in compared
     ]
     return tuple(
         BalanceErrors("", name, unit_of(design.mechanism, name), *map(float, errors))
-        for name, *errors in zip(data.names, *fitted, *rms, strict=True)
+        for name, *errors in zip(design.names, *rms, strict=True)
     )
 
 
