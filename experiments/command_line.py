@@ -26,10 +26,10 @@ from pymoo_hdte.surrogate.threads import usable_cores
 
 FAILED = 1
 """Exit code where the workers or the disk fail, or a stored outcome or an extra is missing."""
-SMALL = [one for one in EXPERIMENTS if one.has_small_version]
-STORED = [one for one in EXPERIMENTS if one.reads_outcome]
-SEEDED = [one for one in EXPERIMENTS if one.takes_seeds]
-LIMITED = [one for one in EXPERIMENTS if one.takes_cases]
+SMALL = [experiment for experiment in EXPERIMENTS if experiment.has_small_version]
+STORED = [experiment for experiment in EXPERIMENTS if experiment.reads_outcome]
+SEEDED = [experiment for experiment in EXPERIMENTS if experiment.takes_seeds]
+LIMITED = [experiment for experiment in EXPERIMENTS if experiment.takes_cases]
 SEEDS = 20
 """Runs of every algorithm: the paper's number, and the default here."""
 IN_USE = ".in-use"
@@ -195,10 +195,10 @@ def _listed(text: str) -> tuple[str, ...]:
 
 def _counted(text: str) -> range:
     """Return what a number, from 1 on, or a range stands for."""
-    first, dash, last = text.partition("-")
+    start, dash, end = text.partition("-")
     if not dash:
         return range(1, _positive(text) + 1)
-    counted = range(_positive(first), _positive(last) + 1)
+    counted = range(_positive(start), _positive(end) + 1)
     if not counted:
         raise argparse.ArgumentTypeError(f"{text!r} is not a range that rises, like 21-40")
     return counted
@@ -226,7 +226,7 @@ def _chosen(name: str | None, parser: argparse.ArgumentParser) -> list[Experimen
 
 
 def _names(experiments: Sequence[Experiment]) -> str:
-    return ", ".join(one.name for one in experiments)
+    return ", ".join(experiment.name for experiment in experiments)
 
 
 def _list_of_experiments() -> str:

@@ -11,29 +11,28 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from experiments.comparing.runs import AS_PRINTED, FIRST_STEP, VELOCITIES
-from experiments.paper import later_prototypes, printed_times, published, table2, table5
+from experiments.paper import later_prototypes, published, table2, table5, table8
 from experiments.paper.anytime.data import OF_TABLE_7, Case, Contested, Scores, committed_scores
-from experiments.paper.anytime.leads import RIVALS, totals_of, who_finds
 from experiments.paper.anytime.measures import RETURNED
 from experiments.paper.anytime.moments import COMMON, EXACT, FRESH
 from experiments.paper.anytime.readings import readings
-from experiments.paper.anytime.sentences import closest_sentence
+from experiments.paper.anytime.sentences import EVERY_RIVAL, closest_sentence, totals_of, who_finds
 from experiments.paper.anytime.tables import SCALE, STATED
 from experiments.paper.calibrating import experiment as calibration
 from experiments.paper.calibrating.data import Outcome, read_outcomes
 from experiments.paper.calibrating.rigid import N_PARAMETERS, simplest
 from experiments.paper.calibrating.tables import best_rungs
-from experiments.paper.design_tables import dominated
 from experiments.paper.inference import experiment as inference
 from experiments.paper.inference.data import read_fits
-from experiments.paper.prototypes import ranking
+from experiments.paper.prototypes import consistency
+from experiments.paper.table8 import dominated
 from experiments.published_values import TABLE_5, TABLE_7, TABLE_8, TABLE_9, Moments
 from experiments.runner.committed import committed_file
 from experiments.runner.result import WITHIN_PAPER, significant
 from experiments.runner.store import write_atomically
+from experiments.runner.texts import filled
 from experiments.studies import cost
 from pymoo_hdte.decision import PREFERENCES, WeightedUtopia
 from pymoo_hdte.problems import RobustDTE
@@ -46,40 +45,33 @@ ORDER = 3
 
 def page() -> str:
     """Return the text of the page."""
-    environment = Environment(
-        loader=FileSystemLoader(Path(__file__).parent / "templates"),
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        keep_trailing_newline=True,
-        autoescape=False,
-    )
-    return environment.get_template("paper.md").render(values())
+    return filled("paper.md", **values())
 
 
-def in_three_sentences() -> tuple[str, str, str]:
-    """Return what README and ``paper.md`` say about the paper."""
+def in_short() -> tuple[str, ...]:
+    """Return the sentences of README and ``paper.md`` about the paper."""
     printed, drive = published.printed_equations(), simplest()
     low, high = (printed[reading].dte for reading in published.READINGS)
     scores, best = committed_scores(), _best_of_the_ladder()
     law, free = (totals_of(scores, velocity) for velocity in (AS_PRINTED, FIRST_STEP))
     return (
-        f"The paper contradicts itself where no model is needed: by its own validation figures, "
-        f"prototype {ranking.HIGHEST} must be predicted "
-        f"{significant(ranking.bounds().least_lead, 3)} arcsec above prototype {ranking.LOWEST}, "
-        f"whose static error is {significant(ranking.excess(), 2)} arcsec larger.",
+        "The paper contradicts itself: by its validation figures, prototype "
+        f"{consistency.HIGHEST} must be predicted "
+        f"{significant(consistency.bounds().least_lead, 3)} arcsec above prototype "
+        f"{consistency.LOWEST}, whose static error is {significant(consistency.excess(), 2)} "
+        "arcsec larger.",
         f"Its equations as printed give a transmission error of {low:.0f} or {high:.0f} arcsec, "
-        f"depending on how the static error is read, where it has "
-        f"{TABLE_8['initial'].mean_arcsec:.0f}; a rigid drive of which "
-        f"{significant(100.0 * drive.torsion_share, 1)} % of the torsion is read as error, with "
-        f"{N_PARAMETERS} parameters, has as good a BIC as our model with {best.n_parameters}, "
-        f"though a coarser fit.",
+        "depending on how the static error is read; the paper states "
+        f"{TABLE_8['initial'].mean_arcsec:.0f}.",
+        f"A rigid drive that reads {significant(100.0 * drive.torsion_share, 1)} % of the torsion "
+        f"as error has {N_PARAMETERS} parameters and as good a BIC as our model with "
+        f"{best.n_parameters}, though it fits less closely.",
         f"At the stated budget, with the paper's samples, "
-        f"{who_finds(scores, Contested(MODEL, COMMON, AS_PRINTED))}, so that the advantage over "
-        f"NSGA-II does not come out; below 100 particles AMP-MOPSO is ahead of MOPSO in "
-        f"{law.ahead['MOPSO']} of {law.cells} settings and of NSGA-II in {law.ahead['NSGA-II']}, "
-        f"but in {free.ahead['MOPSO']} and {free.ahead['NSGA-II']} under another law of first "
-        f"velocities.",
+        f"{who_finds(scores, Contested(MODEL, COMMON, AS_PRINTED))}.",
+        "AMP-MOPSO therefore shows no advantage over NSGA-II there.",
+        f"Below 100 particles it is ahead of MOPSO in {law.ahead['MOPSO']} of {law.cells} settings "
+        f"and of NSGA-II in {law.ahead['NSGA-II']}; under another law of first velocities in "
+        f"{free.ahead['MOPSO']} and {free.ahead['NSGA-II']}.",
     )
 
 
@@ -113,7 +105,7 @@ def values() -> dict[str, Any]:
             moments: who_finds(scores, Contested(MODEL, moments, AS_PRINTED))
             for moments in (EXACT, COMMON, FRESH)
         },
-        "rivals": RIVALS,
+        "rivals": EVERY_RIVAL,
         "laws": {law: totals_of(scores, law) for law in VELOCITIES},
         "n_seeds": len(scores.values[_case(Contested(MODEL, EXACT, AS_PRINTED), OF_TABLE_7[0])]),
         "closest": closest_sentence(readings(scores)),
@@ -124,10 +116,10 @@ def values() -> dict[str, Any]:
 
 def _within_paper() -> Iterator[str]:
     for parts in (
-        ranking.of_the_first_page(),
+        consistency.of_the_first_page(),
         {WITHIN_PAPER: table2.of_the_first_page()},
         later_prototypes.of_the_first_page(),
-        printed_times.of_the_first_page(),
+        table8.of_the_first_page(),
     ):
         yield from parts.values()
 

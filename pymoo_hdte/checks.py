@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 MOST_SHOWN = 200
-"""Most characters of a field or value in a message; a damaged file may hold a million."""
+"""Largest number of characters shown of a field or value; a damaged file may hold a million."""
 
 
 class InvalidInput(ValueError):
@@ -50,9 +50,9 @@ class SeveralComplaints(InvalidInput):
     """
 
     def __init__(self, complaints: Sequence[InvalidInput]) -> None:
-        first = complaints[0]
-        super().__init__(first.field, first.value, first.allowed)
-        self.args = ("\n".join(str(one) for one in complaints),)
+        first_complaint = complaints[0]
+        super().__init__(first_complaint.field, first_complaint.value, first_complaint.allowed)
+        self.args = ("\n".join(str(complaint) for complaint in complaints),)
         self.complaints = tuple(complaints)
 
     def __reduce__(self) -> tuple[Any, ...]:

@@ -135,7 +135,7 @@ def suggestion(unit: str, units: Collection[str]) -> str:
     ----------
     unit : str
     units : collection of str
-        Those that are allowed.
+        Units that are allowed.
 
     Examples
     --------
@@ -149,8 +149,8 @@ def suggestion(unit: str, units: Collection[str]) -> str:
         known, factor, _ = FOREIGN[foreign]
         return f'; for {unit} write unit = "{known}" and scale = {factor:.6g}'
     folded = {written.casefold(): meant for written, meant in _KNOWN.items() if meant in units}
-    near = get_close_matches(_plain(unit).casefold(), folded, 1)
-    return f"; is it {folded[near[0]]!r}?" if near else ""
+    similar = get_close_matches(_plain(unit).casefold(), folded, 1)
+    return f"; is it {folded[similar[0]]!r}?" if similar else ""
 
 
 _ENDINGS = {

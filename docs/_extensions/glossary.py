@@ -11,7 +11,7 @@ from pymoo_hdte._reports.glossary import GLOSSARY
 
 _HEAD = """# Glossary
 
-Every report ends with those of these words that belong to it.
+Each report ends with the terms that it uses.
 """
 
 

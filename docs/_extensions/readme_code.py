@@ -14,7 +14,9 @@ from docutils.parsers.rst import Directive
 from sphinx.application import Sphinx
 
 README = Path(__file__).parents[2] / "README.md"
-_BLOCK = re.compile(r"^```(python|sh)\n(.*?)^```\n(?:\s*prints `(.*?)`)?", re.DOTALL | re.MULTILINE)
+_BLOCK = re.compile(
+    r"^```(python|sh)\n(.*?)^```\n(?:\s*(?:This )?prints `(.*?)`)?", re.DOTALL | re.MULTILINE
+)
 
 
 def block_with(word: str, text: str) -> tuple[str, str, str]:

@@ -2,7 +2,7 @@
 
     python docs/examples/virtual_campaign.py FOLDER
 
-FOLDER must be new or empty. The believed drive has no ripple, and its parameters are off within
+FOLDER must be new or empty. The nominal drive has no ripple, and its parameters are off within
 their tolerances, as those of a real one are. The script needs a copy of the whole repository, since
 the rig belongs to its experiments and not to the package.
 """

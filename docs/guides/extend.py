@@ -51,7 +51,8 @@ from pymoo_hdte.problems import RobustDTE
 # derivatives, which Newton's method needs. Laws that depend on no angle inherit ``Aperiodic``;
 # those that vary with one inherit ``Periodic`` and name their order, so that solvers keep its
 # harmonics. What else solvers ask of a law (inner states, clearance, breakaway) has a default in
-# ``pymoo_hdte.effects.law.Behaviour``.
+# ``pymoo_hdte.effects.law.Behaviour``. There ``formula`` and ``lumped`` tell exports to other
+# tools what the law is.
 #
 # The ``Effect`` names the ports of a drive where the law makes sense, its numbers with their units,
 # its sentence in a report, what it holds as a special case, and a *guess*: from the sizes of a port
@@ -106,8 +107,8 @@ ax.legend()
 plt.show()
 
 # %%
-# Measured records name it too. A motor drives the wheel to and fro; from its torque and the angle,
-# both with noise, the workflow finds what a frictionless wheel lacks.
+# The effect can also be found in measured records. A motor drives the wheel to and fro; from its
+# torque and angle, both with noise, `analyse` finds what a frictionless wheel lacks.
 
 wheel = Mechanism(flywheel.inertias, flywheel.ports, [Input("torque", {"angle": 1.0})])
 time = np.arange(0.0, 20.0, 0.004)
@@ -143,7 +144,7 @@ print(f"mean motor torque {motor[0]:.4f} N.m, with the drag {motor[1]:.4f} N.m")
 print(f"difference {motor[1] - motor[0]:.4f} N.m, in closed form {expected:.4f} N.m")
 
 # %%
-# The integrator knows it, the robust problem, and model files.
+# The integrator, the robust problem and model files know it as well.
 
 steady = draggy.dte_arcsec(design[np.newaxis])[0]
 integrated = simulate_drive(draggy, design, ramp=0.2, settle=0.3).dte_arcsec()
@@ -155,8 +156,8 @@ print(f"robust problem on it: mean {mean:.1f}, std {std:.1f} arcsec")
 print(model_toml(scenario)[-170:])
 
 # %%
-# And a campaign on a rig that has it gets it named, with its values, and as a model to go on with.
-# Here the rig is virtual.
+# A campaign on a rig that has the effect gets it named, with its values and a revised model. Here
+# the rig is virtual.
 
 generator = np.random.default_rng(3)
 rig = draw_rig(virtual_campaign.BELIEVED, (), generator)
@@ -165,7 +166,7 @@ analysis = analyse(with_effects(campaign, rig, [lubricant]))
 print(f"{analysis.verdict.status}: {analysis.revised_model().effects[-1]}")
 
 # %%
-# From the command line, the file goes with the campaign or rig; nothing has to be registered:
+# On the command line, give the file beside the campaign or rig; nothing has to be registered:
 #
 # .. code-block:: sh
 #
@@ -226,7 +227,7 @@ print(f"belt: expected {frequency:.1f} Hz, {crossings / 2 / 0.5:.0f} Hz counted 
 #    :language: python
 #
 # Turning points of an oscillator with viscous and dry friction are known in closed form
-# (Den Hartog, Transactions of the ASME 53, 1931). Nothing is told of the dry friction.
+# (Den Hartog, Transactions of the ASME 53, 1931). The model lacks the dry friction.
 
 stiffness, frequency, damping, friction, noise = 4e3, 63.0, 0.8, 0.03, 2e-6
 shrink = np.exp(-0.5 * np.pi * damping * frequency / stiffness)
@@ -240,7 +241,9 @@ for name, deflection in (("wide", 4e-3), ("less", 3e-3), ("narrow", 1.5e-3), ("h
 analysis = analyse(Oscillator(stiffness, frequency, 0.85, 0.2, noise, tests))
 print(f"{analysis.verdict.status}: {analysis.revised_model().effects[0]}, {friction} N is hidden")
 print(analysis.locate().sentence)
-print(f"error of prediction, in deviations of the noise: {analysis.prove().overall.after:.2f}")
+print(
+    f"prediction error, in standard deviations of the noise: {analysis.prove().overall.after:.2f}"
+)
 
 # %%
 # A part of an algorithm
@@ -324,9 +327,9 @@ for rule in (ConstantWeight(), LinearDecrease(), EntropyWeight()):
 #        "Does a stiffer drive have a smaller error?",
 #    ),
 #
-# and from then on ``python -m experiments stiffer`` runs it, stores its tables as CSV and its
-# figures as PNG, gives it a page and a card with question and answer on ``index.html``. The folder
-# is no part of the installed package; in a copy of the repository it is there.
+# after which ``python -m experiments stiffer`` runs it, stores its tables as CSV and its figures as
+# PNG, and gives it a page and a card on ``index.html``. The folder is part of the repository, but
+# not of the installed package.
 #
 # Long work is cut into *jobs*. A job holds all its settings, its seed included, and names itself by
 # them. The campaign runs jobs on as many processes or machines as the user allows, keeps every

@@ -194,7 +194,7 @@ folder.cleanup()
 # ---------
 #
 # The drive is a simulator like any other. `RobustDTE` fits a tensor polynomial to it, of order 3 to
-# 1024 runs, and tells nothing of its error; here an error is asked for, and the runs follow.
+# 1024 runs, without an error estimate; here the wanted accuracy decides the number of runs.
 
 model = preset("calibrated")
 paper = RobustDTE()
@@ -224,9 +224,8 @@ axes_of_drive = {"K": "K [N.m/rad]", "J_in": "J_in [kg.m2]"}
 result = pictures(joint, drive, "dte", nominal, axes_of_drive)
 
 # %%
-# The band is wide beside the front: designs along it cannot be told apart with certainty at this
-# accuracy. Is it an honest one? The drive model itself is asked 2,000 times around each of 20
-# designs.
+# The band is wide compared with the front: at this accuracy designs along it are indistinguishable.
+# Is the band right? The drive model itself is run 2,000 times around each of 20 designs.
 
 rng = np.random.default_rng(1)
 scatter = np.column_stack([one.sample(rng, 2_000) for one in paper.inputs])

@@ -5,8 +5,8 @@ Make your simulator robust
 Built parts differ from their drawings, and loads from their forecasts. A robust design is good on
 average and scatters little. ``robust_problem`` takes a simulator, what is designed and what
 scatters, and returns a problem of pymoo whose objectives are mean, standard deviation, quantiles
-or other statistics. It needs some hundred runs instead of thousands for each design, as it grows a
-polynomial surrogate of the simulator, the moments of which are exact.
+or other statistics. It builds a polynomial surrogate of the simulator, whose moments are exact, so
+it needs some hundred runs in all instead of thousands for each design.
 """
 
 import tempfile
@@ -32,8 +32,8 @@ from pymoo_hdte.problems import (
 # A simulator
 # -----------
 #
-# Any deterministic function of named numbers may be given; one that no polynomial follows within
-# the budget is refused. It may return one number, or several by name. Here it is an
+# Any deterministic function of named numbers will do; one that no polynomial follows within the
+# budget is refused. It may return one number, or several by name. Here it is an
 # oscillator that stands on a shaking floor: how much of the shaking gets through, and how far its
 # spring is stretched.
 
@@ -60,8 +60,8 @@ designs = {
 noise = {"mass": chaospy.Uniform(18.0, 22.0), "speed": norm(80.0, 2.0)}
 
 # %%
-# Objectives and constraints are statistics of a response. Runs and memory are told before the first
-# run, with the region in which the simulator will be called (``progress=False`` keeps it quiet).
+# Objectives and constraints are statistics of a response. Runs and memory are estimated before the
+# first run, with the region in which the simulator will be called (``progress=False`` hides this).
 
 problem = robust_problem(
     mount,
@@ -137,7 +137,7 @@ print("the band covers at least 95 % of the designs:", bool(np.all(covered >= 0.
 #
 # The problem is an ordinary one of pymoo, with gradients (``dF``, ``dG``) for those who want them.
 # ``F_band`` is the estimated half-width of the error of each objective: designs that differ by less
-# cannot be told apart.
+# are indistinguishable.
 
 result = minimize(problem, ElitistSwarm(), ("n_gen", 60), seed=1)
 half = problem.band(result.X)
@@ -152,8 +152,8 @@ plt.show()
 # When it refuses
 # ---------------
 #
-# A surrogate that is not as accurate as asked for when the budget is spent is not returned, nor is
-# one that makes a positive response negative. The error says how bad it is, and where.
+# A surrogate that misses the wanted accuracy within the budget is refused, as is one that makes a
+# positive response negative. The error says how bad it is, and where.
 
 try:
     robust_problem(

@@ -2,8 +2,8 @@ r"""
 Mathematics: the rules of a verdict
 ===================================
 
-``pymoo-hdte discrepancy`` says of a model and of measurements whether something is missing, and
-what. This page says by which rules, and shows the statistics behind them. All thresholds stand in
+``pymoo-hdte discrepancy`` says whether a model lacks something that its measurements show, and
+what. This page gives the rules and the statistics behind them. All thresholds are in
 `pymoo_hdte.discrepancy._selection.rules.Rules`, from which this page reads them.
 """
 
@@ -29,16 +29,16 @@ from pymoo_hdte.mechanism import BelievedValue, Input, Mechanism, Port, Record
 #
 # Records become *features*, such as amplitudes and phases of the order lines of a drive, or the
 # spectrum of the force balance of another machine. Prediction minus feature, divided by the noise
-# (*whitened*, so that correlations of the noise are taken out), gives residuals :math:`r` that are
+# (*whitened*, which removes correlations of the noise), gives residuals :math:`r` that are
 # independent and of unit variance if the model is right. The misfit is
 #
 # .. math::
 #
 #    \chi^2 = \sum_n r_n^2 .
 #
-# Base parameters are fitted first, within the tolerances in which they are believed; a fit never
-# leaves these. A right model then leaves :math:`\chi^2` near its degrees of freedom :math:`\nu`
-# (residuals less fitted parameters), with standard deviation :math:`\sqrt{2 \nu}`.
+# Base parameters are fitted first, within their stated tolerances. A right model then leaves
+# :math:`\chi^2` near its degrees of freedom :math:`\nu` (residuals less fitted parameters), with
+# standard deviation :math:`\sqrt{2 \nu}`.
 #
 # Is anything missing?
 # --------------------
@@ -59,7 +59,7 @@ print(f"gain that speaks against an adequate model: {RULES.single_effect_gain:g}
 # %%
 # An effect that adds a signal of :math:`\lambda` to the sum of squares (:math:`\lambda` = features
 # times signal to noise, squared) makes :math:`\chi^2` non-central. From the sizes at which it
-# passes the limit one sees what a campaign can detect at all:
+# passes the limit follows what a campaign can detect at all:
 
 degrees_of_freedom = 400
 limit = adequate(degrees_of_freedom, RULES)
@@ -98,8 +98,8 @@ plt.show()
 #
 #    \mathrm{BIC} = \chi^2 + p \, \ln \, n ,
 #
-# ranks them; the smallest is chosen. The **evidence** decides whether the data can tell two of them
-# apart. It is minus twice the logarithm of the probability of the data under a model, by Laplace's
+# ranks them; the smallest is chosen. The **evidence** decides whether the data separate two of
+# them. It is minus twice the logarithm of the probability of the data under a model, by Laplace's
 # approximation (MacKay, Neural Computation 4, 1992),
 #
 # .. math::
@@ -153,9 +153,9 @@ print(f"share of the excess removed at least       {RULES.explained_share:g}")
 print(f"  in each part of the data                 {RULES.explained_part_share:g}")
 print(f"  by effects of an exact form              {RULES.exact_share:.6f}")
 print(f"chi-square / nu that does for exact forms  {RULES.exact_chi_square:g}")
-print(f"a second effect removes of what is left    {RULES.second_share:g}")
+print(f"a second effect removes of the residual    {RULES.second_share:g}")
 print(f"  or, beyond all forms of the first        {RULES.beyond_forms_share:g}")
-print(f"hypotheses are alike within an evidence of     {RULES.evidence_distance:g}")
+print(f"indistinguishable within an evidence of    {RULES.evidence_distance:g}")
 print(f"  or, of forms not exact, if they leave    {RULES.form_ratio:g} times as much")
 
 # %%
@@ -171,8 +171,8 @@ print(f"  or, of forms not exact, if they leave    {RULES.form_ratio:g} times as
 #      - The base passes the limit, and no candidate would gain enough.
 #    * - ``unlisted``
 #      - It does not, and no set explains the misfit either, in the listed form of its laws or in
-#        another, or the error on records kept out of the fit does not shrink with it as it should:
-#        less than half of what a true effect would remove is gone, and that is no chance.
+#        another, or the prediction error on held-out records does not shrink as it should:
+#        less than half of what a true effect would remove is gone, beyond chance.
 #    * - ``class``
 #      - A set explains it, and another set of as many effects that explains it too lies within the
 #        distances above. Where even the chosen form leaves more than noise, that of the evidence is
@@ -183,7 +183,7 @@ print(f"  or, of forms not exact, if they leave    {RULES.form_ratio:g} times as
 #        a bound is no other. A corner that ended as sharp as points can resolve is at no bound.
 #    * - ``partial``
 #      - As before, but one of its values ended at a bound, the interval of a strength contains
-#        nothing, a sensor's zero or gain ended far beyond what is stated of it, values out of
+#        nothing, a sensor's zero or gain ended far outside its stated limits, values out of
 #        tolerance stand beside a curve that leaves more than noise, or more than three times the
 #        noise is left. Or it explains the misfit in another form of its law only.
 #    * - ``parameter``
@@ -203,12 +203,12 @@ print(f"share of the excess removed at least       {RULES.partial_share:g}")
 print(f"a law may be the form of its special case  {RULES.form_share:g} of its strength")
 
 # %%
-# Two of these rules make a set simpler before it is judged. A law gives way to its special case if
+# Two of these rules simplify a set before it is selected. A law gives way to its special case if
 # it ended at a bound, or if the special case leaves no more than noise and no more beyond the law
 # than a model is off by: friction that falls by a hundredth may be dry friction, and both are in
 # one class. Fewer values out of tolerance may stand beside the special case, if any do. And beside
 # effects that leave no more than noise, a further one is dropped if its strength may be nothing, or
-# if the records kept out of the fit deny it.
+# if the held-out records deny it.
 
 print(f"a model is off by                          {RULES.model_accuracy:g} of an amplitude")
 
@@ -239,9 +239,9 @@ for status, right in (
 #
 #    C = \left( J^\top J / \max(\chi^2 / \nu, 1) + 12 \, W^{-2} \right)^{-1} .
 #
-# What the model leaves beyond noise counts as noise (Birge, Physical Review 40, 1932), and bounds
-# count as the variance of a uniform distribution, so that a value that no record determines is as
-# uncertain as it is believed to be. For the line above the interval is that of ordinary least
+# An unexplained residual counts as noise (Birge, Physical Review 40, 1932), and bounds count as the
+# variance of a uniform distribution. A value that no record determines is therefore as uncertain as
+# its tolerance. For the line above the interval is that of ordinary least
 # squares, since the bounds are wide:
 
 sigma = float(np.sqrt(found.covariance[0, 0]))
@@ -291,14 +291,15 @@ for one in sorted([verdict.chosen, *verdict.alternatives], key=lambda one: one.b
     print(f"{mark} {one.label:56}{gain:10.0f}{one.explained:9.4f}{one.fit.evidence:12.0f}")
 
 # %%
-# Of another machine than a drive, no model meets the noise of its sensors. There all of this
-# is measured in units of the *rest*, which is what up to three effects leave, and four rules are
-# added: a named effect removes at least half of the
-# power of the misfit beyond the noise of the sensors; of models that leave about as much, the one
-# with the fewest unknowns is named; a law that merely contains the named one is no other
-# explanation; and what is among the effects that define the rest, down to which these fit in any
-# case, is named in part where it removes less than nine tenths of that power. They are compared as
-# well if the search finds nothing to name, and the largest force is named first.
+# No model of a machine other than a drive fits down to the noise of its sensors. There all of this
+# is measured in units of the *residual* that up to three effects leave, and four rules are added:
+#
+# - a named effect removes at least half of the power of the misfit beyond sensor noise;
+# - of models with about the same residual, the one with the fewest unknowns is named;
+# - a law that merely contains the named one is no other explanation;
+# - one of the effects that define the residual is `partial` if it removes less than nine tenths of
+#   that power. These are compared even if the search names nothing, and the largest force is named
+#   first.
 
 # %%
 # Change a rule

@@ -11,8 +11,7 @@ from importlib.util import find_spec
 import numpy as np
 from pymoo.core.problem import Problem
 
-from experiments.comparing.offers import Offer
-from experiments.comparing.peers_pymoo import OWN, PYMOO, run_pymoo
+from experiments.comparing.peers_pymoo import OWN, PYMOO, Offer, run_pymoo
 
 EVALUATIONS, SPENT = "evaluations", "spent"
 """Columns of a run: its budgets, and what it spent of each."""

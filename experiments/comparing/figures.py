@@ -7,10 +7,13 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
 from matplotlib.ticker import LogFormatter
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from experiments.comparing.paired import MODELS, Comparison
+from experiments.comparing.ranks import cliques
+from pymoo_hdte.checks import InvalidInput, finite_array, one_of
 
 # Okabe and Ito's palette, told apart by colour-blind readers.
 BLUE, ORANGE, GREEN, PINK, YELLOW = "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00"
@@ -126,3 +129,164 @@ def reference_line(axis: Axes, *values: NDArray[np.float64]) -> None:
     """Draw the diagonal over the range of all ``values``, for a plot of predicted on true."""
     ends = [min(v.min() for v in values), max(v.max() for v in values)]
     axis.plot(ends, ends, color=GREY, linewidth=1)
+
+
+_INK = "#1F2933"
+_BAR_STEP, _NAME_STEP = 0.38, 0.75
+"""Distances between bars of cliques and between names, where the axis of ranks is at 0."""
+
+
+def critical_difference_plot(
+    names: Sequence[str], average_ranks: ArrayLike, difference: float, highlight: str
+) -> Figure:
+    """Draw Demsar's diagram: a bar joins the algorithms whose average ranks do not differ.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Of the algorithms.
+    average_ranks : array_like, shape (algorithms,)
+        1 is the best.
+    difference : float
+        Critical difference of two average ranks, from `ranks.nemenyi_difference`.
+    highlight : str
+        Algorithm to draw in bold.
+
+    Raises
+    ------
+    InvalidInput
+        For ranks that do not fit the names, a highlight that is none of them, or a difference
+        that is not above zero.
+    """
+    ranks = finite_array("average_ranks", average_ranks, (len(names),))
+    one_of("highlight", highlight, names)
+    groups = [group for group in cliques(ranks, difference) if len(group) > 1]
+    order = np.argsort(ranks, kind="stable").tolist()
+    n = len(order)
+    n_left = -(-n // 2)
+    first_name = 0.6 + _BAR_STEP * len(groups)
+    bottom = first_name + _NAME_STEP * n_left
+    figure, axes = grid(1, 1, width=9.5, height=0.37 * (bottom + 2.6))
+    axis = axes.flat[0]
+    axis.set_axis_off()
+    axis.set(xlim=(1 - 0.42 * (n - 1), n + 0.42 * (n - 1)), ylim=(bottom, -2.6))
+    _draw_scale(axis, n, difference)
+    # The outermost name of either side stands highest, so that no two leaders cross.
+    for side, members in ((-1, order[:n_left]), (1, order[: n_left - 1 : -1])):
+        for place, index in enumerate(members):
+            height = first_name + _NAME_STEP * place
+            _draw_leader(axis, side, n, names[index], ranks[index], height, highlight)
+    for place, group in enumerate(groups):
+        ends = ranks[[group[0], group[-1]]] + np.array([-0.005, 0.005]) * (n - 1)
+        axis.plot(ends, [0.4 + _BAR_STEP * place] * 2, color=_INK, linewidth=4.5,
+                  solid_capstyle="butt", zorder=3)  # fmt: skip
+    return figure
+
+
+def rank_heatmap(
+    ranks: ArrayLike,
+    problems: Sequence[str],
+    groups: Sequence[str],
+    algorithms: Sequence[str],
+    highlight: str,
+) -> Figure:
+    """Print the rank of every algorithm on every problem, the darker the better.
+
+    Parameters
+    ----------
+    ranks : array_like, shape (problems, algorithms)
+        From `experiments.comparing.ranks.problem_ranks`.
+    problems : sequence of str
+        Names of the rows.
+    groups : sequence of str
+        The group of each problem; groups stand apart, in the order of their first problems, each
+        with its average ranks below.
+    algorithms : sequence of str
+        Names of the columns, drawn in this order.
+    highlight : str
+        Algorithm to draw in a frame.
+
+    Raises
+    ------
+    InvalidInput
+        For ranks or groups that do not fit the names, or a highlight that is none of them.
+    """
+    cells = finite_array("ranks", ranks, (len(problems), len(algorithms)))
+    if len(groups) != len(problems):
+        raise InvalidInput("number of groups", len(groups), f"{len(problems)}, one a problem")
+    one_of("highlight", highlight, algorithms)
+    rows, labels, heads, averages = _sections(cells, problems, groups)
+    figure, axes = grid(1, 1, width=9.5, height=0.9 + 0.25 * len(rows))
+    axis = axes.flat[0]
+    axis.grid(False)
+    axis.spines[:].set_visible(False)
+    axis.imshow(rows, cmap="Blues_r", vmin=1, vmax=1.15 * len(algorithms), aspect="auto")
+    for row, column in np.argwhere(np.isfinite(rows)):
+        rank = rows[row, column]
+        text = f"{rank:.2f}" if row in averages else f"{rank:g}"
+        axis.text(column, row, text, ha="center", va="center", fontsize=9,
+                  color="white" if rank < 0.46 * len(algorithms) else "black",
+                  weight="bold" if row in averages else "normal")  # fmt: skip
+    axis.set_yticks(range(len(rows)), labels, fontsize=9)
+    for row in (*heads, *averages):
+        axis.get_yticklabels()[row].set_fontweight("bold")
+    _name_columns(axis, algorithms, highlight)
+    place = list(algorithms).index(highlight)
+    for head, average in zip(heads, averages, strict=True):
+        axis.add_patch(Rectangle((place - 0.5, head + 0.5), 1, average - head,
+                                 fill=False, edgecolor="black", linewidth=2,
+                                 clip_on=False))  # fmt: skip
+        axis.axhline(average - 0.5, color="white", linewidth=2)
+    return figure
+
+
+def _draw_scale(axis: Axes, n: int, difference: float) -> None:
+    axis.plot([1, n], [0, 0], color=_INK, linewidth=1.2)
+    for rank in range(1, n + 1):
+        axis.plot([rank, rank], [0, -0.16], color=_INK, linewidth=1.2)
+        axis.text(rank, -0.25, str(rank), ha="center", va="bottom", fontsize=10, color=_INK)
+    axis.text(n + 0.06 * (n - 1), 0, "average rank\n(1 is best)", va="center", fontsize=10)
+    axis.errorbar(1 + difference / 2, -1.3, xerr=difference / 2, color=_INK, capsize=5, fmt="none")
+    axis.text(1, -1.55, f"critical difference {difference:.2f}", va="bottom", fontsize=10)
+
+
+def _draw_leader(
+    axis: Axes, side: int, n: int, name: str, rank: float, height: float, highlight: str
+) -> None:
+    """Lead from the rank on the scale down and out to the name, to the left for side -1."""
+    bold = name == highlight
+    colour, width, weight = (BLUE, 2.6, "bold") if bold else (_INK, 0.9, "normal")
+    end = 1 - 0.06 * (n - 1) if side < 0 else n + 0.06 * (n - 1)
+    axis.plot([rank, rank, end], [0, height, height], color=colour, linewidth=width,
+              zorder=2.5 if bold else 2.0)  # fmt: skip
+    words = f"{name}  {rank:.2f} " if side < 0 else f" {rank:.2f}  {name}"
+    axis.text(end, height, words, ha="right" if side < 0 else "left", va="center",
+              fontsize=10, color=colour, weight=weight)  # fmt: skip
+
+
+def _sections(
+    ranks: NDArray[np.float64], problems: Sequence[str], groups: Sequence[str]
+) -> tuple[NDArray[np.float64], list[str], list[int], list[int]]:
+    """Stack a blank row for the heading, the problems and their average, for each group.
+
+    Returns the rows, their labels, and the numbers of the rows of headings and of averages.
+    """
+    blank = np.full((1, ranks.shape[1]), np.nan)
+    blocks: list[NDArray[np.float64]] = []
+    labels: list[str] = []
+    heads, averages = [], []
+    for group in dict.fromkeys(groups):
+        members = [index for index, name in enumerate(groups) if name == group]
+        blocks += [blank, ranks[members], ranks[members].mean(axis=0, keepdims=True)]
+        heads.append(len(labels))
+        labels += [group, *(problems[index] for index in members), "average rank"]
+        averages.append(len(labels) - 1)
+    return np.vstack(blocks), labels, heads, averages
+
+
+def _name_columns(axis: Axes, algorithms: Sequence[str], highlight: str) -> None:
+    axis.xaxis.tick_top()
+    axis.set_xticks(range(len(algorithms)), algorithms, rotation=35, ha="left", fontsize=10)
+    axis.tick_params(length=0)
+    for label, name in zip(axis.get_xticklabels(), algorithms, strict=True):
+        label.set_fontweight("bold" if name == highlight else "normal")

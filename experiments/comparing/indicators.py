@@ -83,14 +83,14 @@ class IndicatorsAgainst:
         InvalidInput
             An objective is not finite.
         """
-        found = np.unique(finite_array("F", F, (None, len(self.ideal))), axis=0)
-        if len(found) == 0:
+        points = np.unique(finite_array("F", F, (None, len(self.ideal))), axis=0)
+        if len(points) == 0:
             return Indicators(np.inf, np.inf, 0.0, np.nan)
         return Indicators(
-            float(self._igd(found)),
-            float(self._igd_plus(found)),
-            float(self._hypervolume(found)),
-            float(self._spacing(found)) if len(found) > 2 else np.nan,
+            float(self._igd(points)),
+            float(self._igd_plus(points)),
+            float(self._hypervolume(points)),
+            float(self._spacing(points)) if len(points) > 2 else np.nan,
         )
 
     def normalise(self, F: NDArray[np.float64]) -> NDArray[np.float64]:

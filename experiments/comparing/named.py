@@ -7,19 +7,26 @@ from __future__ import annotations
 
 import inspect
 import pkgutil
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
 from pathlib import Path
 from typing import Any
+from unittest.mock import patch
 
+import numpy as np
 import pymoo.algorithms.moo
+from moocore import is_nondominated
 from pymoo.core.algorithm import Algorithm
 from pymoo.core.problem import Problem
+from pymoo.optimize import minimize
 from pymoo.problems import get_problem
 from pymoo.util.ref_dirs import get_reference_directions
 
-from experiments.comparing.runs import ALGORITHMS, FINAL_SIZE, robust_problem
+from experiments.comparing.runs import ALGORITHMS, FINAL_SIZE, final_rows, robust_problem
+from experiments.runner.campaign import Run
 from experiments.runner.provenance import fingerprint
 from experiments.runner.setting import Setting
 from pymoo_hdte.algorithms import ElitistSwarm
@@ -106,16 +113,16 @@ def source_of(*names: str) -> str:
 
 def _with_neighbours(files: list[Path]) -> list[Path]:
     """Return the files with all others of their packages."""
-    found = set(files)
+    given = set(files)
     for path in files:
         if (path.parent / "__init__.py").is_file():
-            found |= set(path.parent.rglob("*.py"))
-    return sorted(found)
+            given |= set(path.parent.rglob("*.py"))
+    return sorted(given)
 
 
 def _arguments(factory: Callable[..., Any], population: int, n_obj: int) -> dict[str, Any]:
     takes = inspect.signature(factory).parameters
-    any_keyword = any(one.kind is one.VAR_KEYWORD for one in takes.values())
+    any_keyword = any(part.kind is part.VAR_KEYWORD for part in takes.values())
     arguments: dict[str, Any] = {}
     if "pop_size" in takes or (any_keyword and "ref_dirs" not in takes):
         arguments["pop_size"] = population
@@ -138,12 +145,14 @@ def _pymoo_algorithm(name: str) -> Any:
     """Return a class of `pymoo.algorithms.moo` by its name."""
     for module in pkgutil.iter_modules(pymoo.algorithms.moo.__path__):
         try:
-            found = getattr(import_module(f"pymoo.algorithms.moo.{module.name}"), name, None)
+            algorithm_class = getattr(
+                import_module(f"pymoo.algorithms.moo.{module.name}"), name, None
+            )
         except ModuleNotFoundError:
             # One module of pymoo (kgb) needs scikit-learn, which pymoo does not ask for.
             continue
-        if inspect.isclass(found) and issubclass(found, Algorithm):
-            return found
+        if inspect.isclass(algorithm_class) and issubclass(algorithm_class, Algorithm):
+            return algorithm_class
     raise InvalidInput(OF_ALGORITHMS, name, f"{', '.join(ALGORITHMS)}, ElitistSwarm, {_OF_PYMOO}")
 
 
@@ -167,3 +176,75 @@ def _made(option: str, name: str, make: Callable[[], Any]) -> Any:
     except Exception as error:
         allowed = f"{_OF_PYMOO}, made without further arguments ({type(error).__name__}: {error})"
         raise InvalidInput(option, name, allowed) from error
+
+
+SPENT = "evaluations"
+
+
+@dataclass(frozen=True)
+class OpenRun:
+    """One algorithm, one problem, one seed and a budget, all by name.
+
+    ``source`` identifies the files of a stranger's problem or algorithm, see `named.source_of`, so
+    that a changed file is not taken for the one that made a stored run.
+    """
+
+    problem: str
+    algorithm: str
+    seed: int
+    population: int
+    evaluations: int
+    source: str = ""
+
+    @property
+    def key(self) -> str:
+        """All settings in one name."""
+        names = f"{self.problem}_{self.algorithm}".replace(":", "..")
+        budget = f"pop{self.population}_{self.evaluations}_final{FINAL_SIZE}"
+        return "_".join(filter(None, (names, budget, f"seed{self.seed}", self.source)))
+
+    def execute(self) -> Run:
+        """Optimise, and reduce what is found to `FINAL_SIZE` designs in the same way for all.
+
+        Columns are the evaluations spent, the design variables and the objectives, rows by rising
+        objectives. Where nothing feasible is found, one row holds the evaluations alone.
+        """
+        problem = problem_named(self.problem)
+        algorithm = algorithm_named(self.algorithm, self.population, self.problem)
+        with seeded_default_rng(self.seed):
+            ended = minimize(problem, algorithm, ("n_eval", self.evaluations), seed=self.seed)
+        spent = ended.algorithm.evaluator.n_eval
+        columns = (SPENT, *(f"x{1 + i}" for i in range(problem.n_var)))
+        columns += tuple(f"f{1 + i}" for i in range(problem.n_obj))
+        X, F = np.empty((0, problem.n_var)), np.empty((0, problem.n_obj))
+        # Without a feasible design, the optimum is the least infeasible one and F is None.
+        if ended.F is not None:
+            X, F = ended.opt.get("X", "F")
+            sound = np.isfinite(F).all(axis=1)
+            X, F = X[sound], F[sound]
+        if not len(F):
+            nothing = np.full((1, len(columns)), np.nan)
+            nothing[0, 0] = spent
+            return Run(columns, nothing, ended.exec_time)
+        best = is_nondominated(F, keep_weakly=True)
+        X, F = X[best], F[best]
+        final = final_rows(F)
+        rows = np.hstack([np.full((len(final), 1), spent), X[final], F[final]])
+        return Run(columns, rows, ended.exec_time)
+
+
+@contextmanager
+def seeded_default_rng(seed: int) -> Iterator[None]:
+    """Seed the generators that pymoo's MOPSO_CD and CMOPSO make without a seed.
+
+    Both truncate their archive with ``numpy.random.default_rng(None)``, so that the same seed would
+    not give the same run.
+    """
+    original = np.random.default_rng
+    children = np.random.SeedSequence(seed)
+
+    def seeded(given: Any = None) -> np.random.Generator:
+        return original(children.spawn(1)[0] if given is None else given)
+
+    with patch.object(np.random, "default_rng", seeded):
+        yield

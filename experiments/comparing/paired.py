@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.comparing.indicators import smaller_is_better
-from experiments.comparing.named import problem_named, source_of
-from experiments.comparing.open_runs import OpenRun
+from experiments.comparing.named import OpenRun, problem_named, source_of
 from experiments.comparing.quality import Quality, TrueFront
 from experiments.comparing.references import MODELS, objective_names, reference
 from experiments.comparing.runs import ALGORITHMS, OptimisationRun
@@ -155,8 +154,8 @@ def _job(setting: Setting, problem: str, algorithm: str, seed: int) -> Job:
 def _comparison(
     problem: str, finished: dict[str, list[tuple[Job, Run]]], seeds: range
 ) -> Comparison:
-    found = {a: [_found(job, run) for job, run in of_one] for a, of_one in finished.items()}
-    fronts = {a: [F for F, _ in of_one] for a, of_one in found.items()}
+    values = {a: [_found(job, run) for job, run in of_one] for a, of_one in finished.items()}
+    fronts = {a: [F for F, _ in of_one] for a, of_one in values.items()}
     truth, is_true = reference(problem, [F for of_one in fronts.values() for F in of_one])
     return Comparison(
         problem,
@@ -165,7 +164,7 @@ def _comparison(
         seeds,
         objective_names(problem),
         fronts,
-        {a: [spent for _, spent in of_one] for a, of_one in found.items()},
+        {a: [spent for _, spent in of_one] for a, of_one in values.items()},
         {a: [run for _, run in of_one] for a, of_one in finished.items()},
         {a: [truth.quality(F) for F in of_one] for a, of_one in fronts.items()},
     )

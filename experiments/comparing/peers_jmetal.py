@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 from pymoo.core.problem import Problem
 from pymoo.util.ref_dirs import get_reference_directions
 
-from experiments.comparing.offers import POPULATION, Offer
+from experiments.comparing.peers_pymoo import POPULATION, Offer
 
 logging.getLogger("jmetal.core.algorithm").setLevel(logging.WARNING)
 

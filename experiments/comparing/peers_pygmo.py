@@ -9,7 +9,7 @@ import pygmo
 from numpy.typing import NDArray
 from pymoo.core.problem import Problem
 
-from experiments.comparing.offers import POPULATION, Offer
+from experiments.comparing.peers_pymoo import POPULATION, Offer
 
 
 class WrappedProblem:

@@ -88,9 +88,9 @@ class TrueFront:
         return Quality(measured.igd, measured.spacing, measured.hypervolume, lost)
 
     def _lost(self, F: NDArray[np.float64]) -> int:
-        found = self.normalise(F)
+        scaled = self.normalise(F)
         nearest = [
-            np.linalg.norm(self.normalise(piece)[:, None] - found[None], axis=2).min()
+            np.linalg.norm(self.normalise(piece)[:, None] - scaled[None], axis=2).min()
             for piece in self.pieces
         ]
         return sum(bool(distance > REACH) for distance in nearest)

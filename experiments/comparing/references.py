@@ -28,7 +28,7 @@ def true_front(model: str) -> NDArray[np.float64]:
     return front
 
 
-def reference(problem: str, found: Sequence[NDArray[np.float64]]) -> tuple[TrueFront, bool]:
+def reference(problem: str, fronts: Sequence[NDArray[np.float64]]) -> tuple[TrueFront, bool]:
     """Return the problem's true front, or the union of the runs if it gives none.
 
     Raises
@@ -39,7 +39,7 @@ def reference(problem: str, found: Sequence[NDArray[np.float64]]) -> tuple[TrueF
     own = true_front(problem) if problem in MODELS else _own_front(problem_named(problem))
     if own is not None:
         return TrueFront(own), True
-    union = front_among(np.concatenate(found))
+    union = front_among(np.concatenate(fronts))
     if len(union) < 2 or not np.all(np.ptp(union, axis=0) > 0.0):
         allowed = "a problem with a front of its own, or runs that find two different optima"
         raise InvalidInput(OF_PROBLEMS, problem, allowed)

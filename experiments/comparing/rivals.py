@@ -15,8 +15,7 @@ from scipy.stats import binomtest, mannwhitneyu, rankdata
 from experiments.comparing.indicators import smaller_is_better
 from experiments.comparing.paired import SIGNIFICANT
 from experiments.comparing.ranks import OF_PROBLEMS, OF_RUNS, costs_of
-from experiments.comparing.rates import state_of
-from experiments.comparing.statistics import holm, wilcoxon_p
+from experiments.comparing.statistics import holm, state_of, wilcoxon_p
 from pymoo_hdte.checks import InvalidInput, one_of
 
 

@@ -56,8 +56,8 @@ def final_rows(F: NDArray[np.float64], size: int = FINAL_SIZE) -> NDArray[np.int
 
     More are thinned by crowding, in the same way for all algorithms.
     """
-    kept = least_crowded(F, size)
-    return kept[np.lexsort(F[kept].T[::-1])]
+    rows = least_crowded(F, size)
+    return rows[np.lexsort(F[rows].T[::-1])]
 
 
 @dataclass(frozen=True)
@@ -84,11 +84,11 @@ class OptimisationRun:
         """
         problem = robust_problem(self.model)
         algorithm = ALGORITHMS[self.algorithm](self.population, self.final_size)
-        found = minimize(problem, algorithm, ("n_gen", self.generations), seed=self.seed)
-        spent = found.algorithm.evaluator.n_eval
+        ended = minimize(problem, algorithm, ("n_gen", self.generations), seed=self.seed)
+        spent = ended.algorithm.evaluator.n_eval
         if spent != self.population * self.generations:
             raise RuntimeError(f"{self.key} spent {spent} evaluations: no fair comparison")
-        X, F = found.opt.get("X", "F")
-        kept = final_rows(F, self.final_size)
+        X, F = ended.opt.get("X", "F")
+        rows = final_rows(F, self.final_size)
         columns = (*problem.var_names, *problem.obj_names)
-        return Run(columns, np.hstack([X[kept], F[kept]]), found.exec_time)
+        return Run(columns, np.hstack([X[rows], F[rows]]), ended.exec_time)

@@ -38,17 +38,17 @@ def run(context: Context) -> Result:
     """Compare AMP-MOPSO with variants that lack strategies, or what the setting names."""
     stated = context.setting.is_stated
     comparisons = compare(context, PARTS, "ablation")
-    found = [list(find(comparisons)) if stated else [] for find in (_evenness, _gaps)]
+    findings = [list(find(comparisons)) if stated else [] for find in (_evenness, _gaps)]
     return Result(
         title=f"Fig. 17: ablation of AMP-MOPSO{'' if stated else ', open'}, "
         f"{context.seeds_in_words}",
         command=context.comparison_command("ablation"),
-        answer=_answer([*found[0], *found[1]]) if any(found) else least_igd(comparisons),
+        answer=_answer([*findings[0], *findings[1]]) if any(findings) else least_igd(comparisons),
         paragraphs=(SETTING, FLOWCHART) if stated else open_paragraphs(context, comparisons),
         models=models_compared(comparisons),
         tables=(
-            quality_table(comparisons, TABLE_7 if stated else {}, found[0]),
-            coverage_table(comparisons, found[1]),
+            quality_table(comparisons, TABLE_7 if stated else {}, findings[0]),
+            coverage_table(comparisons, findings[1]),
             paired_tests_table(comparisons, subject(context, FULL)),
             runs_table(comparisons),
         ),
@@ -66,12 +66,12 @@ def run(context: Context) -> Result:
 
 def _answer(findings: Sequence[Finding]) -> str:
     """Say how many parts make the difference that the paper shows, then the findings."""
-    shown = sum(one.agrees for one in findings)
+    shown = sum(finding.agrees for finding in findings)
     first = (
         f"Of the {len(findings)} differences that the paper shows, {shown or 'none'} came out "
         "when the pyramid or the entropy weight was left out."
     )
-    return " ".join([first, *(one.sentence for one in findings)])
+    return " ".join([first, *(finding.sentence for finding in findings)])
 
 
 def _gaps(comparisons: Sequence[Comparison]) -> Iterator[Finding]:

@@ -21,17 +21,21 @@ TESTED = ("igd", "spacing", "hypervolume")
 def least_igd(comparisons: Sequence[Comparison]) -> str:
     """Say for every problem which algorithm has the least mean IGD."""
     sentences = []
-    for one in comparisons:
-        means = {name: float(one.values(name, "igd").mean()) for name in one.algorithms}
+    for comparison in comparisons:
+        means = {
+            name: float(comparison.values(name, "igd").mean()) for name in comparison.algorithms
+        }
         best = min(means, key=means.__getitem__)
         least = significant(means[best], 3)
-        sentences.append(f"On {one.model}, {best} has the least mean IGD, {least}.")
+        sentences.append(f"On {comparison.model}, {best} has the least mean IGD, {least}.")
     return " ".join(sentences)
 
 
 def models_compared(comparisons: Sequence[Comparison]) -> dict[str, str]:
     """Return what is said of the drive models among the problems compared."""
-    return models_of(*(one.model for one in comparisons if one.model in PRESETS))
+    return models_of(
+        *(comparison.model for comparison in comparisons if comparison.model in PRESETS)
+    )
 
 
 def open_paragraphs(context: Context, comparisons: Sequence[Comparison]) -> tuple[str, ...]:
@@ -39,7 +43,7 @@ def open_paragraphs(context: Context, comparisons: Sequence[Comparison]) -> tupl
     setting = context.setting
     if setting.is_stated:
         return ()
-    unions = [one.model for one in comparisons if not one.is_true]
+    unions = [comparison.model for comparison in comparisons if not comparison.is_true]
     sentences = [
         "Not the setting of the paper, whose numbers are therefore left out: "
         f"{'; '.join(setting.differences())}.",
@@ -58,9 +62,9 @@ def _other_budgets(evaluations: int, comparisons: Sequence[Comparison]) -> Itera
         for algorithm, spent in comparison.spent.items():
             if set(spent) != {evaluations}:
                 few, many = min(spent), max(spent)
-                found = f"{few:,}" if few == many else f"{few:,} to {many:,}"
+                shown = f"{few:,}" if few == many else f"{few:,} to {many:,}"
                 yield (
-                    f"No fair comparison: on {comparison.model}, {algorithm} spent {found} "
+                    f"No fair comparison: on {comparison.model}, {algorithm} spent {shown} "
                     f"evaluations instead of {evaluations:,}."
                 )
 
@@ -169,8 +173,8 @@ def times_table(
     columns = (*_summary_columns("time", "s"), *_paper_columns("time", published, "s", digits=4))
     title = f"Wall time of one run of {evaluations:,} evaluations, other runs going on beside it"
     rows = _rows(comparisons, cells)
-    found = tuple(findings)
-    return Table("times", title, (*WHO, *columns), rows, findings=found, wall_times=True)
+    shown = tuple(findings)
+    return Table("times", title, (*WHO, *columns), rows, findings=shown, wall_times=True)
 
 
 def change(before: float, after: float) -> str:

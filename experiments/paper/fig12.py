@@ -13,9 +13,9 @@ from scipy.stats import gaussian_kde, norm, skew
 
 from experiments.comparing.figures import BLUE, GREEN, GREY, ORANGE, grid
 from experiments.comparing.runs import robust_problem
+from experiments.paper.choices import scatter_indices
 from experiments.paper.models import FITTED, models_of
 from experiments.paper.scatter import dte_samples
-from experiments.paper.shares import scatter_indices
 from experiments.published_values import TABLE_8, Moments
 from experiments.runner.registry import Context
 from experiments.runner.result import Column, Finding, Picture, Result, Table, significant
@@ -116,7 +116,7 @@ def _table(distributions: Sequence[Distribution]) -> Table:
 def _findings(distributions: Sequence[Distribution]) -> Iterator[Finding]:
     for model in PRESETS:
         wide, narrow, _ = (entry for entry in distributions if entry.model == model)
-        shown, other = (
+        shown, moments = (
             f"{significant(e.moments.mean_arcsec, 4)} ± {significant(e.moments.std_arcsec, 4)} "
             f"arcsec with {BANDS[e.band]}"
             for e in (wide, narrow)
@@ -125,7 +125,7 @@ def _findings(distributions: Sequence[Distribution]) -> Iterator[Finding]:
         yield Finding(
             wide.alike,
             f"On {model} the DTE of the nominal design (mean ± std) is {shown}; the paper prints "
-            f"{PAPER.mean_arcsec} ± {PAPER.std_arcsec} arcsec. It is {other}{fitted}.",
+            f"{PAPER.mean_arcsec} ± {PAPER.std_arcsec} arcsec. It is {moments}{fitted}.",
             answers=model == "calibrated",
         )
 

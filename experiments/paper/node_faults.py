@@ -131,9 +131,9 @@ def noise_effects(
     for order in TABLE_5:
         added = np.array([_unit_noise(random_state, cube, order) for cube in cubes])
         for model in models:
-            rest = errors[model, order][:, :, None]
+            base = errors[model, order][:, :, None]
             for size in sizes:
-                by_draw = np.sqrt(np.mean((rest + size * added) ** 2, axis=1))
+                by_draw = np.sqrt(np.mean((base + size * added) ** 2, axis=1))
                 rmse[model, size][order] = float(by_draw.mean())
     return [
         NoiseEffect(model, size, rmse[model, size], _expected(errors, model, size))
@@ -162,18 +162,18 @@ def fault_effects(rests: Mapping[str, Array], cubes: Sequence[Array]) -> list[Fa
     `AS_PRINTED` is added to them.
     """
     random_state = np.random.default_rng(SEED)
-    found: dict[str, dict[str, list[Array]]] = {name: {} for name in (*rests, AS_PRINTED)}
+    errors: dict[str, dict[str, list[Array]]] = {name: {} for name in (*rests, AS_PRINTED)}
     for number, cube in enumerate(cubes):
         functions = cardinal_functions(cube, HIGH)
-        rest_errors = {name: rest[number][:, None] for name, rest in rests.items()}
+        rest_errors = {name: errors[number][:, None] for name, errors in rests.items()}
         rest_errors[AS_PRINTED] = _rest_as_printed(random_state, len(cube))
         for explanation, shape in _shapes(random_state, functions):
-            for name, rest in rest_errors.items():
-                parts = found[name].setdefault(explanation, [])
-                parts.append(_scaled_to_print(rest, shape))
+            for name, residual in rest_errors.items():
+                parts = errors[name].setdefault(explanation, [])
+                parts.append(_scaled_to_print(residual, shape))
     return [
         FaultEffect(name, explanation, *np.hstack(parts))
-        for name, explanations in found.items()
+        for name, explanations in errors.items()
         for explanation, parts in explanations.items()
     ]
 
@@ -210,17 +210,21 @@ def _shapes(random_state: np.random.Generator, functions: Array) -> Iterator[tup
     yield EVERY_RUN, functions @ random_state.standard_normal((nodes, DRAWS))
 
 
-def _scaled_to_print(rest: Array, shape: Array) -> Array:
+def _scaled_to_print(residual: Array, shape: Array) -> Array:
     """Return size, MAE and largest error (3, draws) where the RMSE becomes the printed one.
 
     Draws whose rest has at least that RMSE already are left out.
     """
-    rest = np.broadcast_to(rest, shape.shape)
-    missing = TABLE_5[HIGH].rmse_arcsec ** 2 - np.mean(rest**2, axis=0)
-    rest, shape, missing = rest[:, missing > 0.0], shape[:, missing > 0.0], missing[missing > 0.0]
-    square, mixed = np.mean(shape**2, axis=0), np.mean(shape * rest, axis=0)
+    residual = np.broadcast_to(residual, shape.shape)
+    missing = TABLE_5[HIGH].rmse_arcsec ** 2 - np.mean(residual**2, axis=0)
+    residual, shape, missing = (
+        residual[:, missing > 0.0],
+        shape[:, missing > 0.0],
+        missing[missing > 0.0],
+    )
+    square, mixed = np.mean(shape**2, axis=0), np.mean(shape * residual, axis=0)
     size = (np.sqrt(mixed**2 + square * missing) - mixed) / square
-    error = np.abs(rest + size * shape)
+    error = np.abs(residual + size * shape)
     return np.array([size, error.mean(axis=0), error.max(axis=0)])
 
 
@@ -365,18 +369,18 @@ def faults_figure(effects: Sequence[FaultEffect]) -> Figure:
     """Draw largest error over MAE of all draws, one panel for each rest of the error."""
     rests = list(dict.fromkeys(effect.rest for effect in effects))
     figure, axes = grid(1, len(rests), width=3.8, height=3.4)
-    first, *_, last = FAULTY_RUNS.values()
-    shown = {first: BLUE, last: GREEN, EVERY_RUN: ORANGE}
-    for rest, axis in zip(rests, axes[0], strict=True):
+    lowest, *_, highest = FAULTY_RUNS.values()
+    shown = {lowest: BLUE, highest: GREEN, EVERY_RUN: ORANGE}
+    for residual, axis in zip(rests, axes[0], strict=True):
         for effect in effects:
-            if effect.rest == rest and effect.explanation in shown:
+            if effect.rest == residual and effect.explanation in shown:
                 axis.plot(effect.mae, effect.largest, "o", color=shown[effect.explanation],
                           markersize=2, alpha=0.4, label=effect.explanation)  # fmt: skip
         paper = TABLE_5[HIGH]
         axis.plot(paper.mae_arcsec, paper.max_error_arcsec, "*", color="black", markersize=12,
                   label="paper")  # fmt: skip
         axis.axvline(paper.mae_arcsec, color=GREY, linewidth=0.8)
-        axis.set_title(rest, fontsize=10)
+        axis.set_title(residual, fontsize=10)
         axis.set_xlabel("MAE [arcsec]")
     axes[0, 0].set_ylabel("largest error [arcsec]")
     axes[0, 0].legend(fontsize=7, frameon=False)

@@ -150,14 +150,14 @@ def _design(model: DriveModel, parameters: NDArray[np.float64]) -> Design:
 
 def printed_equations() -> dict[str, Printed]:
     """Return what the printed equations give under each of `READINGS` of theta_s."""
-    found = {}
+    printed = {}
     for reading in READINGS:
         model = preset("published")
         error = replace(model.kinematic_error, reading=reading)
         problem = RobustDTE(replace(model, kinematic_error=error))
         dte = problem.model.dte_arcsec(problem.model.nominal[None])[0]
-        found[reading] = Printed(float(dte), *exact_moments(problem, problem.nominal, BAND))
-    return found
+        printed[reading] = Printed(float(dte), *exact_moments(problem, problem.nominal, BAND))
+    return printed
 
 
 def of_the_first_page(printed: dict[str, Printed]) -> str:
@@ -188,7 +188,10 @@ def _readings(printed: dict[str, Printed]) -> Table:
         (*rows, ("the paper", None, *paper)),
         findings=(
             Finding(
-                any(abs(one.mean / paper.mean_arcsec - 1.0) <= ONE_PERCENT for one in (low, high)),
+                any(
+                    abs(value.mean / paper.mean_arcsec - 1.0) <= ONE_PERCENT
+                    for value in (low, high)
+                ),
                 f"The printed equations give {low.dte:.1f} arcsec if theta_s is a peak-to-peak, "
                 f"and {high.dte:.1f} (mean {high.mean:.1f}, standard deviation {high.std:.1f}) if "
                 f"it is a semi-amplitude; the paper has {paper.mean_arcsec:.1f} and "

@@ -6,14 +6,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from experiments.comparing.rates import at_least
-from experiments.paper.static_error.figures import heat_maps
-from experiments.paper.static_error.normality_tables import (
-    common_sizes,
-    pooling_table,
-    sizes_table,
-)
-from experiments.paper.static_error.sources import (
+from experiments.comparing.statistics import at_least
+from experiments.paper.static_error.statistics import (
     N_PROTOTYPES,
     N_REPEATS,
     NOISE_UM,
@@ -26,13 +20,17 @@ from experiments.paper.static_error.sources import (
     detections,
     outlier_counts,
     power,
+    prototypes,
     prototypes_needed,
     spoilt_readings,
 )
-from experiments.paper.static_error.statistics import prototypes
 from experiments.paper.static_error.tables import (
+    common_sizes,
     component_picture,
+    heat_maps,
+    pooling_table,
     reading_table,
+    sizes_table,
     statistic_table,
     total_picture,
 )
@@ -109,20 +107,20 @@ def run(context: Context) -> Result:
     )
 
 
-def _statistics_table(found: ErrorStatistics) -> Table:
+def _statistics_table(statistics: ErrorStatistics) -> Table:
     sheet = {source.symbol: source for source in hs_20_100().error_sources}
     rows = []
     inside = 0
     for index, symbol in enumerate(SYMBOLS):
-        paper, sample = TABLE_2[symbol], found.samples[index]
+        paper, sample = TABLE_2[symbol], statistics.samples[index]
         mean_low, mean_high = sample.mean_interval()
         std_low, std_high = sample.std_interval()
         inside += mean_low <= paper.mean_um <= mean_high
         inside += std_low <= paper.std_um <= std_high
         tested: tuple[Cell, ...] = (
-            found.shapiro_w[index],
+            statistics.shapiro_w[index],
             paper.shapiro_w,
-            found.shapiro_p[index],
+            statistics.shapiro_p[index],
             paper.shapiro_p,
         )
         mean = (sample.mean, sample.mean_error, mean_low, mean_high, paper.mean_um)
@@ -139,7 +137,7 @@ def _statistics_table(found: ErrorStatistics) -> Table:
             Column("to", "µm", 3, name),
             Column("paper", "µm", 3, name, paper=True),
         ]
-    normal = found.marginals.count("normal")
+    normal = statistics.marginals.count("normal")
     findings = (
         Finding(
             at_least(inside, 2 * len(SYMBOLS), 0.95),
@@ -231,11 +229,11 @@ def _correlation_findings(clean: ErrorStatistics, rng: np.random.Generator) -> I
         f"|r| = {largest:.2f} here. Independence is an assumption, not a result.",
         within_paper=True,
     )
-    found, alarms = detections(N_CAMPAIGNS, rng)
+    counts, alarms = detections(N_CAMPAIGNS, rng)
     yield Finding(
-        at_least(found, N_CAMPAIGNS, power(PLANTED_CORRELATION, N_PROTOTYPES))
+        at_least(counts, N_CAMPAIGNS, power(PLANTED_CORRELATION, N_PROTOTYPES))
         and at_least(N_CAMPAIGNS - alarms, N_CAMPAIGNS, 0.95),
-        f"The planted correlation of {PLANTED_CORRELATION} is found in {found} of {N_CAMPAIGNS} "
+        f"The planted correlation of {PLANTED_CORRELATION} is found in {counts} of {N_CAMPAIGNS} "
         f"campaigns, another pair in {alarms} ({significant(100 * alarms / N_CAMPAIGNS, 2)} %; 5 % "
         "are expected at most).",
         check=True,

@@ -6,20 +6,23 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
-from experiments.comparing.rates import at_least, rate_p
+from experiments.comparing.figures import BLUE, GREEN, ORANGE, PINK, grid
+from experiments.comparing.statistics import at_least, rate_p
 from experiments.paper.bench.campaign import (
     COEFFICIENTS,
     N_PROTOTYPES,
     N_REPEATS,
     NOMINAL_STIFFNESS,
     TORSION,
+    Records,
     draw_campaign,
     slope_error_per_noise,
     summaries,
 )
 from experiments.paper.later_prototypes import later_prototypes_table, of_the_first_page
-from experiments.paper.table3_figures import damping_lines, torsion_loop
 from experiments.published_values import TABLE_3
 from experiments.runner.registry import Context
 from experiments.runner.result import (
@@ -33,9 +36,69 @@ from experiments.runner.result import (
 )
 from experiments.runner.texts import paragraphs
 from pymoo_hdte.drive import hs_20_100
-from pymoo_hdte.identification import Series, hysteresis_width, lost_energy
+from pymoo_hdte.identification import LinearFit, Series, hysteresis_width, lost_energy, stiffness
 from pymoo_hdte.identification.damping import INPUT_SPEEDS, OUTPUT_SPEEDS
-from pymoo_hdte.units import ARCSEC
+from pymoo_hdte.identification.prototypes import RunKey
+from pymoo_hdte.units import ARCSEC, REVOLUTION_PER_MINUTE
+
+BRANCHES = {
+    "a1": ("forward loading", BLUE),
+    "a2": ("forward unloading", ORANGE),
+    "a3": ("reverse loading", GREEN),
+    "a4": ("reverse unloading", PINK),
+}
+
+
+def torsion_loop(records: Records, key: RunKey) -> Figure:
+    """Draw one loop, branch by branch, and what is left of it without the line of a1."""
+    loop = records.loops[key]
+    fit = stiffness(loop)
+    residual = loop.torque - fit.intercept - fit.slope * loop.torsion
+    figure, (axes,) = grid(1, 2, width=5.4, height=4.2)
+    for name, samples in loop.branches.items():
+        meaning, colour = BRANCHES[name]
+        torsion = loop.torsion[samples] / ARCSEC
+        for axis, torque in zip(axes, (loop.torque, residual), strict=True):
+            label = f"{name}, {meaning}"
+            axis.plot(torsion, torque[samples], ".", color=colour, markersize=3, label=label)
+    ends = np.array([0.0, loop.torsion.max()])
+    line = f"K = {fit.slope:.0f} ± {fit.slope_error:.0f} N.m/rad"
+    axes[0].plot(ends / ARCSEC, fit.intercept + fit.slope * ends, "k-", linewidth=1, label=line)
+    axes[0].set_ylabel("torque [N.m]")
+    axes[1].set_ylabel("torque less the line of a1 [N.m]")
+    axes[0].legend(fontsize=8, frameon=False)
+    for axis in axes:
+        axis.set_xlabel("torsion [arcsec]")
+    return figure
+
+
+def damping_lines(
+    records: Records, fits: dict[str, dict[RunKey, LinearFit]], key: RunKey
+) -> Figure:
+    """Draw the runs of one prototype with the fitted lines."""
+    bearing, complete, output = records.bearing[key], records.complete[key], records.output[key]
+    figure, (axes,) = grid(1, 2, width=5.4, height=4.0)
+    difference = complete.torque - bearing.torque
+    _line(axes[0], bearing.speed, bearing.torque, fits["B_in"][key], BLUE, "B_in")
+    _line(axes[0], bearing.speed, difference, fits["B_fc"][key], ORANGE, "B_fc")
+    _line(axes[1], output.speed, output.torque, fits["B_out"][key], GREEN, "B_out")
+    axes[0].set_xlabel("input speed [r/min]")
+    axes[1].set_xlabel("output speed [r/min]")
+    for axis in axes:
+        axis.set_ylabel("no-load torque [mN.m]")
+        axis.legend(fontsize=8, frameon=False, loc="upper left")
+    return figure
+
+
+def _line(
+    axis: Axes, speed: np.ndarray, torque: np.ndarray, fit: LinearFit, colour: str, name: str
+) -> None:
+    at = speed / REVOLUTION_PER_MINUTE
+    label = f"{name} = ({1e4 * fit.slope:.3f} ± {1e4 * fit.slope_error:.3f})e-4 N.m.s/rad"
+    axis.plot(at, 1e3 * torque, "o", color=colour, markersize=5, mfc="none")
+    line = 1e3 * (fit.intercept + fit.slope * speed)
+    axis.plot(at, line, color=colour, linewidth=1.4, label=label)
+
 
 SEED = 1
 N_CAMPAIGNS = 200
@@ -57,15 +120,15 @@ def run(context: Context) -> Result:
     rng = np.random.default_rng(SEED)
     records, _ = draw_campaign(rng)
     fits = records.fits()
-    found = summaries(fits)
+    summaries_of = summaries(fits)
     return Result(
         title="Tables 3 and 4: identified stiffness and damping",
         command="python -m experiments table3",
         paragraphs=(SETTING, MEANING),
         first_page=of_the_first_page(),
         tables=(
-            _coefficient_table(found),
-            _nominal_table(found),
+            _coefficient_table(summaries_of),
+            _nominal_table(summaries_of),
             _coverage_table(rng),
             _friction_table(rng),
             _resolution_table(),
@@ -124,7 +187,7 @@ def _coefficient_table(found: Mapping[str, Series]) -> Table:
     return Table("coefficients", title, tuple(columns), tuple(rows), note, (finding,))
 
 
-def _nominal_table(found: Mapping[str, Series]) -> Table:
+def _nominal_table(series: Mapping[str, Series]) -> Table:
     nominal = hs_20_100().nominal
     printed = {
         "theta_s": (nominal.static_error / ARCSEC, "arcsec", "from Eqs. (1) and (2), see table2"),
@@ -137,7 +200,7 @@ def _nominal_table(found: Mapping[str, Series]) -> Table:
     }
     rows = []
     for name, (value, unit, source) in printed.items():
-        ours = found[name].between if name in found else None
+        ours = series[name].between if name in series else None
         cells = (ours.mean, ours.mean_error) if ours else (None, None)
         rows.append((name, unit, *cells, value, source))
     columns = (

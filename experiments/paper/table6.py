@@ -2,9 +2,15 @@
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
+from collections.abc import Mapping
+from dataclasses import dataclass
 
+import numpy as np
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+
+from experiments.comparing.figures import BLUE, GREY, ORANGE, grid
 from experiments.comparing.runs import robust_problem
 from experiments.paper.models import models_of
 from experiments.paper.prototypes.consistency import (
@@ -12,11 +18,16 @@ from experiments.paper.prototypes.consistency import (
     best_case_table,
     bounds_table,
     consistency_table,
+    of_the_first_page,
+    ranking_table,
 )
-from experiments.paper.prototypes.figures import bars, records_figure
-from experiments.paper.prototypes.printed_validation import HIGHEST, LOWEST, NUMBERS
-from experiments.paper.prototypes.ranking import of_the_first_page, ranking_table
-from experiments.paper.prototypes.records import Record, record
+from experiments.paper.prototypes.printed_validation import (
+    HIGHEST,
+    LOWEST,
+    NUMBERS,
+    Assignment,
+    bounds,
+)
 from experiments.published_values import TABLE_6
 from experiments.runner.registry import Context
 from experiments.runner.result import (
@@ -28,9 +39,104 @@ from experiments.runner.result import (
     significant,
 )
 from experiments.runner.texts import paragraphs
-from pymoo_hdte.drive import PRESETS
+from pymoo_hdte.drive import PRESETS, DriveModel, low_pass, measured_dte, simulate_drive
 from pymoo_hdte.drive.measurement import CUTOFF, SAMPLING_RATE
 from pymoo_hdte.units import ARCSEC
+
+
+@dataclass(frozen=True)
+class Record:
+    """One record at 1 kHz, a little longer than an output turn.
+
+    Attributes
+    ----------
+    output_angle : ndarray, shape (n_times,)
+        Nominal output angle, 0 where the turn begins, in degrees.
+    raw, filtered : ndarray, shape (n_times,)
+        Transmission error before and after the low pass, arcsec, without its mean.
+    steady, integrated, sampled, measured : float
+        DTE in arcsec: of the steady state, of the integrated motion, after sampling, and after
+        sampling and filtering.
+    ratio : float
+    """
+
+    output_angle: NDArray[np.float64]
+    raw: NDArray[np.float64]
+    filtered: NDArray[np.float64]
+    steady: float
+    integrated: float
+    sampled: float
+    measured: float
+    ratio: float
+
+
+def record(model: DriveModel, parameters: NDArray[np.float64]) -> Record:
+    """Run a prototype, parameters (5,) in SI units, from rest and record one output turn."""
+    run = simulate_drive(model, parameters)
+    times = np.arange(run.time[0], run.time[-1], 1.0 / SAMPLING_RATE)
+    error = CubicSpline(run.time, run.transmission_error)(times)
+    angle = CubicSpline(run.time, run.input_angle)(times)
+    offset = error.mean()
+    turn = (angle >= 0.0) & (angle <= 2.0 * np.pi * run.ratio)
+    return Record(
+        output_angle=np.degrees(angle / run.ratio),
+        raw=(error - offset) / ARCSEC,
+        filtered=(low_pass(error) - offset) / ARCSEC,
+        steady=float(model.dte_arcsec(parameters[None])[0]),
+        integrated=run.dte_arcsec(),
+        sampled=float(np.ptp(error[turn])) / ARCSEC,
+        measured=measured_dte(angle, angle / run.ratio - error, run.ratio) / ARCSEC,
+        ratio=run.ratio,
+    )
+
+
+_INPUT_TURNS = 3
+
+
+def records_figure(records: Mapping[int, Record]) -> Figure:
+    """Draw each prototype's record: the whole output turn, and a few input turns of it."""
+    figure, axes = grid(len(records), 2, width=5.0, height=2.9)
+    for (number, record), (whole, part) in zip(records.items(), axes, strict=True):
+        stretch = _INPUT_TURNS * 360.0 / record.ratio
+        for axis, end in ((whole, 360.0), (part, stretch)):
+            inside = (record.output_angle >= 0.0) & (record.output_angle <= end)
+            angle = record.output_angle[inside]
+            marker = {"linewidth": 0.5} if axis is whole else {"linewidth": 1.6}
+            axis.plot(angle, record.raw[inside], color=GREY, label="unfiltered", **marker)
+            axis.plot(angle, record.filtered[inside], color=BLUE, label="100 Hz low pass", **marker)
+            axis.set_xlim(0.0, end)
+            axis.set_xlabel("output angle [deg]")
+        whole.set_ylabel("transmission error [arcsec]")
+        whole.set_title(
+            f"No. {number}: DTE {record.measured:.2f} arcsec after the chain", fontsize=10
+        )
+        part.set_title(f"No. {number}, first {_INPUT_TURNS} input turns", fontsize=10)
+    labelled = axes[0, 1].get_legend_handles_labels()
+    figure.legend(*labelled, loc="outside lower center", ncols=2, fontsize=8, frameon=False)
+    return figure
+
+
+def bars(
+    predicted: Mapping[str, NDArray[np.float64]], best_case: Mapping[str, Assignment | None]
+) -> Figure:
+    """Draw predicted DTE (5,) by model, with measured values that the printed facts allow."""
+    figure, axes = grid(1, len(predicted), width=4.0, height=3.4)
+    places = np.arange(len(NUMBERS))
+    for (name, values), axis in zip(predicted.items(), axes[0], strict=True):
+        axis.bar(places, values, 0.6, color=BLUE, alpha=0.75, label="predicted")
+        nearest = best_case[name]
+        if nearest is not None:
+            label = "nearest allowed measurement"
+            axis.plot(places, nearest.measured, "D", color=ORANGE, markersize=6, label=label)
+        mean = bounds().measured_mean
+        axis.axhline(mean, color=GREY, linewidth=1.2, label="implied measured mean")
+        axis.set_xticks(places, [f"No. {number}" for number in NUMBERS])
+        axis.set_ylim(0.0, 1.5 * max(mean, *values))
+        axis.set_title(name, fontsize=10)
+    axes[0, 0].set_ylabel("DTE [arcsec]")
+    axes[0, 0].legend(fontsize=8, frameon=False, loc="upper left")
+    return figure
+
 
 RECORDED = (1, 2)
 """Prototypes whose records Fig. 14 shows."""

@@ -29,7 +29,7 @@ from tqdm import tqdm
 from experiments.runner.provenance import environment, fingerprint
 from experiments.runner.store import TIMES, write_atomically
 from experiments.runner.workers import WorkerLost, WrongWorker, arithmetic, interrupts_held_off
-from pymoo_hdte._io.text_table import csv_text, read_text_table
+from pymoo_hdte._io.csv_table import csv_text, read_text_table
 
 SOURCE = "source or versions"
 ONE_JOB = Lock()

@@ -130,18 +130,6 @@ EXPERIMENTS = (
         reads_outcome=True,
     ),
     Experiment(
-        "emps",
-        "studies.measured.emps",
-        "EMPS: friction of a positioning system, measured by others",
-        "Does it find the friction of a positioning system, and are the values those published?",
-    ),
-    Experiment(
-        "kinova",
-        "studies.measured.kinova",
-        "Kinova Gen3: friction and ripple of a robot joint, measured by others",
-        "Does it find friction and ripple of a robot joint?",
-    ),
-    Experiment(
         "peers",
         "studies.contest.peers",
         "The elitist swarm against the best algorithms of other libraries",

@@ -13,7 +13,7 @@ from typing import Any
 
 from experiments.runner.provenance import environment, source_fingerprint
 from experiments.runner.registry import Context
-from pymoo_hdte._io.text_table import csv_text, read_text_table
+from pymoo_hdte._io.csv_table import csv_text, read_text_table
 
 DATA = Path(__file__).parents[1] / "data"
 _ORIGIN = "# {"
@@ -54,10 +54,10 @@ def read_origin(path: Path) -> dict[str, Any]:
         If there is no such line.
     """
     with path.open(encoding="utf-8") as file:
-        first = file.readline()
-    if not first.startswith(_ORIGIN):
+        line = file.readline()
+    if not line.startswith(_ORIGIN):
         raise OSError(f"{path} does not say in its first line when and by what it was made")
-    return dict(json.loads(first.removeprefix("#")))
+    return dict(json.loads(line.removeprefix("#")))
 
 
 def stored_outcome(context: Context, experiment: str) -> tuple[str, ...]:

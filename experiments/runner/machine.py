@@ -41,9 +41,9 @@ def processor() -> str:
 
 
 def _linear_algebra() -> str:
-    found = {
-        f"{one['internal_api']} {one['version']}, {one['num_threads']} threads"
-        for one in threadpool_info()
-        if one["user_api"] == "blas"
+    libraries = {
+        f"{library['internal_api']} {library['version']}, {library['num_threads']} threads"
+        for library in threadpool_info()
+        if library["user_api"] == "blas"
     }
-    return "; ".join(sorted(found)) or "unknown"
+    return "; ".join(sorted(libraries)) or "unknown"

@@ -70,8 +70,8 @@ class Context:
     @property
     def seeds_in_words(self) -> str:
         """The seeds for a title."""
-        first, last = self.seeds_to_run[0], self.seeds_to_run[-1]
-        return f"seeds {first} to {last}" if first < last else f"seed {first}"
+        start, end = self.seeds_to_run[0], self.seeds_to_run[-1]
+        return f"seeds {start} to {end}" if start < end else f"seed {start}"
 
     def comparison_command(self, experiment: str) -> str:
         """Return the command for this setting of an experiment that compares algorithms."""
@@ -88,8 +88,8 @@ class Context:
 
 def _counted(numbers: range) -> str:
     """Return a range as the command line takes it."""
-    first, last = numbers[0], numbers[-1]
-    return f"{last}" if first == 1 else f"{first}-{last}"
+    start, end = numbers[0], numbers[-1]
+    return f"{end}" if start == 1 else f"{start}-{end}"
 
 
 @dataclass(frozen=True)

@@ -82,14 +82,14 @@ def write_report(out: Path, notice: str = "") -> Path:
         for verdict, (heading, mood) in _VERDICTS.items()
     ]
     write_atomically(out / COMPARISONS, _page(COMPARISONS, common, up="", verdicts=verdicts))
-    first = {
+    values = {
         "sections": {about: _parts(results, about) for about in FIRST_PAGE},
         "shown": _shown_first(results),
         "verdicts": verdicts,
         "models": list(models),
         "notice": notice,
     }
-    write_atomically(out / PAGE, _page(PAGE, common, up="", **first))
+    write_atomically(out / PAGE, _page(PAGE, common, up="", **values))
     return out / PAGE
 
 

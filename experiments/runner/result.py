@@ -200,8 +200,10 @@ class Result:
         if unknown:
             raise ValueError(f"no section of the first page: {', '.join(sorted(unknown))}")
         if not self.answer:
-            found = (one for table in self.tables for one in table.findings if one.answers)
-            object.__setattr__(self, "answer", " ".join(one.sentence for one in found))
+            answering = (
+                finding for table in self.tables for finding in table.findings if finding.answers
+            )
+            object.__setattr__(self, "answer", " ".join(finding.sentence for finding in answering))
 
 
 def significant(value: float, digits: int) -> str:

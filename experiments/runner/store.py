@@ -12,7 +12,7 @@ from typing import Any
 
 from experiments.runner.provenance import environment, report_fingerprint
 from experiments.runner.result import Column, Finding, Picture, Result, Table, significant
-from pymoo_hdte._io.text_table import csv_text
+from pymoo_hdte._io.csv_table import csv_text
 from pymoo_hdte._io.whole_file import write_whole
 
 RESULT = "result.json"

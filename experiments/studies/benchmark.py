@@ -21,7 +21,6 @@ from experiments.runner.result import Column, Finding, Result, Table
 from experiments.studies.benchmark_parts import ratios_of_parts
 from experiments.studies.benchmark_verdicts import verdict_times
 from experiments.studies.benchmark_workers import ratios_of_workers, virtual_table
-from experiments.studies.measured.cpu_time import measured_cpu
 from experiments.studies.timing import Ratio, best_time, integration_time, ratio_table
 from pymoo_hdte.algorithms import AMPMOPSO, CompactSwarm, ElitistSwarm
 from pymoo_hdte.drive import (
@@ -72,7 +71,6 @@ def run(context: Context) -> Result:
         tables=(
             ratio_table(ratios),
             virtual_table(),
-            *measured_cpu(),
             *verdict_times(),
             machine_table(),
             _agreement_table(agreement),

@@ -121,16 +121,16 @@ def _peaks_table(maps: Sequence[SpeedLoadMap]) -> Table:
 
 def _figure(maps: Sequence[SpeedLoadMap]) -> Figure:
     figure, axes = grid(len(maps), 2, width=5.2, height=3.2)
-    for entry, (left, right) in zip(maps, axes, strict=True):
-        _draw_map(figure, left, entry)
+    for entry, (axis, right) in zip(maps, axes, strict=True):
+        _draw_map(figure, axis, entry)
         _draw_curves(right, entry)
         for orders, speed in neighbouring_resonances(entry.model, float(SPEEDS[-1])):
-            _mark_resonance(left, right, f"order {orders}", speed)
+            _mark_resonance(axis, right, f"order {orders}", speed)
     return figure
 
 
-def _mark_resonance(left: Axes, right: Axes, label: str, speed: float) -> None:
-    left.axvline(speed, color="white", linestyle="-.", linewidth=1.2)
+def _mark_resonance(axis: Axes, right: Axes, label: str, speed: float) -> None:
+    axis.axvline(speed, color="white", linestyle="-.", linewidth=1.2)
     right.axvline(speed, color=ORANGE, linestyle="-.", linewidth=1.2)
     right.annotate(
         label,

@@ -11,14 +11,15 @@ from matplotlib.figure import Figure
 
 from experiments.comparing.figures import BLUE, GREEN, GREY, ORANGE, PINK, grid
 from experiments.comparing.runs import robust_problem
-from experiments.paper.choices import BAND, MODEL
-from experiments.paper.models import models_of
-from experiments.paper.shares import (
+from experiments.paper.choices import (
+    BAND,
+    MODEL,
     design_indices,
     falls_when_halved,
     scatter_indices,
     study_designs,
 )
+from experiments.paper.models import models_of
 from experiments.runner.registry import Context
 from experiments.runner.result import Cell, Column, Finding, Picture, Result, Table, significant
 from experiments.runner.texts import paragraphs

@@ -26,10 +26,10 @@ from pymoo_hdte._io.whole_file import write_whole
 from pymoo_hdte.checks import InvalidInput
 
 LARGEST_FILE = 2**22
-"""Bytes; half a million coefficients, as of order 12 in five variables."""
+"""Bytes: enough for half a million coefficients, as of order 12 in five variables."""
 
 LARGEST_HEADER = 2**18
-"""Characters."""
+"""Largest number of characters in a header."""
 
 DEEPEST_HEADER = 50
 """Largest depth of nested lists and tables."""
@@ -120,9 +120,9 @@ class FileFormat:
         return {name: header[name] for name in self.fields}, arrays
 
     def _check(self, header: Any) -> None:
-        found = header.get("format") if isinstance(header, dict) else header
-        if not isinstance(header, dict) or found != self.name:
-            raise InvalidInput("format of the file", found, repr(self.name))
+        stated_format = header.get("format") if isinstance(header, dict) else header
+        if not isinstance(header, dict) or stated_format != self.name:
+            raise InvalidInput("format of the file", stated_format, repr(self.name))
         version = header.get("version")
         allowed = "version 1" if self.version == 1 else f"versions 1 to {self.version}"
         if type(version) is not int or not 1 <= version <= self.version:
@@ -204,7 +204,7 @@ def _header(member: bytes) -> Any:
         if depth > DEEPEST_HEADER:
             raise ValueError(f"the header is nested deeper than {DEEPEST_HEADER}")
         parts = [part.values() if isinstance(part, dict) else part for part in level]
-        level = [one for some in parts for one in some]
+        level = [member for some in parts for member in some]
     return header
 
 
@@ -236,7 +236,7 @@ def _as_json(header: Mapping[str, Any]) -> str:
 
 
 def _plain_number(value: Any) -> int | float:
-    """Return a number of numpy, which JSON does not know, as Python's."""
+    """Return a NumPy number, which JSON does not know, as a Python number."""
     if isinstance(value, numbers.Integral):
         return int(value)
     if isinstance(value, numbers.Real):

@@ -1,7 +1,7 @@
 """Formats that hold columns as arrays by name: one reader for each, found by the file's ending.
 
 MATLAB up to v7, NumPy's npz and JSON lines need nothing else; xlsx needs openpyxl, and HDF5, which
-MATLAB v7.3 is, needs h5py. The extra `EXTRA` brings both.
+MATLAB v7.3 is, needs h5py. The extra `EXTRA` brings both, and `ROS_EXTRA` what logs of ROS need.
 """
 
 from __future__ import annotations
@@ -15,13 +15,14 @@ import zlib
 from array import array
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pymoo_hdte._io import matlab
+from pymoo_hdte._io import matlab, ros_logs
 from pymoo_hdte._io.budget import Budget, regular_file
 from pymoo_hdte._io.text_header import MOST_LINES_ABOVE
 from pymoo_hdte._io.text_lines import line_blocks
@@ -29,6 +30,8 @@ from pymoo_hdte.checks import InvalidInput
 
 EXTRA = "pymoo-hdte[formats]"
 """What to install for xlsx, HDF5 and MATLAB v7.3."""
+ROS_EXTRA = "pymoo-hdte[ros]"
+"""What to install for rosbag2 and MCAP."""
 
 _HDF5 = b"\x89HDF\r\n\x1a\n"
 _USER_BLOCK = 512
@@ -52,7 +55,7 @@ def read_arrays(path: Path, form: str, names: Sequence[str]) -> Arrays:
     form : str
         One of `READERS`.
     names : sequence of str
-        Of variables, keys, titles, or paths of data sets. A value that is missing is NaN.
+        Names of variables, keys, titles, or paths of data sets. A missing value becomes NaN.
 
     Raises
     ------
@@ -67,19 +70,19 @@ def read_arrays(path: Path, form: str, names: Sequence[str]) -> Arrays:
 
 
 def format_of(path: Path, form: str) -> str:
-    """Return the format of a file: as stated, but where the ending of a text is of another."""
+    """Return the format of a file: as stated, unless its name ends like a file of arrays."""
     if form == "csv":
-        for other, (endings, _) in READERS.items():
+        for actual_form, (endings, _) in READERS.items():
             if path.name.endswith(endings):
-                return other
+                return actual_form
     return form
 
 
-def _library(name: str, path: Path) -> Any:
+def _library(name: str, path: Path, extra: str = EXTRA) -> Any:
     try:
         return importlib.import_module(name)
     except ImportError:
-        allowed = f'a file that needs {name}, after: pip install "{EXTRA}"'
+        allowed = f'a file that needs {name}, after: pip install "{extra}"'
         if path.suffix == ".mat":
             allowed += "; or save it as v5 or v7"
         raise InvalidInput(
@@ -103,7 +106,7 @@ def _checked(
             shape = tuple(values.shape)
             shown = f"{values.dtype} of shape {list(shape)}"
             length = max(shape, default=0)
-            same = all(length == max(one.shape) for one in right.values())
+            same = all(length == max(vector.shape) for vector in right.values())
             if values.dtype.kind in "iuf" and math.prod(shape) == length > 0 and same:
                 right[name] = values
                 budget.check("rows", length, f"{path.name}: {name}")
@@ -148,12 +151,12 @@ _DAMAGED = (
     *(OSError, ValueError, LookupError, TypeError, EOFError, RuntimeError, SyntaxError),
     *(zlib.error, zipfile.BadZipFile, tokenize.TokenError),
 )
-"""What libraries raise where bytes of a packed file were changed."""
+"""Errors that libraries raise for damaged packed files."""
 
 
 @dataclass(frozen=True)
 class _Member:
-    """An array of an npz file that is read when it is asked for, and what its head says of it."""
+    """An array of an npz file, read when its values are taken; type and shape are in its head."""
 
     archive: Any
     name: str
@@ -165,7 +168,7 @@ class _Member:
 
 
 def _member(archive: Any, name: str) -> _Member:
-    """Return an array of an open npz file; `ValueError` if it is none of numbers."""
+    """Return an array of an open npz file; `ValueError` if it does not hold numbers."""
     with archive.zip.open(f"{name}.npy") as file:
         version = np.lib.format.read_magic(file)
         heads = {
@@ -180,9 +183,9 @@ def _check_zip(path: Path, wanted: Callable[[str], bool]) -> list[str]:
     """Return the names in a zip file, whose wanted members together fit into the budget."""
     with zipfile.ZipFile(path) as packed:
         members = packed.infolist()
-    size = sum(one.file_size for one in members if wanted(one.filename))
+    size = sum(member.file_size for member in members if wanted(member.filename))
     Budget.now().check("bytes", size, f"{path.name}, expanded")
-    return [one.filename for one in members]
+    return [member.filename for member in members]
 
 
 def _read_npz(path: Path, names: Sequence[str]) -> Arrays:
@@ -222,7 +225,7 @@ def _read_json_lines(path: Path, names: Sequence[str]) -> Arrays:
                 except OverflowError:
                     raise InvalidInput(f"{place}: {name}", value, "a finite number") from None
     arrays = {name: np.array(column) for name, column in columns.items()}
-    known = {name: one for name, one in arrays.items() if not np.all(np.isnan(one))}
+    known = {name: column for name, column in arrays.items() if not np.all(np.isnan(column))}
     return Arrays(_checked(path, names, known, there))
 
 
@@ -242,7 +245,9 @@ def _read_xlsx(path: Path, names: Sequence[str]) -> Arrays:
             for row in rows:
                 above += 1
                 cells = ["" if cell is None else str(cell).strip() for cell in row]
-                titles = max(titles, cells, key=lambda one: sum(one.count(n) == 1 for n in names))
+                titles = max(
+                    titles, cells, key=lambda candidate: sum(candidate.count(n) == 1 for n in names)
+                )
                 if all(cells.count(name) == 1 for name in names):
                     break
                 if above >= MOST_LINES_ABOVE:
@@ -252,18 +257,18 @@ def _read_xlsx(path: Path, names: Sequence[str]) -> Arrays:
                 raise InvalidInput(f"{path.name}: columns", titles, allowed)
             places = [titles.index(name) for name in names]
             columns = [array("d") for _ in names]
-            row_of_file, first = above, True
+            row_of_file, first_row = above, True
             for row in rows:
                 row_of_file += 1
                 budget.check("rows", row_of_file, f"{path.name}: rows")
-                found = [row[at] if at < len(row) else None for at in places]
+                values = [row[at] if at < len(row) else None for at in places]
                 # Units may stand below the titles.
-                if first and any(isinstance(one, str) for one in found):
-                    first, above = False, above + 1
-                    if not any(isinstance(one, int | float) for one in found):
+                if first_row and any(isinstance(cell, str) for cell in values):
+                    first_row, above = False, above + 1
+                    if not any(isinstance(cell, int | float) for cell in values):
                         continue
-                first = False
-                for name, column, value in zip(names, columns, found, strict=True):
+                first_row = False
+                for name, column, value in zip(names, columns, values, strict=True):
                     if isinstance(value, bool) or not isinstance(value, int | float | None):
                         place = f"{path.name}, row {row_of_file}: {name}"
                         raise InvalidInput(place, value, "a number")
@@ -278,10 +283,16 @@ def _read_xlsx(path: Path, names: Sequence[str]) -> Arrays:
         raise InvalidInput(path.name, str(error)[:200], "an intact xlsx file") from None
     arrays = {name: np.array(column) for name, column in zip(names, columns, strict=True)}
     # Sheets have rows that were formatted and never filled.
-    filled = np.flatnonzero(np.any([~np.isnan(one) for one in arrays.values()], axis=0))
-    last = int(filled[-1]) + 1 if filled.size else 0
-    arrays = {name: one[:last] for name, one in arrays.items()}
+    filled = np.flatnonzero(np.any([~np.isnan(column) for column in arrays.values()], axis=0))
+    n_rows = int(filled[-1]) + 1 if filled.size else 0
+    arrays = {name: column[:n_rows] for name, column in arrays.items()}
     return Arrays(_checked(path, names, arrays, titles), above)
+
+
+def _read_ros(path: Path, names: Sequence[str]) -> Arrays:
+    library = partial(_library, path=path, extra=ROS_EXTRA)
+    columns, there = ros_logs.joint_columns(path, names, library)
+    return Arrays(_checked(path, names, columns, there))
 
 
 READERS: dict[str, tuple[tuple[str, ...], Callable[[Path, Sequence[str]], Arrays]]] = {
@@ -290,5 +301,121 @@ READERS: dict[str, tuple[tuple[str, ...], Callable[[Path, Sequence[str]], Arrays
     "npz": ((".npz",), _read_npz),
     "xlsx": ((".xlsx",), _read_xlsx),
     "hdf5": ((".h5", ".hdf5"), _read_hdf5),
+    **{form: (endings, _read_ros) for form, endings in ros_logs.ENDINGS.items()},
 }
-"""For each format the endings of its files and its reader."""
+"""The endings of file names and the reader of each format."""
+
+
+def vector_names(path: Path, form: str) -> list[str]:
+    """Return names of vectors of numbers of one length, of those of which a file has most numbers.
+
+    Parameters
+    ----------
+    path : Path
+    form : str
+        One of `READERS`.
+
+    Raises
+    ------
+    InvalidInput
+        As `read_arrays`.
+    OSError
+        If it cannot be read.
+    """
+    Budget.now().check("bytes", regular_file(path), path.name)
+    if form in ("json_lines", "xlsx"):
+        return _names_of_json_lines(path) if form == "json_lines" else _names_of_xlsx(path)
+    lengths = {"matlab": _lengths_of_matlab, "npz": _lengths_of_npz, "hdf5": _lengths_of_hdf5}
+    by_length: dict[int, list[str]] = {}
+    for name, length in lengths[form](path).items():
+        by_length.setdefault(length, []).append(name)
+    most = max(by_length, key=lambda length: length * len(by_length[length]), default=0)
+    return by_length[most] if most > 1 else []
+
+
+def _length(shape: Sequence[int], kind: str) -> int:
+    """Return the length of an array if it is a vector of numbers, else 0."""
+    length = max(shape, default=0)
+    return length if kind in "iuf" and math.prod(shape) == length else 0
+
+
+def _lengths_of_matlab(path: Path) -> dict[str, int]:
+    with path.open("rb") as file:
+        start = file.read(_USER_BLOCK + len(_HDF5))
+    if start.startswith(_HDF5) or start[_USER_BLOCK:] == _HDF5:
+        return _lengths_of_hdf5(path)
+    return matlab.vector_lengths(path)
+
+
+def _lengths_of_npz(path: Path) -> dict[str, int]:
+    try:
+        names = [name for name in _check_zip(path, lambda _: False) if name.endswith(".npy")]
+        with np.load(path, allow_pickle=False) as file:
+            members = [_member(file, name.removesuffix(".npy")) for name in names]
+            return {member.name: _length(member.shape, member.dtype.kind) for member in members}
+    except _DAMAGED as error:
+        if isinstance(error, OSError) and not path.is_file():
+            raise
+        raise InvalidInput(path.name, str(error)[:200], "an intact npz file of numbers") from None
+
+
+def _lengths_of_hdf5(path: Path) -> dict[str, int]:
+    h5py = _library("h5py", path)
+    lengths: dict[str, int] = {}
+
+    def note(name: str, data: Any) -> None:
+        if isinstance(data, h5py.Dataset):
+            lengths[name] = _length(data.shape or (), data.dtype.kind)
+
+    try:
+        with h5py.File(path, "r") as file:
+            file.visititems(note)
+    except (OSError, ValueError, KeyError, RuntimeError, TypeError) as error:
+        allowed = "an intact HDF5 file, or a MATLAB file saved as v5 or v7"
+        raise InvalidInput(path.name, str(error)[:200], allowed) from None
+    return lengths
+
+
+def _names_of_json_lines(path: Path) -> list[str]:
+    _, lines = next(line_blocks(path, "JSON lines"), (range(0), []))
+    try:
+        row = json.loads(lines[0]) if lines else {}
+    except (ValueError, RecursionError) as error:
+        allowed = "one JSON object in each line"
+        raise InvalidInput(f"{path.name}, line 1", str(error), allowed) from None
+    pairs = row.items() if isinstance(row, dict) else ()
+    return [
+        name
+        for name, value in pairs
+        if isinstance(value, int | float) and not isinstance(value, bool)
+    ]
+
+
+def _names_of_xlsx(path: Path) -> list[str]:
+    openpyxl = _library("openpyxl", path)
+    try:
+        _check_zip(path, lambda _: True)
+        book = openpyxl.load_workbook(path, read_only=True, data_only=True)
+        try:
+            sheet = book.worksheets[0]
+            sheet.reset_dimensions()
+            titles: list[str] = []
+            for row in sheet.iter_rows(values_only=True, max_row=MOST_LINES_ABOVE):
+                numbers = [isinstance(cell, int | float) and cell is not True for cell in row]
+                if titles and any(numbers):
+                    return [
+                        title
+                        for title, number in zip(titles, numbers, strict=False)
+                        if title and number and titles.count(title) == 1
+                    ]
+                words = ["" if cell is None else str(cell).strip() for cell in row]
+                # Units below the titles have no more cells than these.
+                if sum(map(bool, words)) > sum(map(bool, titles)):
+                    titles = words
+        finally:
+            book.close()
+    except _DAMAGED as error:
+        if isinstance(error, OSError) and not path.is_file():
+            raise
+        raise InvalidInput(path.name, str(error)[:200], "an intact xlsx file") from None
+    return []

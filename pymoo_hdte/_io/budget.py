@@ -34,7 +34,7 @@ class Budget:
         Lines of a text, or length of an array; each number that is read takes 8 bytes of memory,
         and as much again while it is read.
     characters : int
-        Of a line with its end, of the lines of a quoted cell, and of blank lines at a stretch.
+        Of a line with its end, all lines of a quoted cell, or consecutive blank lines.
 
     Examples
     --------
@@ -56,13 +56,13 @@ class Budget:
             If a variable is no whole number above 0.
         """
         values = {}
-        for one in fields(cls):
-            variable = _variable(one.name)
+        for limit in fields(cls):
+            variable = _variable(limit.name)
             if (text := os.environ.get(variable)) is not None:
                 digits = text.strip().replace("_", "")
                 if not (digits.isascii() and digits.isdigit() and int(digits[:20])):
                     raise InvalidInput(variable, text, "a whole number above 0")
-                values[one.name] = int(digits[:20])
+                values[limit.name] = int(digits[:20])
         return cls(**values)
 
     def check(self, unit: str, amount: int, where: str) -> None:
@@ -73,7 +73,7 @@ class Budget:
         unit : {"bytes", "rows", "characters"}
         amount : int
         where : str
-            Names the file, and what of it is too large.
+            The file, and the part of it that is too large, for the error.
 
         Raises
         ------
@@ -108,13 +108,13 @@ def regular_file(path: Path) -> int:
 
 
 @contextmanager
-def memory_told(path: Path) -> Iterator[None]:
-    """Tell which file did not fit into the memory that there is.
+def refused_if_too_large(path: Path) -> Iterator[None]:
+    """Refuse, by its name, a file that does not fit into memory.
 
     Raises
     ------
     InvalidInput
-        In the place of a MemoryError.
+        Instead of a MemoryError inside the block.
     """
     try:
         yield

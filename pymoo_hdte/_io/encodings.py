@@ -1,4 +1,4 @@
-"""Encodings of text: stated, or told by the first bytes and by what decodes.
+"""Encodings of text: stated, or recognised by the first bytes and by what decodes.
 
 UTF-8 is tried first. A byte that is none is one of cp1252, in which Windows writes umlauts and
 units; the first bytes tell UTF-16, by a mark or by the zeros between ASCII characters.
@@ -10,10 +10,10 @@ import codecs
 import re
 
 ENCODINGS = {"utf-8": "utf-8-sig", "cp1252": "cp1252", "utf-16": "utf-16"}
-"""How a file may be encoded, by the name in a layout, with Python's name."""
+"""Python's names of the encodings that a layout may state, by their names there."""
 
 PROBE = 256
-"""Bytes from the start that tell UTF-16."""
+"""Bytes at the start of a file, enough to recognise UTF-16."""
 
 _MARKS = {
     codecs.BOM_UTF8: "utf-8-sig",
@@ -70,12 +70,12 @@ def with_cp1252(text: str) -> str:
 
 
 def decoded(content: bytes) -> str:
-    """Return the whole of a text in UTF-8, UTF-16 or cp1252.
+    """Return a whole text that is in UTF-8, UTF-16 or cp1252.
 
     Raises
     ------
     ValueError
-        For bytes that are none of these.
+        For bytes in no such encoding.
     """
     encoding = encoding_of(content[:PROBE])
     text = content.decode(encoding, "surrogateescape")

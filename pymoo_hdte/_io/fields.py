@@ -29,7 +29,7 @@ class Fields:
     def __init__(self, table: Any, path: str) -> None:
         if not isinstance(table, Mapping):
             raise InvalidInput(path, table, "a table of fields")
-        self._left = dict(table)
+        self._unread = dict(table)
         self._path = path
 
     def _name(self, field: str) -> str:
@@ -37,11 +37,11 @@ class Fields:
 
     def take(self, field: str, allowed: str) -> Any:
         """Return the raw value of a field that must be there; ``allowed`` words the error."""
-        if field not in self._left:
-            near = get_close_matches(field, self._left, 1)
-            what = f"missing; is it {near[0]!r}?" if near else "missing"
+        if field not in self._unread:
+            similar = get_close_matches(field, self._unread, 1)
+            what = f"missing; is it {similar[0]!r}?" if similar else "missing"
             raise InvalidInput(self._name(field), None, f"{allowed} (the field is {what})")
-        return self._left.pop(field)
+        return self._unread.pop(field)
 
     def table(self, field: str) -> Fields:
         """Return a nested table."""
@@ -86,7 +86,7 @@ class Fields:
     def texts(self, field: str) -> tuple[str, ...]:
         """Return a list of non-empty strings."""
         raw = self.take(field, "a list of strings")
-        if not isinstance(raw, list) or not all(isinstance(one, str) and one for one in raw):
+        if not isinstance(raw, list) or not all(isinstance(text, str) and text for text in raw):
             raise InvalidInput(self._name(field), raw, "a list of non-empty strings")
         return tuple(raw)
 
@@ -108,24 +108,24 @@ class Fields:
 
     def names(self) -> tuple[str, ...]:
         """Return the names of the remaining fields."""
-        return tuple(self._left)
+        return tuple(self._unread)
 
     def has(self, field: str) -> bool:
         """Tell whether an optional field is there."""
-        return field in self._left
+        return field in self._unread
 
     def is_table(self, field: str) -> bool:
         """Tell whether a remaining field is a table."""
-        return isinstance(self._left.get(field), Mapping)
+        return isinstance(self._unread.get(field), Mapping)
 
     def is_number(self, field: str) -> bool:
         """Tell whether a remaining field is a number."""
-        return isinstance(self._left.get(field), int | float)
+        return isinstance(self._unread.get(field), int | float)
 
     def finish(self) -> None:
         """Raise `InvalidInput` if a field was not asked for: it is misspelt or misplaced."""
         complaints = Complaints()
-        for field, value in self._left.items():
+        for field, value in self._unread.items():
             with complaints.noted():
                 raise InvalidInput(self._name(field), value, "no such field here")
         complaints.finish()

@@ -17,11 +17,11 @@ from pymoo_hdte._io.text_lines import Seen
 from pymoo_hdte.checks import InvalidInput
 
 _SAME = 1e-3
-"""In steps, up to which moments are the same."""
+"""Moments that differ by less than this, in steps, are the same."""
 _RATES = STEP_SPREAD / 2.0
-"""By which rates may differ and count as equal, relative: a step may deviate by twice as much."""
+"""Largest relative difference of equal rates; a step may deviate by twice as much."""
 _LENGTHS = 0.01
-"""By which the lengths of files without a column of time may differ, relative."""
+"""Largest relative difference in length of files without a column of time."""
 
 
 def read_joined(
@@ -41,14 +41,14 @@ def read_joined(
         coarser one nothing was measured. With a sampling rate instead, equal rows of the files
         belong together.
     seen : callable, optional
-        Is told how many further bytes have been read.
+        Called with the number of further bytes read.
     part : Part, optional
-        Of each of the files.
+        The part to be read of each file.
 
     Returns
     -------
     Table
-        At the steps of the finest file, as long as all were recorded.
+        At the steps of the finest file, while all files were recording.
 
     Raises
     ------
@@ -63,7 +63,7 @@ def read_joined(
             path,
             replace(
                 layout,
-                channels={n: one for n, one in layout.channels.items() if files[n] == path},
+                channels={n: channel for n, channel in layout.channels.items() if files[n] == path},
             ),
             seen,
             part,
@@ -73,7 +73,7 @@ def read_joined(
     if len(tables) == 1:
         return tables[0]
     if layout.time is None:
-        lengths = {path.name: len(one.time) for path, one in zip(paths, tables, strict=True)}
+        lengths = {path.name: len(table.time) for path, table in zip(paths, tables, strict=True)}
         if max(lengths.values()) - min(lengths.values()) > _LENGTHS * max(lengths.values()):
             allowed = "as many in each file, because a sample_rate stands for their times"
             raise InvalidInput("rows of the files", lengths, allowed)
@@ -102,7 +102,7 @@ def read_unbroken(
 def _at_the_finest(paths: Sequence[Path], tables: Sequence[Table]) -> Table:
     finest = min(tables, key=_step)
     if _step(max(tables, key=_step)) > (1.0 + _RATES) * _step(finest):
-        rates = {path.name: 1.0 / _step(one) for path, one in zip(paths, tables, strict=True)}
+        rates = {path.name: 1.0 / _step(table) for path, table in zip(paths, tables, strict=True)}
         raise InvalidInput(
             "rates of the files, Hz",
             {name: float(f"{rate:.6g}") for name, rate in rates.items()},
@@ -110,31 +110,33 @@ def _at_the_finest(paths: Sequence[Path], tables: Sequence[Table]) -> Table:
             "belongs to one of the coarsest",
         )
     step = _step(finest)
-    first = max(one.time[0] for one in tables) - _SAME * step
-    last = min(one.time[-1] for one in tables) + _SAME * step
-    time = finest.time[(finest.time >= first) & (finest.time <= last)]
+    begin = max(table.time[0] for table in tables) - _SAME * step
+    end = min(table.time[-1] for table in tables) + _SAME * step
+    time = finest.time[(finest.time >= begin) & (finest.time <= end)]
     names = ", ".join(path.name for path in paths)
     if len(time) < FEWEST_ROWS:
         allowed = f"at least {FEWEST_ROWS}, recorded while the other files were"
         raise InvalidInput(f"rows of the finest of {names}", len(time), allowed)
     channels, moved = {}, False
-    for one in tables:
-        places = np.searchsorted(one.time, time - _SAME * step)
-        same = places[-1] < len(one.time) and bool(
-            np.all(np.abs(one.time[places] - time) <= _SAME * step)
+    for table in tables:
+        places = np.searchsorted(table.time, time - _SAME * step)
+        same = places[-1] < len(table.time) and bool(
+            np.all(np.abs(table.time[places] - time) <= _SAME * step)
         )
         moved = moved or not same
-        for name, signal in one.channels.items():
-            channels[name] = signal[places] if same else make_interp_spline(one.time, signal)(time)
-    remarks = [one.remark for one in tables]
+        for name, signal in table.channels.items():
+            channels[name] = (
+                signal[places] if same else make_interp_spline(table.time, signal)(time)
+            )
+    remarks = [table.remark for table in tables]
     if moved:
         remarks.append(f"The signals of {names} are taken at the steps of the finest file.")
     return Table(
         time,
         channels,
-        sum(one.dropped for one in tables),
+        sum(table.dropped for table in tables),
         " ".join(filter(None, remarks)),
-        moved or any(one.interpolated for one in tables),
+        moved or any(table.interpolated for table in tables),
     )
 
 

@@ -10,23 +10,23 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+from pymoo_hdte._io.csv_table import LARGEST
 from pymoo_hdte._io.encodings import ENCODINGS
 from pymoo_hdte._io.fields import Fields
 from pymoo_hdte._io.text_columns import DECIMALS
 from pymoo_hdte._io.text_header import DELIMITERS
-from pymoo_hdte._io.text_table import LARGEST
 from pymoo_hdte.checks import InvalidInput, one_of, real_number
 from pymoo_hdte.units import ORIGINS, UNITS, suggestion, usual_spelling
 
 TEXTS = ("csv", "plain")
 """Formats of text."""
-FORMATS = ("matlab", *TEXTS, "json_lines", "npz", "xlsx", "hdf5")
+FORMATS = ("matlab", *TEXTS, "json_lines", "npz", "xlsx", "hdf5", "rosbag2", "mcap")
 MEASURED = (
     *("time", "angle", "length", "speed", "linear speed", "acceleration", "linear acceleration"),
     *("force", "torque", "current", "voltage", "temperature", "ratio"),
 )
 """Quantities, among those of `pymoo_hdte.units`, that a channel may hold."""
-CHANNEL_UNITS = {unit: size for one in MEASURED for unit, size in UNITS[one].items()}
+CHANNEL_UNITS = {unit: size for quantity in MEASURED for unit, size in UNITS[quantity].items()}
 """Every unit a channel may have, with its factor to SI."""
 
 COUNTS = "counts"
@@ -40,7 +40,7 @@ class Channel:
     Attributes
     ----------
     column : str or int
-        Its title, or in a table of text its number from 0; an empty title is that of no column.
+        Its title, or in a table of text its number from 0. An empty title stands for no column.
     unit : str
         One of `CHANNEL_UNITS`, or `COUNTS`.
     scale : float
@@ -49,9 +49,9 @@ class Channel:
     unwrap : bool
         For angles that jump by a turn.
     wraps : float, optional
-        After how much, in the unit, the readings begin anew: a counter that overflows.
+        Interval, in the unit, after which the readings of an overflowing counter begin anew.
     counts_per_turn : float, optional
-        With `COUNTS` only.
+        Counts of a turn of the encoder, for the unit `COUNTS` only.
     zero : float
         Reading where the channel is zero, in the unit.
     integrated : bool
@@ -60,7 +60,7 @@ class Channel:
     Raises
     ------
     InvalidInput
-        For another unit, or what does not go with it.
+        For an unknown unit, or a field that does not go with the unit.
     """
 
     column: str | int
@@ -87,7 +87,7 @@ class Channel:
 
     @property
     def factor(self) -> float:
-        """Of the unit, to SI."""
+        """Factor of the unit to SI."""
         if self.counts_per_turn is not None:
             return 2.0 * math.pi / self.counts_per_turn
         return CHANNEL_UNITS[self.unit]
@@ -99,7 +99,7 @@ class Channel:
 
     @property
     def period(self) -> float | None:
-        """After how much in SI the readings begin anew, or None."""
+        """Interval in SI after which the readings begin anew, or None."""
         if self.unwrap:
             return 2.0 * math.pi * abs(self.scale)
         return None if self.wraps is None else abs(self.wraps * self.factor * self.scale)
@@ -132,13 +132,13 @@ def layout_from_fields(table: Fields, usual: TableLayout | None = None) -> Table
     ----------
     table : Fields
     usual : TableLayout, optional
-        Holds for whatever the table leaves out; the table has no channels but its own, and no units
-        of another quantity.
+        Layout that holds for whatever the table leaves out. The table may then name only its
+        channels, in units of the same quantities.
 
     Raises
     ------
     InvalidInput
-        With the field.
+        With the name of the faulty field.
     """
     form = usual.format if usual else None
     form = table.choice("format", FORMATS) if table.has("format") else form
@@ -175,7 +175,7 @@ def with_zeros(table: Fields, layout: TableLayout) -> TableLayout:
         For a channel that the layout does not have, or a reading that is no number.
     """
     channels = dict(layout.channels)
-    there = [name for name, one in channels.items() if one.column != ""]
+    there = [name for name, channel in channels.items() if channel.column != ""]
     for name in table.names():
         one_of(table._name("channel"), name, there)
         zero = table.number(name, at_least=-LARGEST, at_most=LARGEST)
@@ -185,9 +185,9 @@ def with_zeros(table: Fields, layout: TableLayout) -> TableLayout:
 
 def _form_of(table: Fields, channels: Sequence[Channel]) -> str:
     """Return the format of a file whose columns have titles, or numbers."""
-    numbered = {isinstance(one.column, int) for one in channels}
+    numbered = {isinstance(channel.column, int) for channel in channels}
     if len(numbered) > 1:
-        columns = [one.column for one in channels]
+        columns = [channel.column for channel in channels]
         raise InvalidInput(table._name("columns"), columns, "titles for all, or numbers for all")
     return "plain" if True in numbered else "csv"
 
@@ -214,7 +214,7 @@ def _units_beside(channel: Channel) -> Collection[str]:
     """Return the units of the quantity of a channel."""
     if channel.unit == COUNTS:
         return UNITS["angle"]
-    return next(UNITS[one] for one in MEASURED if channel.unit in UNITS[one])
+    return next(UNITS[quantity] for quantity in MEASURED if channel.unit in UNITS[quantity])
 
 
 def _channel(table: Fields, form: str | None, units: Collection[str]) -> Channel:
@@ -252,6 +252,6 @@ def _unit(table: Fields, units: tuple[str, ...]) -> str:
     known = ", ".join(map(repr, units))
     allowed = f"one of {known}{suggestion(str(stated), units)}"
     if unit in CHANNEL_UNITS:
-        kind = next(one for one in MEASURED if unit in UNITS[one])
+        kind = next(quantity for quantity in MEASURED if unit in UNITS[quantity])
         allowed = f"no unit of {kind}, which this column does not hold, but one of {known}"
     raise InvalidInput(table._name("unit"), stated, allowed)

@@ -9,7 +9,8 @@ from __future__ import annotations
 import math
 import struct
 import zlib
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -38,26 +39,13 @@ def read_vectors(path: Path, names: Sequence[str]) -> dict[str, NDArray[np.float
         If it cannot be read.
     """
     budget = Budget.now()
-    budget.check("bytes", regular_file(path), path.name)
-    data, at = path.read_bytes(), 128
-    found, columns = dict[str, str](), dict[str, NDArray[np.float64]]()
+    descriptions, columns = dict[str, str](), dict[str, NDArray[np.float64]]()
     expanded = 0
-    try:
-        order = {b"\0\1IM": "<", b"\1\0MI": ">"}[data[124:128]]
-        while at < len(data):
-            kind, matrix, at = _element(data, at, order)
-            packed = matrix if kind == _COMPRESSED else None
-            head = matrix[:_HEAD]
-            if packed is not None:
-                head = zlib.decompressobj().decompress(packed, _HEAD)[8:]
-            flags = struct.unpack_from(f"{order}8xI", head)[0]
-            _, shape, start = _element(head, 16, order)
-            _, title, start = _element(head, start, order)
-            name, lengths = title.decode("latin-1"), np.frombuffer(shape, f"{order}i4").tolist()
-            found[name] = f"MATLAB class {flags & 0xFFF:#x} of shape {lengths}"
-            if name in names and flags & 0xFF in _NUMERIC and not flags & _COMPLEX:
-                if math.prod(lengths) != max(lengths):
-                    continue
+    with _refusals(path):
+        order, data = _contents(path)
+        for name, flags, lengths, start, matrix, packed in _arrays(data, order):
+            descriptions[name] = f"MATLAB class {flags & 0xFFF:#x} of shape {lengths}"
+            if name in names and _is_vector(flags, lengths):
                 budget.check("rows", max(lengths), f"{path.name}: {name}")
                 if packed is not None:
                     # Eight bytes at most for a number, and the tag in front of them.
@@ -67,16 +55,75 @@ def read_vectors(path: Path, names: Sequence[str]) -> dict[str, NDArray[np.float
                 kind, numbers, _ = _element(matrix, start, order)
                 values = np.frombuffer(numbers, order + _NUMBERS[kind]).reshape(lengths)
                 columns[name] = values.ravel().astype(float)
+    for name in names:
+        if name not in columns or columns[name].size != columns[names[0]].size:
+            allowed = f"a vector of real numbers, all of one length; there are {descriptions}"
+            raise InvalidInput(f"{path.name}: {name}", descriptions.get(name), allowed[:500])
+    return columns
+
+
+def vector_lengths(path: Path) -> dict[str, int]:
+    """Return how many numbers each row or column of real numbers has, by name.
+
+    Raises
+    ------
+    InvalidInput, OSError
+        As `read_vectors`.
+    """
+    with _refusals(path):
+        order, data = _contents(path)
+        return {
+            name: max(lengths)
+            for name, flags, lengths, *_ in _arrays(data, order)
+            if _is_vector(flags, lengths)
+        }
+
+
+@contextmanager
+def _refusals(path: Path) -> Iterator[None]:
+    """Refuse the file by name where its bytes are not those of MATLAB."""
+    try:
+        yield
     except (KeyError, ValueError, struct.error, zlib.error) as error:
         if isinstance(error, InvalidInput):
             raise
         allowed = "an intact MATLAB file (save v4 or v7.3, HDF5, as v5 or v7)"
         raise InvalidInput(path.name, repr(error)[:200], allowed) from None
-    for name in names:
-        if name not in columns or columns[name].size != columns[names[0]].size:
-            allowed = f"a vector of real numbers, all of one length; there are {found}"
-            raise InvalidInput(f"{path.name}: {name}", found.get(name), allowed[:500])
-    return columns
+
+
+def _contents(path: Path) -> tuple[str, bytes]:
+    """Return the order of bytes and all bytes of a file."""
+    Budget.now().check("bytes", regular_file(path), path.name)
+    data = path.read_bytes()
+    return {b"\0\1IM": "<", b"\1\0MI": ">"}[data[124:128]], data
+
+
+_Array = tuple[str, int, list[int], int, bytes, bytes | None]
+
+
+def _arrays(data: bytes, order: str) -> Iterator[_Array]:
+    """Yield name, flags, lengths and start of the numbers of each array, and its bytes.
+
+    The last are the array as it stands, and the same if it is compressed.
+    """
+    at = 128
+    while at < len(data):
+        kind, matrix, at = _element(data, at, order)
+        packed = matrix if kind == _COMPRESSED else None
+        head = matrix[:_HEAD]
+        if packed is not None:
+            head = zlib.decompressobj().decompress(packed, _HEAD)[8:]
+        flags = struct.unpack_from(f"{order}8xI", head)[0]
+        _, shape, start = _element(head, 16, order)
+        _, title, start = _element(head, start, order)
+        lengths = np.frombuffer(shape, f"{order}i4").tolist()
+        yield title.decode("latin-1"), flags, lengths, start, matrix, packed
+
+
+def _is_vector(flags: int, lengths: list[int]) -> bool:
+    """Tell whether an array is a row or a column of real numbers."""
+    numeric = flags & 0xFF in _NUMERIC and not flags & _COMPLEX
+    return numeric and math.prod(lengths) == max(lengths)
 
 
 def _expanded(packed: bytes, most: int) -> bytes:

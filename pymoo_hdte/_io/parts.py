@@ -12,19 +12,19 @@ from pymoo_hdte._io.fields import Fields
 from pymoo_hdte.checks import InvalidInput
 
 WORDS = ("share", "rows", "seconds")
-"""How a part may be stated."""
+"""Units in which a part may be stated."""
 
 
 @dataclass(frozen=True)
 class Part:
-    """A part of a file, the first of its limits inside, the last outside.
+    """A part of a file, from its start (inside) to its stop (outside).
 
     Attributes
     ----------
     by : {"share", "rows", "seconds"}
-        Shares of the rows, numbers of rows from 0, each below those that are skipped, or times as
-        in the column of time, s.
-    first, last : float
+        Whether the limits are shares of the rows, row numbers from 0 or times as in the column of
+        time, s. Skipped rows do not count.
+    start, stop : float
 
     Raises
     ------
@@ -33,28 +33,28 @@ class Part:
     """
 
     by: str
-    first: float
-    last: float
+    start: float
+    stop: float
 
     def __post_init__(self) -> None:
         least, most = {"share": (0.0, 1.0), "rows": (0.0, math.inf)}.get(
             self.by, (-math.inf, math.inf)
         )
-        whole = self.by != "rows" or (self.first % 1.0 == 0.0 == self.last % 1.0)
-        if not (least <= self.first < self.last <= most and whole):
+        whole = self.by != "rows" or (self.start % 1.0 == 0.0 == self.stop % 1.0)
+        if not (least <= self.start < self.stop <= most and whole):
             allowed = {
                 "share": "[from, to] between 0 and 1, rising",
                 "rows": "[first, end] as whole numbers from 0, rising",
             }.get(self.by, "[from, to] in s, rising")
-            raise InvalidInput(self.by, [self.first, self.last], allowed)
+            raise InvalidInput(self.by, [self.start, self.stop], allowed)
 
     def rows_of(self, time: NDArray[np.float64]) -> slice:
-        """Return the rows of the part among all, which were taken at times of shape (n,), s."""
+        """Return which of the rows, taken at times of shape (n,), s, belong to the part."""
         if self.by == "seconds":
-            inside = np.flatnonzero((time >= self.first) & (time < self.last))
+            inside = np.flatnonzero((time >= self.start) & (time < self.stop))
             return slice(int(inside[0]), int(inside[-1]) + 1) if inside.size else slice(0, 0)
         size = len(time) if self.by == "share" else 1
-        return slice(round(self.first * size), min(round(self.last * size), len(time)))
+        return slice(round(self.start * size), min(round(self.stop * size), len(time)))
 
 
 def part_from_fields(entry: Fields) -> Part | None:
@@ -63,14 +63,14 @@ def part_from_fields(entry: Fields) -> Part | None:
     Raises
     ------
     InvalidInput
-        With the field, as `Part`, or for a second of `WORDS`.
+        With the name of the faulty field: as `Part`, or if the part is stated twice.
     """
     stated = [word for word in WORDS if entry.has(word)]
     if not stated:
         return None
     by, *others = stated
-    for other in others:
-        raise InvalidInput(entry._name(other), entry.numbers(other), f"absent beside {by}")
+    for word in others:
+        raise InvalidInput(entry._name(word), entry.numbers(word), f"absent beside {by}")
     limits = entry.numbers(by)
     if len(limits) != 2:
         raise InvalidInput(entry._name(by), limits, "two numbers, [from, to]")

@@ -15,14 +15,14 @@ from numpy.typing import NDArray
 from scipy.interpolate import make_interp_spline
 
 from pymoo_hdte._io.array_files import READERS, format_of, read_arrays
-from pymoo_hdte._io.budget import memory_told, regular_file
+from pymoo_hdte._io.budget import refused_if_too_large, regular_file
+from pymoo_hdte._io.csv_table import LARGEST, read_text_table
 from pymoo_hdte._io.even_steps import LONGEST_STEP, even_steps, is_even
 from pymoo_hdte._io.layout import CHANNEL_UNITS, Channel, TableLayout, layout_from_fields
 from pymoo_hdte._io.parts import Part
 from pymoo_hdte._io.text_columns import TextTable, column_label
 from pymoo_hdte._io.text_header import numbered
 from pymoo_hdte._io.text_lines import Seen
-from pymoo_hdte._io.text_table import LARGEST, read_text_table
 from pymoo_hdte.checks import InvalidInput, real_number
 from pymoo_hdte.units import ORIGINS, usual_spelling
 
@@ -59,7 +59,7 @@ class Columns:
     above: int = 0
 
     def si(self, channel: Channel, rows: slice = slice(None)) -> NDArray[np.float64]:
-        """Return a channel in SI, shape (n,); what is not finite is interpolated if any is."""
+        """Return a channel in SI, shape (n,); values that are not finite are interpolated."""
         raw = self.raw[channel.column][rows]
         at = np.flatnonzero(np.isfinite(raw))
         if at.size == 0:
@@ -79,7 +79,7 @@ class Columns:
 
     @cached_property
     def time(self) -> NDArray[np.float64]:
-        """Of each row, s, shape (n,): as measured, or row of the file / sample rate."""
+        """Time of each row, s, shape (n,): as measured, or row of the file / sample rate."""
         if self.layout.time:
             return self.si(self.layout.time)
         rate = real_number("sample_rate", self.layout.sample_rate, above=0.0)
@@ -93,12 +93,12 @@ class Columns:
 
     @property
     def span(self) -> str:
-        """Where all rows stand."""
+        """Lines or rows of the file where the rows stand, for errors."""
         if self.text:
             return f"{self.path.name}, lines {self.text.lines[0]} to {self.text.lines[-1]}"
-        first = self.above + self.layout.skip_rows + 1
-        last = first + self.length - 1
-        return f"{self.path.name}, rows {first} to {last}"
+        first_row = self.above + self.layout.skip_rows + 1
+        last_row = first_row + self.length - 1
+        return f"{self.path.name}, rows {first_row} to {last_row}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,8 +138,8 @@ def read_unbroken_tables(
 ) -> list[Table]:
     """Read the mapped columns as `read_table` does; a gap in time begins another table.
 
-    Of more gaps than one in `ROWS_PER_FILLED` rows the file is refused, as by `read_table`. Tables
-    shorter than one row in as many are left out.
+    A file with more than one gap per `ROWS_PER_FILLED` rows is refused, as by `read_table`. Tables
+    with less than that share of the rows are left out.
 
     Returns
     -------
@@ -166,7 +166,7 @@ def _tables(
     finite = np.all([np.isfinite(raw) for raw in columns.values()], axis=0)
     whole = np.flatnonzero(finite)
     if whole.size < FEWEST_ROWS:
-        of = f" in {part.by} = {[part.first, part.last]}" if part else ""
+        of = f" in {part.by} = {[part.start, part.stop]}" if part else ""
         place = f"{path.name}: finite rows after skip_rows = {layout.skip_rows}{of}"
         raise InvalidInput(place, whole.size, f"at least {FEWEST_ROWS}")
 
@@ -182,8 +182,8 @@ def _tables(
     for at in np.flatnonzero(gaps > LONGEST_GAP)[:1]:
         allowed = f"gaps of at most {LONGEST_GAP} rows; here are {gaps[at]}"
         raise missing(int(whole[at]) + 1, allowed)
-    kept = slice(rows.start + start, rows.start + stop)
-    time, dropped = read.time[kept], int(np.count_nonzero(~finite))
+    record_rows = slice(rows.start + start, rows.start + stop)
+    time, dropped = read.time[record_rows], int(np.count_nonzero(~finite))
     steps = np.diff(time)
     mean, usual = float(np.mean(steps)), float(np.median(steps))
     falls, leaps = steps <= 0.0, steps > LONGEST_STEP * mean
@@ -203,23 +203,23 @@ def _tables(
         column = layout.time.column if layout.time else next(iter(columns))
         raise refuse(start + int(row) + 1, column, allowed)
     if not pieces:
-        return [_even_table(read, kept, dropped)]
-    first = int(np.argmax(steps > LONGEST_STEP * usual))
+        return [_even_table(read, record_rows, dropped)]
+    gap_row = record_rows.start + int(np.argmax(steps > LONGEST_STEP * usual))
     out = len(time) - sum(piece.stop - piece.start for piece in pieces)
     said = (
         f"{path.name} leaves gaps of up to {1e3 * float(steps.max()):.4g} ms between rows that are "
-        f"{1e3 * usual:.4g} ms apart, the first after {read.place(kept.start + first)}. The rows "
+        f"{1e3 * usual:.4g} ms apart, the first after {read.place(gap_row)}. The rows "
         f"between gaps are records of their own, {len(pieces)} in number."
     ) + (f" Rows of shorter parts are left out: {out}." if out else "")
     tables = [
         _even_table(
             read,
-            slice(kept.start + piece.start, kept.start + piece.stop),
+            slice(record_rows.start + piece.start, record_rows.start + piece.stop),
             0 if number else dropped,
         )
         for number, piece in enumerate(pieces)
     ]
-    return [replace(one, remark=f"{said} {one.remark}".strip()) for one in tables]
+    return [replace(table, remark=f"{said} {table.remark}".strip()) for table in tables]
 
 
 def _pieces(steps: NDArray[np.float64], usual: float) -> list[slice]:
@@ -230,14 +230,14 @@ def _pieces(steps: NDArray[np.float64], usual: float) -> list[slice]:
         return []
     limits = [0, *ends.tolist(), rows]
     least = max(FEWEST_ROWS, rows // ROWS_PER_FILLED)
-    return [slice(first, last) for first, last in pairwise(limits) if last - first >= least]
+    return [slice(start, stop) for start, stop in pairwise(limits) if stop - start >= least]
 
 
-def _even_table(read: Columns, kept: slice, dropped: int) -> Table:
+def _even_table(read: Columns, rows: slice, dropped: int) -> Table:
     """Return rows without a gap in time, at even steps."""
-    layout, time = read.layout, read.time[kept]
+    layout, time = read.layout, read.time[rows]
     # Turns of an angle that wraps, and rates, count from the first row of the file.
-    signals = {name: read.si(channel)[kept] for name, channel in layout.channels.items()}
+    signals = {name: read.si(channel)[rows] for name, channel in layout.channels.items()}
     remark, interpolated = "", False
     if layout.time is not None and not is_even(time):
         even = even_steps(time, signals)
@@ -247,7 +247,7 @@ def _even_table(read: Columns, kept: slice, dropped: int) -> Table:
         # Only now: the integral over stamps that are wrong is smooth over them, and hides it.
         if channel.integrated:
             sums = make_interp_spline(time, signals[name], 3).antiderivative()(time)
-            signals[name] = sums - sums[0] + read.sum_before(channel, kept.start)
+            signals[name] = sums - sums[0] + read.sum_before(channel, rows.start)
     return Table(time, signals, dropped, remark, interpolated)
 
 
@@ -279,16 +279,16 @@ def read_columns(
     gaps : bool
         Whether values may be missing or not finite.
     seen : callable, optional
-        Is told how many further bytes have been read.
+        Called with the number of further bytes read.
 
     Raises
     ------
     InvalidInput
-        As `read_table`, but for what it says of values, of rows and of time.
+        As `read_table`, except that neither values nor the number of rows nor times are checked.
     OSError
         If the file cannot be read.
     """
-    with memory_told(path):
+    with refused_if_too_large(path):
         return _columns(path, layout, gaps, seen)
 
 
@@ -323,8 +323,8 @@ def _columns(path: Path, layout: TableLayout, gaps: bool, seen: Seen | None) -> 
     )
     if counted:
         titles = {name: numbered(name) for name in names}
-        found = table.numbers(list(titles.values()), gaps=gaps)
-        raw = {name: found[title] for name, title in titles.items()}
+        columns = table.numbers(list(titles.values()), gaps=gaps)
+        raw = {name: columns[title] for name, title in titles.items()}
         return Columns(path, layout, raw, table, len(raw[names[0]]))
     for channel in mapped:
         _check_unit(table, channel)
@@ -333,7 +333,7 @@ def _columns(path: Path, layout: TableLayout, gaps: bool, seen: Seen | None) -> 
 
 
 def _check_unit(table: TextTable, channel: Channel) -> None:
-    """Refuse a channel whose unit is another than the file has in its row of units."""
+    """Refuse a channel whose unit differs from that in the row of units of the file."""
     unit = usual_spelling(table.units.get(str(channel.column), "").strip("[]() "))
     stated = CHANNEL_UNITS.get(unit), ORIGINS.get(unit, 0.0)
     if unit in CHANNEL_UNITS and stated != (channel.factor, channel.origin):

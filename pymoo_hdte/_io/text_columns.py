@@ -17,10 +17,10 @@ from pymoo_hdte._io.text_lines import Block, Row
 from pymoo_hdte.checks import InvalidInput
 
 DECIMALS = {"point": ".", "comma": ","}
-"""What may stand before the decimals of a number, by name."""
+"""Decimal marks by their names in a layout."""
 
 _MOST_COMPARED = 1000
-"""Titles among which one is looked for that is like a missing one, which takes a while each."""
+"""Largest number of titles among which one like a missing title is sought: each takes a while."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,13 +32,13 @@ class TextTable:
     file : str
         Name, for error messages.
     titles : list of str, or of int
-        Of the columns; their numbers from 0 if the file has no titles.
+        Titles of the columns; their numbers from 0 if the file has none.
     title_line : int
         The number of the line of titles, from 1.
     mark : str or None
         What separates the cells of a row; None for any white space.
     units : dict of str to str
-        Of the columns, from the row of units below the titles; empty without such a row.
+        Units of the columns, from a row below the titles; empty without such a row.
     decimal : {".", ","} or None
         What stands before decimals; None to find out.
     blocks : callable
@@ -59,7 +59,7 @@ class TextTable:
         return [line for lines, _ in self.blocks() for line in lines]
 
     def require(self, names: Sequence[Any], *, no_others: bool = False) -> None:
-        """Raise `InvalidInput` unless each of these columns is there once, and no others if so."""
+        """Raise `InvalidInput` unless these columns are there once each, and others if allowed."""
         there = all(self.titles.count(name) == 1 for name in names)
         if not there or (no_others and len(self.titles) != len(names)):
             field = f"{self.file}, line {self.title_line}: columns"
@@ -67,16 +67,16 @@ class TextTable:
             raise InvalidInput(field, self.titles, allowed)
 
     def _hint(self, names: Sequence[Any]) -> str:
-        """Return what may help where columns are missing, as the end of a sentence."""
+        """Return a hint about missing columns, as the end of a sentence."""
         missing = [name for name in names if name not in self.titles]
-        titles = [one for one in self.titles if isinstance(one, str)]
+        titles = [title for title in self.titles if isinstance(title, str)]
         if titles and all(map(begins_as_number, titles)):
             return "; a file without titles has columns that are called by numbers, from 0"
         if len(titles) > _MOST_COMPARED:
             return ""
-        near = [(name, get_close_matches(str(name), titles, 1, 0.4)) for name in missing]
-        found = [f"is {name} {one[0]!r}?" for name, one in near if one]
-        return f"; {' '.join(found)}" if found else ""
+        similar = [(name, get_close_matches(str(name), titles, 1, 0.4)) for name in missing]
+        questions = [f"is {name} {matches[0]!r}?" for name, matches in similar if matches]
+        return f"; {' '.join(questions)}" if questions else ""
 
     def numbers(
         self, names: Sequence[Any], *, gaps: bool = False
@@ -96,25 +96,26 @@ class TextTable:
             For a column that is not there once, no rows, a row with another number of cells than
             the titles, text in the place of a number, or a gap.
         """
-        found: list[NDArray[np.float64]] = []
+        tables: list[NDArray[np.float64]] = []
         decimal = self.decimal or ("." if self.mark == "," else None)
         for lines, rows in self.blocks():
-            if not found:
+            if not tables:
                 self.require(names)
             decimal = decimal or self._decimal_of(rows, names)
             # All at once is fast; cell by cell locates errors.
             table = self._all_at_once(rows, names, decimal)
             if table is None or not (gaps or np.all(np.isfinite(table))):
                 table = self._cell_by_cell(lines, rows, names, gaps, decimal or ".")
-            found.append(table)
-        if not found and gaps:
+            tables.append(table)
+        if not tables and gaps:
             return {name: np.empty(0) for name in names}
         self.require(names)
-        if not found:
+        if not tables:
             field = f"{self.file}, line {self.title_line}: rows below the header"
             raise InvalidInput(field, 0, "at least 1")
         return {
-            name: np.concatenate([one[:, at] for one in found]) for at, name in enumerate(names)
+            name: np.concatenate([table[:, at] for table in tables])
+            for at, name in enumerate(names)
         }
 
     def texts(self) -> list[dict[Any, str]]:
@@ -203,8 +204,8 @@ class TextTable:
         cells = row.split(self.mark) if isinstance(row, str) else row
         if len(cells) != len(self.titles):
             field = f"{self.file}, line {line}: number of cells"
-            first = "header" if self._titled else "first line"
-            raise InvalidInput(field, len(cells), f"{len(self.titles)}, as in the {first}")
+            reference = "header" if self._titled else "first line"
+            raise InvalidInput(field, len(cells), f"{len(self.titles)}, as in the {reference}")
         return cells
 
 

@@ -13,10 +13,10 @@ DELIMITERS = {"comma": ",", "semicolon": ";", "tab": "\t", "space": None}
 """What separates cells, by name; ``space`` is any white space."""
 
 MOST_LINES_ABOVE = 200
-"""Among so many lines the titles are looked for."""
+"""Number of lines in which the titles are sought."""
 
 AROUND = ' \t"'
-"""What may stand around a number or a title in its cell."""
+"""Characters that may stand around a number or a title in its cell."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ def plain_header(
 ) -> Header:
     """Return the numbers of the columns of a table without titles, by its first row."""
     top, line = (lines[0], numbers[0]) if lines else ("", 1)
-    mark = next((one for one in ",;" if one in top), None)
+    mark = next((character for character in ",;" if character in top), None)
     mark = mark if delimiter is None else DELIMITERS[delimiter]
     return Header(list(range(len(top.split(mark)))), line, mark, skip_rows)
 
@@ -99,9 +99,9 @@ def titled_header(
         for mark in _marks(lines[place], delimiter):
             titles = cells_of(file, numbers[place], lines[place], mark)
             words = sum(bool(cell) and not begins_as_number(cell) for cell in titles)
-            found = sum(titles.count(name) == 1 for name in wanted), words
-            if found > most:
-                most, at = found, place
+            score = sum(titles.count(name) == 1 for name in wanted), words
+            if score > most:
+                most, at = score, place
                 best = Header(titles, numbers[place], mark, skip_rows)
         if wanted and most[0] == len(wanted):
             break

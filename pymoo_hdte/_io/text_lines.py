@@ -29,20 +29,20 @@ FIRST_LINES = 1 << 16
 Lines = tuple[Sequence[int], list[str]]
 """Lines with their numbers, from 1."""
 Row = str | list[str]
-"""A row as it stands, or cut into cells where any is quoted."""
+"""A row as it stands in the file, or its cells in a block with quotes."""
 Block = tuple[Sequence[int], list[Row]]
 """The numbers of the lines on which rows begin, and the rows."""
 Seen = Callable[[int], None]
-"""Is told how many further bytes of a file have been read."""
+"""Called with the number of further bytes read of a file."""
 Progress = Callable[[int, int], None]
-"""Is told how many bytes of all files have been read, and how many there are."""
+"""Called with the bytes read of all files so far, and their total."""
 
 _NO_TEXT = re.compile("[\0\udc80-\udcff]")
 """NUL, or a byte that is no UTF-8, as Python hands it on."""
 
 
-def told(progress: Progress | None, paths: Sequence[Path]) -> Seen | None:
-    """Return what adds up the bytes that are read and tells them, with those of all files."""
+def byte_counter(progress: Progress | None, paths: Sequence[Path]) -> Seen | None:
+    """Return a counter that reports the bytes read so far, and those of all files."""
     if progress is None:
         return None
     total, done = sum(path.stat().st_size for path in paths), 0
@@ -67,9 +67,9 @@ def line_blocks(
     Parameters
     ----------
     path : Path
-        Of a file that is compressed if its name ends in ``.gz``.
+        A file, compressed if its name ends in ``.gz``.
     kind : str
-        Of text that it should be, for errors.
+        Kind of text that is expected, for errors.
     seen : callable, optional
         Called after each block.
     size : int
@@ -91,15 +91,15 @@ def line_blocks(
         blank: list[str] = []
         start, done, characters = 1, 0, 0
         for lines in _lines(path, kind, raw, size, budget, encoding):
-            kept = len(lines)
-            while kept and not lines[kept - 1].strip():
-                kept -= 1
+            end = len(lines)
+            while end and not lines[end - 1].strip():
+                end -= 1
             if seen:
                 seen(raw.tell() - done)
                 done = raw.tell()
-            further = lines[kept:]
-            if kept:
-                lines = blank + lines[:kept]
+            further = lines[end:]
+            if end:
+                lines = blank + lines[:end]
                 budget.check("rows", start + len(lines) - 1, f"{path.name}: lines")
                 yield range(start, start + len(lines)), lines
                 start += len(lines)
@@ -110,20 +110,20 @@ def line_blocks(
 
 
 def lines_below(blocks: Iterable[Lines], line: int, skip: int) -> Iterator[Lines]:
-    """Yield the lines below a line, without the first so many of them."""
+    """Yield the lines below a line, without the first `skip` of them."""
     for numbers, lines in blocks:
-        first = bisect_right(numbers, line)
-        first, skip = min(first + skip, len(lines)), max(skip - (len(lines) - first), 0)
-        if first < len(lines):
-            yield numbers[first:], lines[first:]
+        start = bisect_right(numbers, line)
+        start, skip = min(start + skip, len(lines)), max(skip - (len(lines) - start), 0)
+        if start < len(lines):
+            yield numbers[start:], lines[start:]
 
 
 def unquoted_rows(file: str, blocks: Iterator[Lines], mark: str) -> Iterator[Block]:
     """Yield rows, cut into cells in blocks with quotes; a quoted cell may have several lines."""
     most = Budget.now().characters
-    rest: Lines | None = None
-    while block := rest or next(blocks, None):
-        rest = None
+    remaining_lines: Lines | None = None
+    while block := remaining_lines or next(blocks, None):
+        remaining_lines = None
         numbers, lines = block
         quotes = _quotes(lines)
         if not quotes:
@@ -133,7 +133,9 @@ def unquoted_rows(file: str, blocks: Iterator[Lines], mark: str) -> Iterator[Blo
             # A cell that begins in this block may end in another.
             further, ends = _to_the_end(blocks, most)
             numbers, lines = [*numbers, *further[0][:ends]], [*lines, *further[1][:ends]]
-            rest = (further[0][ends:], further[1][ends:]) if ends < len(further[1]) else None
+            remaining_lines = (
+                (further[0][ends:], further[1][ends:]) if ends < len(further[1]) else None
+            )
         yield _cut(file, numbers, lines, mark)
 
 
@@ -162,7 +164,7 @@ def _lines(
 ) -> Iterator[list[str]]:
     packed = path.suffix == ".gz"
     binary = cast("BinaryIO", gzip.GzipFile(fileobj=raw)) if packed else raw
-    text, rest, done = None, "", 0
+    text, partial_line, done = None, "", 0
 
     def long(length: int, line: int) -> None:
         budget.check("characters", length, f"{path.name}, line {line}: a line")
@@ -173,10 +175,10 @@ def _lines(
         # With the surrogates of bytes that are no text, so that their line can be told.
         text = io.TextIOWrapper(binary, coded, "surrogateescape")
         mixed = encoding is None and coded == ENCODINGS["utf-8"]
-        while found := text.read(size):
-            found = with_cp1252(found) if mixed else found
+        while chunk := text.read(size):
+            chunk = with_cp1252(chunk) if mixed else chunk
             budget.check("bytes", binary.tell(), f"{path.name}, expanded")
-            whole, end, rest = (rest + found).rpartition("\n")
+            whole, end, partial_line = (partial_line + chunk).rpartition("\n")
             if end:
                 _check(path, kind, whole, done)
                 lines = whole.split("\n")
@@ -185,7 +187,7 @@ def _lines(
                 long(longest + 1, done + lengths.index(longest) + 1)
                 done += len(lines)
                 yield lines
-            long(len(rest), done + 1)
+            long(len(partial_line), done + 1)
     except (gzip.BadGzipFile, EOFError, zlib.error) as error:
         raise InvalidInput(path.name, str(error), f"gzip-compressed {kind} in UTF-8") from None
     except UnicodeError as error:
@@ -194,12 +196,12 @@ def _lines(
     finally:
         if text is not None:
             text.detach()
-    _check(path, kind, rest, done)
-    yield [rest]
+    _check(path, kind, partial_line, done)
+    yield [partial_line]
 
 
 def _check(path: Path, kind: str, text: str, done: int) -> None:
-    """Raise `InvalidInput` for what is no text, below so many lines."""
+    """Raise `InvalidInput` for bytes that are no text, in a block after `done` lines."""
     # Most files are of ASCII, which is faster to tell.
     bad = None if text.isascii() and "\0" not in text else _NO_TEXT.search(text)
     if bad is None:
@@ -216,14 +218,14 @@ def _check(path: Path, kind: str, text: str, done: int) -> None:
 def _cut(file: str, numbers: Sequence[int], rows: list[str], mark: str) -> Block:
     """Return the line where each row begins, and the cells of rows of which some are quoted."""
     reader = csv.reader((f"{row}\n" for row in rows), delimiter=mark, skipinitialspace=True)
-    found: list[Row] = []
+    cell_rows: list[Row] = []
     lines, start = [], 0
     try:
         for cells in reader:
-            found.append(cells)
+            cell_rows.append(cells)
             lines.append(numbers[start])
             start = reader.line_num
     except csv.Error as error:
         allowed = "quoted cells that end, separated by commas, semicolons or tabs"
         raise InvalidInput(f"{file}, line {numbers[start]}", str(error), allowed) from None
-    return lines, found
+    return lines, cell_rows

@@ -30,7 +30,7 @@ def toml_text(table: Mapping[str, Any]) -> str:
     Parameters
     ----------
     table : mapping
-        Of texts, numbers, truth values, lists and tables of these; numpy scalars are numbers.
+        Table of texts, numbers, truth values, lists and tables of these; numpy scalars are numbers.
 
     Returns
     -------
@@ -56,9 +56,9 @@ def toml_text(table: Mapping[str, Any]) -> str:
 def _plain(value: Any) -> Any:
     """Return a value without numpy's scalars, which TOML writers do not support."""
     if isinstance(value, Mapping):
-        return {name: _plain(one) for name, one in value.items()}
+        return {name: _plain(entry) for name, entry in value.items()}
     if isinstance(value, list | tuple):
-        return [_plain(one) for one in value]
+        return [_plain(entry) for entry in value]
     return value.item() if isinstance(value, np.generic) else value
 
 
@@ -98,7 +98,7 @@ def toml_with_lines(path: Path) -> Iterator[Fields]:
 
 
 def _with_line(error: InvalidInput, path: Path, text: str) -> InvalidInput:
-    """Return an error about a field with its line; another one as it is."""
+    """Return an error with the line of its field; an error about something else as it is."""
     if not error.field.startswith(f"{path.name}."):
         return error
     key = error.field.removeprefix(f"{path.name}.")
@@ -144,10 +144,10 @@ def _lines_of_keys(text: str) -> dict[str, int]:
             counts[name] = counts.get(name, 0) + 1
             lines[table] = number
         elif header := re.match(r"\s*\[([^]]+)]", line):
-            first, dot, rest = header[1].strip().partition(".")
+            head, dot, tail = header[1].strip().partition(".")
             # A table inside the latest of an array of tables.
-            latest = f"[{counts[first] - 1}]" if dot and first in counts else ""
-            table = f"{first}{latest}{dot}{rest}"
+            latest = f"[{counts[head] - 1}]" if dot and head in counts else ""
+            table = f"{head}{latest}{dot}{tail}"
             lines[table] = number
         elif field := re.match(r"\s*([\w-]+)\s*=", line):
             lines.setdefault(f"{table}.{field[1]}".lstrip("."), number)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 _NEW_FILE = os.O_WRONLY | os.O_CREAT | os.O_EXCL
 _FLAGS = _NEW_FILE | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_BINARY", 0)
-"""Of a file that is not there yet: no link that somebody has put in its place is followed."""
+"""Flags for a new file: a link that somebody has put in its place is not followed."""
 
 
 def write_whole(path: Path, content: bytes) -> None:

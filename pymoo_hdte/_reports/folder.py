@@ -44,7 +44,7 @@ class ReportFolder:
 
     @property
     def files(self) -> tuple[str, ...]:
-        """Names of all files there can be."""
+        """Names of all files that a report may have."""
         return (*self.always, *self.optional)
 
     def check(self, out: Path) -> None:
@@ -53,7 +53,7 @@ class ReportFolder:
         Parameters
         ----------
         out : Path
-            New, empty, or an earlier report, which will be replaced.
+            A folder that is new, empty, or an earlier report, which will be replaced.
 
         Raises
         ------
@@ -63,7 +63,9 @@ class ReportFolder:
             If it cannot be written.
         """
         allowed = "a folder that is new, empty or an earlier report, but not the one you are in"
-        dangling = any(one.is_symlink() and not one.exists() for one in out.absolute().parents)
+        dangling = any(
+            parent.is_symlink() and not parent.exists() for parent in out.absolute().parents
+        )
         folder = out.is_dir() or not out.exists()
         if dangling or out.is_symlink() or not folder or out.resolve() == Path.cwd():
             raise InvalidInput("folder of the report", str(out), allowed)
@@ -107,11 +109,11 @@ class ReportFolder:
         Parameters
         ----------
         out : Path
-            New, empty, or an earlier report, which is replaced.
+            A folder that is new, empty, or an earlier report, which is replaced.
         page : str
             HTML.
         document : dict
-            Of plain types and finite numbers.
+            Document of plain types and finite numbers.
         texts : mapping of str
             Contents of the further files, by name.
 

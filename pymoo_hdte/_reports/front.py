@@ -20,15 +20,15 @@ NAME = "front-point-"
 
 @dataclass(frozen=True, eq=False)
 class Front:
-    """What is drawn.
+    """The points of a front and their marks in the figure.
 
     Attributes
     ----------
     points : ndarray, shape (n, 2)
     marked : dict of int
-        Row that has its own marker and label, by label.
+        Rows with a marker of their own, by label.
     initial : ndarray, shape (2,)
-        Drawn beside the front, or told in the legend if it is far away.
+        Initial design, drawn beside the front or, if it is distant, given in the legend.
     axes : tuple of str
         Labels of the two axes.
     """
@@ -40,10 +40,11 @@ class Front:
 
 
 _BEYOND = 10.0
-"""Widths of the front from which on the initial design would make a heap of it, and is left out."""
+"""Distance of the initial design, in widths of the front, beyond which it is not drawn: the
+front would shrink to a heap."""
 
 
-def _far(initial: NDArray[np.float64], points: NDArray[np.float64]) -> bool:
+def _is_distant(initial: NDArray[np.float64], points: NDArray[np.float64]) -> bool:
     width = np.ptp(points, axis=0)
     off = np.maximum(points.min(axis=0) - initial, initial - points.max(axis=0))
     return bool(np.all(width > 0.0) and np.any(off > _BEYOND * width))
@@ -59,7 +60,7 @@ def front_svg(front: Front) -> str:
         axis.plot(
             *front.points[row], sign, markersize=11, fillstyle="none", color="black", label=word
         )
-    if _far(front.initial, front.points):
+    if _is_distant(front.initial, front.points):
         label = "data sheet: {:.4g}, {:.4g}, beyond".format(*front.initial)
         axis.plot([], [], "x", color=BEFORE, markersize=9, mew=2.2, label=label)
     else:

@@ -12,7 +12,7 @@ DRIVE = {
     "harmonic balance": "a steady motion found as a sum of sines, without stepping through time.",
     "locked stiffness": "the stiffness seen in a torsion sweep, over the mean stiffness in motion. "
     "With the input locked, the teeth stand in one place; in motion all places are averaged.",
-    "nominal": "as on the data sheet, before parts vary.",
+    "nominal": "as stated in your model or data sheet, before parts vary or values are fitted.",
     "order": "how often per turn of the input something repeats: order 2 comes twice a turn.",
     "order line": "the part of a channel that repeats at one order, with its amplitude and phase.",
     "port": "a place where a force acts: input, output, mesh (between the two) and sensor of a "
@@ -24,35 +24,35 @@ DRIVE = {
     "wind-up": "torsion under torque; a soft one is softer near zero torque.",
 }
 VERDICT = {
-    "adequate": "a verdict, shown as 'nothing missing': what is believed explains the records to "
-    "within their noise.",
-    "base": "the believed model alone, its values fitted within their tolerances, no effect added.",
-    "believed": "what you gave as your model, with how far each value may be off.",
+    "adequate": "a verdict: nothing is missing. The nominal model explains the records within its "
+    "tolerances and their noise.",
+    "base": "the nominal model alone, fitted within its tolerances, with no effect added.",
     "BIC": "how well a set of effects fits, with a penalty for each unknown; smaller is better. "
     "Only differences count: 10 is strong evidence.",
-    "campaign": "all records of one machine, with its noise and what is believed of it.",
+    "campaign": "all records of one machine, with its noise and its nominal model.",
     "chi-square": "sum of squared misfits in units of their noise; about one per degree of freedom "
-    "if only noise is left.",
-    "class": "a verdict, shown as 'one of several': one of the effects listed is the cause, and "
-    "these records cannot tell which.",
+    "if the residual is only noise.",
+    "class": "a verdict: one of the hypotheses listed is the cause, and these records cannot "
+    "distinguish them.",
     "effect": "a law at a port, such as dry friction at the input.",
-    "gap": "root mean square of measured minus predicted.",
-    "held out": "kept away from every fit, to see whether the corrected model holds there.",
+    "held out": "kept away from every fit, to validate the corrected model.",
     "law": "how a force, torque or error follows from position, speed or temperature.",
-    "misfit": "what is measured and not predicted, in units of the noise.",
-    "named": "a verdict, shown as 'found': the effects named explain the records, and nothing "
-    "that was compared does as well.",
-    "noise floor": "the gap that a perfect model would still leave.",
-    "parameter": "a verdict, shown as 'believed value wrong': no effect is missing, but a value "
-    "is outside its tolerance.",
-    "partial": "a verdict, shown as 'found in part': what is named is missing, but something is "
-    "left or is not quite right.",
+    "library": "all effects that are looked for: those of this software, and your own.",
+    "misfit": "measured minus predicted, in units of the noise.",
+    "named": "a verdict: the effects named explain the records, and no other hypothesis does as "
+    "well.",
+    "noise floor": "the prediction error that a perfect model would still have.",
+    "parameter": "a verdict: no effect is missing, but a nominal value is outside its tolerance.",
+    "partial": "a verdict: what is named is missing, but with caveats, such as an unexplained "
+    "residual or a value at its bound.",
+    "prediction error": "root mean square of measured minus predicted.",
     "record": "one test: a file with time and channels.",
     "repeatability": "how much the error changes from one record to the next when nothing else "
     "does.",
-    "shrinkage": "the part of the gap above the noise floor that the correction removes.",
-    "unlisted": "a verdict, shown as 'unknown effect': something is missing, and no effect of "
-    "the list explains it.",
+    "residual": "what a fitted model leaves unexplained.",
+    "shrinkage": "the share of the prediction error above the noise floor that the correction "
+    "removes.",
+    "unlisted": "a verdict: something is missing, and no effect in the library explains it.",
 }
 DESIGN = {
     "box": "all designs that may be chosen: each variable between its two bounds.",
@@ -85,37 +85,36 @@ GLOSSARY = {
     "Robust designs": DESIGN,
     "Comparing algorithms": COMPARISON,
 }
-"""By chapter, for each term what it means; terms in the order of the alphabet."""
+"""Terms with their meanings, by chapter; terms stand in alphabetical order."""
 
 
 def terms_of(*chapters: str) -> dict[str, str]:
-    """Return the terms of some chapters with their meanings, in the order of the alphabet."""
-    found = {term: said for chapter in chapters for term, said in GLOSSARY[chapter].items()}
-    return dict(sorted(found.items(), key=lambda one: one[0].lower()))
+    """Return the terms of some chapters with their meanings, in alphabetical order."""
+    terms = {term: said for chapter in chapters for term, said in GLOSSARY[chapter].items()}
+    return dict(sorted(terms.items(), key=lambda entry: entry[0].lower()))
 
 
 def terms_in(text: str, *chapters: str) -> dict[str, str]:
     """Return the terms of some chapters that a text needs: its own, and those of their meanings.
 
-    A verdict stands in a text by the words that reports show for it.
+    A verdict stands in a text as reports show it, with the word before it.
 
-    >>> [*terms_in("The gap is at the noise floor.", "Verdicts on a model")]
-    ['gap', 'noise floor']
+    >>> [*terms_in("Verdict: class. It is at the noise floor.", "Verdicts on a model")]
+    ['class', 'noise floor', 'prediction error']
     """
-    found, texts = dict[str, str](), [text]
+    needed, texts = dict[str, str](), [text]
     every = terms_of(*chapters)
     while texts:
         new = {
             term: said
             for term, said in every.items()
-            if term not in found and any(_stands(term, said, one) for one in texts)
+            if term not in needed and any(_stands(term, said, passage) for passage in texts)
         }
-        found |= new
+        needed |= new
         texts = [*new.values()]
-    return {term: said for term, said in every.items() if term in found}
+    return {term: said for term, said in every.items() if term in needed}
 
 
 def _stands(term: str, said: str, text: str) -> bool:
-    shown = re.match("a verdict, shown as '(.*?)'", said)
-    word = re.escape(shown[1] if shown else term)
+    word = f"Verdict: {term}" if said.startswith("a verdict: ") else re.escape(term)
     return re.search(rf"(?<![\w-]){word}(s|es|ed)?(?![\w-])", text, re.IGNORECASE) is not None

@@ -14,16 +14,18 @@ from pymoo_hdte._reports.glossary import terms_in
 
 
 def page(package: str, template: str, **values: Any) -> str:
-    """Return a page from a template of a package, which may include files of this one."""
+    """Return a page from a template of a package; it may include templates of `_reports`."""
     environment = Environment(
-        loader=ChoiceLoader([PackageLoader(one, ".") for one in (package, "pymoo_hdte._reports")]),
+        loader=ChoiceLoader(
+            [PackageLoader(name, ".") for name in (package, "pymoo_hdte._reports")]
+        ),
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
     )
     filters = (change, number, percent, with_error, without_tags)
-    environment.filters |= {one.__name__: one for one in filters}
+    environment.filters |= {function.__name__: function for function in filters}
     environment.globals |= {"digits": digits, "terms_in": terms_in}
     return environment.get_template(template).render(**values)
 
@@ -67,7 +69,7 @@ def percent(share: float) -> str:
 
 
 def with_error(value: float, half_width: float) -> str:
-    """Return a value and the half of its interval, both to the second digit of that half.
+    """Return a value and its half interval, both to the second digit of the half interval.
 
     The half is rounded up: an interval is never shown narrower than it is. Above 100 both are to
     the unit.
@@ -85,7 +87,7 @@ def with_error(value: float, half_width: float) -> str:
 
 
 def digits(lower: float | None, upper: float | None) -> int:
-    """Return how many digits of a value its interval leaves: two of the width, 2 to 12 in all.
+    """Return the digits worth showing of a value: two of its interval's width, 2 to 12 in all.
 
     Without an interval there are 4.
     """
@@ -96,7 +98,7 @@ def digits(lower: float | None, upper: float | None) -> int:
 
 
 def without_tags(markup: str) -> str:
-    """Return the text of a page, in which tags part words.
+    """Return the text of a page without its tags, which separate words.
 
     >>> without_tags("<b>found</b>The stiffness").split()
     ['found', 'The', 'stiffness']

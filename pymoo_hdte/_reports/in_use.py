@@ -1,4 +1,4 @@
-"""One command at a time writes to a folder; the others are told which one does."""
+"""One command at a time writes to a folder; errors of others name the process that does."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ if sys.platform != "win32":
     import fcntl
 
 _TRIES = 100
-"""How often a folder that vanishes while a file is opened in it is made again; by hand."""
+"""How often a folder that vanishes while a file is opened in it is made again; set by hand."""
 _LINK = (errno.ELOOP, errno.EMLINK)
-"""What systems say of a link that is not followed: Linux and macOS, FreeBSD."""
+"""Error codes for a link that is not followed: of Linux and macOS, and of FreeBSD."""
 
 
 @contextmanager
@@ -36,9 +36,9 @@ def in_use(file: Path, field: str, folder: Path) -> Iterator[None]:
     Parameters
     ----------
     file : Path
-        To be locked; it, and folders that are missing for it, are made and removed again.
+        File to be locked. It and its missing folders are made, and removed afterwards.
     field : str
-        What the folder is to the user, for the message.
+        The user's name for the folder, for the message.
     folder : Path
         The folder that is to be used by one process.
 
@@ -53,16 +53,16 @@ def in_use(file: Path, field: str, folder: Path) -> Iterator[None]:
     if sys.platform == "win32":
         yield
         return
-    made = [one for one in file.parents if not one.exists()]
+    made = [parent for parent in file.parents if not parent.exists()]
     lock = _locked(file, field, folder)
 
     def release() -> None:
         # Removed before it is unlocked: who opened it meanwhile sees that it is no longer there.
         file.unlink(missing_ok=True)
         lock.close()
-        for one in made:
+        for parent in made:
             with suppress(OSError):
-                one.rmdir()
+                parent.rmdir()
 
     GIVEN_BACK.append(release)
     try:
@@ -93,14 +93,14 @@ def _opened(file: Path, field: str, folder: Path) -> IO[str]:
     # It will be overwritten, and with it whatever a link leads to or shares its content.
     allowed = f"a folder where {file.name} is no link, pipe or device, since it is overwritten"
     flags = os.O_RDWR | os.O_CREAT | os.O_APPEND | os.O_NOFOLLOW | os.O_NONBLOCK
-    for left in reversed(range(_TRIES)):
+    for remaining_tries in reversed(range(_TRIES)):
         try:
             file.parent.mkdir(parents=True, exist_ok=True)
             descriptor = os.open(file, flags, 0o666)
             break
         except (FileNotFoundError, FileExistsError):
             # Whoever held it may just be removing the folders that it made.
-            if not left:
+            if not remaining_tries:
                 raise
         except OSError as error:
             if error.errno not in _LINK:

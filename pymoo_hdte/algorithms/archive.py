@@ -65,8 +65,8 @@ class LeaderArchive:
         everyone = Population.merge(self.members, population)
         points = self.points.followed_by(points)
         front = best_front(points)
-        kept = front[least_crowded(points.F[front], self.capacity)]
-        self.members, self.points = everyone[kept], points[kept]
+        rows = front[least_crowded(points.F[front], self.capacity)]
+        self.members, self.points = everyone[rows], points[rows]
 
     def draw(self, n: int, random_state: np.random.Generator) -> NDArray[np.float64]:
         """Draw positions of leaders, each the less crowded of two random members.
@@ -100,8 +100,8 @@ class FrontArchive:
         Largest number of members.
     truncation : Truncation
         Chooses who stays above the capacity.
-    left : int, optional
-        How many it leaves, the capacity by default; fewer, and it is seldom needed.
+    thinned_to : int, optional
+        Number that a truncation leaves, by default the capacity; with fewer it is seldom needed.
 
     Attributes
     ----------
@@ -109,9 +109,11 @@ class FrontArchive:
         The archived individuals.
     """
 
-    def __init__(self, capacity: int, truncation: Truncation, left: int | None = None) -> None:
+    def __init__(
+        self, capacity: int, truncation: Truncation, thinned_to: int | None = None
+    ) -> None:
         self._capacity, self._truncation = capacity, truncation
-        self._left = capacity if left is None else left
+        self._thinned_to = capacity if thinned_to is None else thinned_to
         self.members = Population.empty()
 
     def __len__(self) -> int:
@@ -136,9 +138,9 @@ class FrontArchive:
             return
         if len(self.members):
             points = points_of(self.members).followed_by(points)
-        kept = np.flatnonzero(points.violation == 0.0)
-        if len(kept):
-            kept = kept[is_nondominated(points.F[kept])]
-        if len(kept) > self._capacity:
-            kept = kept[self._truncation(points.F[kept], self._left)]
-        self.members = everyone[kept]
+        rows = np.flatnonzero(points.violation == 0.0)
+        if len(rows):
+            rows = rows[is_nondominated(points.F[rows])]
+        if len(rows) > self._capacity:
+            rows = rows[self._truncation(points.F[rows], self._thinned_to)]
+        self.members = everyone[rows]

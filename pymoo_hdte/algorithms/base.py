@@ -51,7 +51,7 @@ class Swarm(Algorithm):
         Parameters
         ----------
         problem : Problem
-            With real variables, finite bounds and two objectives or more.
+            A problem with real variables, finite bounds and two objectives or more.
         **kwargs
             What `pymoo.core.algorithm.Algorithm.setup` takes: termination, seed and others.
 
@@ -77,7 +77,7 @@ class Swarm(Algorithm):
     def _plan(self) -> None:
         """Fix what depends on how long the run will be."""
 
-    def _n_asked(self) -> int:
+    def _n_requested(self) -> int:
         """Return the number of particles in a generation."""
         return self.pop_size
 
@@ -121,8 +121,8 @@ class Swarm(Algorithm):
     def _evaluated(self, infills: Population | None) -> Points:
         """Return the points of a swarm that comes back from evaluation, in the order of ``ask``."""
         n = 0 if infills is None else len(infills)
-        if infills is None or n != self._n_asked():
-            allowed = f"the {self._n_asked()} particles of ask(), in their order"
+        if infills is None or n != self._n_requested():
+            allowed = f"the {self._n_requested()} particles of ask(), in their order"
             raise InvalidInput("number of infills", n, allowed)
         points = self._points(infills)
         expected = (n, self.problem.n_obj)

@@ -24,7 +24,7 @@ from pymoo_hdte.algorithms.survival import Quality
 from pymoo_hdte.checks import whole_number
 
 SMALLEST, LARGEST = 10, 100
-"""Particles of a swarm that grows."""
+"""Smallest and largest number of particles of a swarm that grows."""
 _AT_ONCE = 10
 """Generations after which what they found enters the archive of all."""
 
@@ -124,7 +124,9 @@ class CompactSwarm(ElitistSwarm):
         self.n_result = whole_number("n_result", n_result, at_least=1)
         self.n_archive = whole_number("n_archive", n_archive, at_least=self.n_result)
         # Thinning out a thousand takes longer than a generation: a quarter at once makes it rare.
-        self._found = FrontArchive(self.n_archive, most_spread, left=1 + 3 * self.n_archive // 4)
+        self._front_archive = FrontArchive(
+            self.n_archive, most_spread, thinned_to=1 + 3 * self.n_archive // 4
+        )
         self._offered = FrontArchive(self.n_result, self._truncation)
         self._waiting: list[Population] = []
 
@@ -165,7 +167,7 @@ class CompactSwarm(ElitistSwarm):
         if len(front):
             self._waiting.append(population[front])
         if len(self._waiting) == _AT_ONCE:
-            self._enter(self._found)
+            self._enter(self._front_archive)
             self._waiting = []
 
     def _enter(self, archive: FrontArchive) -> None:
@@ -182,9 +184,9 @@ class CompactSwarm(ElitistSwarm):
 
     def archive_all(self) -> Population:
         """Return all non-dominated feasible solutions found, at most ``n_archive``, thinned out."""
-        found = copy(self._found)
-        self._enter(found)
-        return found.members.copy()
+        archive = copy(self._front_archive)
+        self._enter(archive)
+        return archive.members.copy()
 
     def _set_optimum(self) -> None:
         if len(self._offered):

@@ -57,9 +57,9 @@ def least_crowded(F: NDArray[np.float64], size: int) -> NDArray[np.int_]:
         if row not in present or shortest != distance[row]:
             continue
         present.remove(row)
-        for other in neighbours.remove(row):
-            distance[other] = neighbours.distance(other)
-            heappush(heap, (distance[other], other))
+        for neighbour in neighbours.remove(row):
+            distance[neighbour] = neighbours.distance(neighbour)
+            heappush(heap, (distance[neighbour], neighbour))
     return np.array(sorted(present))
 
 

@@ -39,7 +39,7 @@ def constrained_ranks(points: Points) -> NDArray[np.int_]:
 def best_front(points: Points) -> NDArray[np.int_]:
     """Return the rows worth keeping: the feasible front, else the one least infeasible point.
 
-    Of points with equal objectives (or equal least violation) the first stays. The answer is empty
+    Among points with equal objectives (or least violation) the first stays. The answer is empty
     if no point can be judged.
     """
     feasible = np.flatnonzero(points.violation == 0)

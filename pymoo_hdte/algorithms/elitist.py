@@ -65,7 +65,7 @@ class ElitistSwarm(Swarm):
     n_offsprings : int, optional
         New positions in a generation, ``pop_size`` by default.
     repair : Repair, optional
-        Of pymoo, for all positions before they are evaluated; `RoundingRepair` makes integers.
+        Repair of pymoo for positions before they are evaluated; `RoundingRepair` makes integers.
     **kwargs
         Any other argument of `pymoo.core.algorithm.Algorithm`.
 
@@ -127,7 +127,7 @@ class ElitistSwarm(Swarm):
     def _check(self, problem: Problem) -> None:
         check_problem(problem, integers=type(self.repair) is not NoRepair)
 
-    def _n_asked(self) -> int:
+    def _n_requested(self) -> int:
         started = self.is_initialized and self.n_offsprings is not None
         return self.n_offsprings if started else self.pop_size  # type: ignore[return-value]
 
@@ -157,9 +157,9 @@ class ElitistSwarm(Swarm):
 
     def _movers(self, n: int) -> NDArray[np.int_]:
         """Return which of ``n`` particles move."""
-        if self._n_asked() < min(n, self.pop_size):
-            return self.random_state.permutation(n)[: self._n_asked()]
-        return np.resize(np.arange(n), self._n_asked())
+        if self._n_requested() < min(n, self.pop_size):
+            return self.random_state.permutation(n)[: self._n_requested()]
+        return np.resize(np.arange(n), self._n_requested())
 
     def _front(self, swarm: Points) -> Points:
         """Return the points that lead."""
@@ -167,7 +167,7 @@ class ElitistSwarm(Swarm):
 
     def _leaders(self, front: Points) -> NDArray[np.float64]:
         """Draw a leader's position for every particle that moves, shape (n, d)."""
-        return front.X[crowding_tournaments(front.F, self._n_asked(), self.random_state)]
+        return front.X[crowding_tournaments(front.F, self._n_requested(), self.random_state)]
 
     def _around(self, move: Move, swarm: Points, rows: NDArray[np.int_]) -> NDArray[np.float64]:
         """Return the positions a move draws from: all, or the neighbours of every row."""
@@ -182,11 +182,11 @@ class ElitistSwarm(Swarm):
         points = self._points(self.pop).followed_by(self._evaluated(infills))
         everyone = Population.merge(self.pop, infills)
         self._note(everyone, points)
-        kept = self._survivors(points)
+        rows = self._survivors(points)
         survived = np.zeros(len(points), dtype=bool)
-        survived[kept] = True
+        survived[rows] = True
         self.success.learn(self.chosen, survived[-len(self.chosen) :])
-        self.pop = everyone[kept]
+        self.pop = everyone[rows]
 
     def _note(self, everyone: Population, points: Points) -> None:
         """Take down what a swarm needs of old and new particles, before it chooses."""

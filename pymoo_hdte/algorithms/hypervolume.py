@@ -46,18 +46,18 @@ def most_hypervolume(
     scaled = (F - F.min(axis=0)) / np.where(span > 0, span, 1.0)
     if n_obj == 2:
         order = np.lexsort(scaled.T[::-1])
-        kept = _kept_of_two if COMPILES else _kept_of_two_in_numpy
-        return np.sort(order[kept(scaled[order], order, size)])
+        select = _selected_of_two if COMPILES else _selected_of_two_in_numpy
+        return np.sort(order[select(scaled[order], order, size)])
     safe = np.zeros(n, dtype=bool)
     # An objective that is the same everywhere has no end.
     ends = np.unique(scaled[:, span > 0].argmax(axis=0))
     if keep_ends and len(ends) <= size:
         safe[ends] = True
-    return _kept_of_three(scaled, size, safe)
+    return _selected_of_three(scaled, size, safe)
 
 
 @compiled
-def _kept_of_two(
+def _selected_of_two(
     scaled: NDArray[np.float64], number: NDArray[np.int_], size: int
 ) -> NDArray[np.bool_]:
     """Say which of the rows stay, which ascend in the first objective and are called ``number``."""
@@ -90,10 +90,10 @@ def _rectangle(scaled: NDArray[np.float64], lower: int, row: int, upper: int) ->
     return float(width * (scaled[lower, 1] - scaled[row, 1]))
 
 
-def _kept_of_two_in_numpy(
+def _selected_of_two_in_numpy(
     scaled: NDArray[np.float64], number: NDArray[np.int_], size: int
 ) -> NDArray[np.bool_]:
-    """Say the same as `_kept_of_two`, to the last bit, where there is no machine code."""
+    """Say the same as `_selected_of_two`, to the last bit, where there is no machine code."""
     n = len(scaled)
     rows, called = np.arange(n), number.copy()
     stays = np.ones(n, dtype=np.bool_)
@@ -119,7 +119,7 @@ def _kept_of_two_in_numpy(
     return stays
 
 
-def _kept_of_three(
+def _selected_of_three(
     scaled: NDArray[np.float64], size: int, safe: NDArray[np.bool_]
 ) -> NDArray[np.int_]:
     """Return which rows stay, the ``safe`` ones among them."""

@@ -30,27 +30,27 @@ Values = NDArray[np.float64]
 Evaluate = Callable[[Values], Values]
 
 POINTS = 20
-"""Designs along the front that are evaluated in a round, if nothing else is asked for."""
+"""Designs along the front that are evaluated in a round, by default."""
 EXPLORERS = 16
 """Designs anywhere that are evaluated in a round."""
-_FIRST = 64
+_FIRST_DESIGNS = 64
 """Designs all over the box in the first round, or a quarter of the most there may be."""
 _CORNERS_UP_TO = 6
 """Variables up to which all corners of the box are evaluated."""
 _POPULATION, _GENERATIONS = 100, 60
 _AT_ONCE = 16
-"""Designs evaluated before somebody who waits is told."""
+"""Designs evaluated between two notifications."""
 _SAME = 1e-4
 """Distance in the unit cube below which a design counts as evaluated already."""
-_FAR = 2.0
+_OUTLYING = 2.0
 """Designs worse than the front by this factor, as in a resonance, would bend the interpolation."""
 _BEYOND = 1.0
-"""Above the largest logarithm interpolated by this much, an interpolation is cut off."""
+"""Distance above the largest interpolated logarithm at which the interpolation is cut off."""
 
 
 @dataclass(frozen=True, eq=False)
 class FoundFront:
-    """What a search found.
+    """The result of a search.
 
     Attributes
     ----------
@@ -60,7 +60,7 @@ class FoundFront:
     front : ndarray, shape (n, 2)
         Their objectives as evaluated, in their own units.
     width : ndarray, shape (2,)
-        Of the front in each objective's unit, or ``least_width`` of its least value if that is
+        Width of the front in their units, or ``least_width`` of its least value if that is
         more.
     difference : float
         Dimensionless, in widths: largest difference of interpolation and evaluation along the last
@@ -69,7 +69,7 @@ class FoundFront:
     evaluated : int
         Number of designs evaluated.
     lost : ndarray, shape (k, n_var)
-        Those of them without objectives, in their own units.
+        Evaluated designs without objectives, in their own units.
 
     Examples
     --------
@@ -142,17 +142,17 @@ def interpolated_front(
     True
     """
     known = _Known(evaluate, lower, upper, least_width, notify)
-    first = _first_cubes(len(lower), min(_FIRST, most // 4), rng)
+    start_cubes = _first_cubes(len(lower), min(_FIRST_DESIGNS, most // 4), rng)
     if start is not None:
         cubes = known.cube_of(start)
-        first = np.vstack([first, cubes[_not_known(first, cubes)]])
-    known.add(first)
+        start_cubes = np.vstack([start_cubes, cubes[_not_known(start_cubes, cubes)]])
+    known.add(start_cubes)
     if not known.good.any():
         raise ArithmeticError(f"none of {len(known.cubes)} designs over the whole box has values")
     while known.difference > accuracy and len(known.cubes) < most:
         known.difference = _round(known, points, rng)
         known.tell()
-    return known.found()
+    return known.result()
 
 
 class _Known:
@@ -181,8 +181,8 @@ class _Known:
     def add(self, cubes: Values) -> Values:
         """Evaluate designs, some at once, and return their objectives."""
         before = len(self.values)
-        for first in range(0, len(cubes), _AT_ONCE):
-            some = cubes[first : first + _AT_ONCE]
+        for begin in range(0, len(cubes), _AT_ONCE):
+            some = cubes[begin : begin + _AT_ONCE]
             values = self._evaluate(self.designs_of(some))
             self.cubes = np.vstack([self.cubes, some])
             self.values = np.vstack([self.values, values])
@@ -196,22 +196,22 @@ class _Known:
 
     @property
     def good(self) -> NDArray[np.bool_]:
-        """Which have objectives, shape (n,)."""
+        """Which designs have objectives, shape (n,)."""
         return np.asarray(np.isfinite(self.values).all(axis=1))
 
     @property
     def front_rows(self) -> NDArray[np.int_]:
         """Rows of the front, by rising first objective."""
         rows = np.flatnonzero(self.good)
-        kept = rows[NonDominatedSorting().do(self.values[rows], only_non_dominated_front=True)]
-        return kept[np.lexsort(self.values[kept].T[::-1])]
+        front = rows[NonDominatedSorting().do(self.values[rows], only_non_dominated_front=True)]
+        return front[np.lexsort(self.values[front].T[::-1])]
 
     @property
     def width(self) -> Values:
         front = self.values[self.front_rows]
         return np.maximum(np.ptp(front, axis=0), self._least_width * front.min(axis=0))
 
-    def found(self) -> FoundFront:
+    def result(self) -> FoundFront:
         rows = self.front_rows
         lost = self.designs_of(self.cubes[~self.good])
         designs, front = self.designs_of(self.cubes[rows]), self.values[rows]
@@ -224,26 +224,26 @@ class _Interpolation(Problem):
     def __init__(self, known: _Known) -> None:
         n_var = known.cubes.shape[1]
         super().__init__(n_var=n_var, n_obj=2, xl=0.0, xu=1.0)
-        self._near, worst = known.good, known.values[known.front_rows].max(axis=0)
-        near = self._near & (known.values <= _FAR * worst).all(axis=1)
+        self._usable, worst = known.good, known.values[known.front_rows].max(axis=0)
+        usable = self._usable & (known.values <= _OUTLYING * worst).all(axis=1)
         # The polynomial of degree 2 needs as many designs as it has coefficients; more are better.
-        if near.sum() >= (n_var + 1) * (n_var + 2):
-            self._near = near
-        logarithms = np.log(known.values[self._near])
+        if usable.sum() >= (n_var + 1) * (n_var + 2):
+            self._usable = usable
+        logarithms = np.log(known.values[self._usable])
         self._highest = logarithms.max(axis=0) + _BEYOND
         self._nearest = scipy.spatial.cKDTree(known.cubes)
         degree = 2 if len(logarithms) >= (n_var + 1) * (n_var + 2) else 0
         self._between = scipy.interpolate.RBFInterpolator(
-            known.cubes[self._near],
+            known.cubes[self._usable],
             logarithms,
             kernel="quintic" if degree else "linear",
             degree=degree,
         )
 
     def _evaluate(self, x: Values, out: dict[str, Any], *args: Any, **kwargs: Any) -> None:
-        near = self._near[self._nearest.query(x)[1]]
+        is_usable = self._usable[self._nearest.query(x)[1]]
         logarithms = np.minimum(self._between(x), self._highest)
-        out["F"] = np.exp(np.where(near[:, None], logarithms, self._highest))
+        out["F"] = np.exp(np.where(is_usable[:, None], logarithms, self._highest))
 
 
 def _round(known: _Known, points: int, rng: np.random.Generator) -> float:
@@ -266,7 +266,7 @@ def _round(known: _Known, points: int, rng: np.random.Generator) -> float:
     differences = np.abs(values[: len(new)] - expected) / width
     if np.isnan(differences).any():
         return np.inf
-    return float(max(one.max(initial=0.0) for one in (differences, undercut, beyond)))
+    return float(max(difference.max(initial=0.0) for difference in (differences, undercut, beyond)))
 
 
 def _first_cubes(n_var: int, number: int, rng: np.random.Generator) -> Values:
@@ -292,9 +292,9 @@ def _spread(front: Values, number: int) -> NDArray[np.int_]:
 
 def _not_known(known: Values, cubes: Values) -> NDArray[np.int_]:
     """Return the rows of designs that are neither known nor the same as an earlier one."""
-    found: list[int] = []
+    new_rows: list[int] = []
     for row, cube in enumerate(cubes):
-        others = np.vstack([known, cubes[found]])
+        others = np.vstack([known, cubes[new_rows]])
         if np.abs(others - cube).max(axis=1).min() > _SAME:
-            found.append(row)
-    return np.array(found, dtype=int)
+            new_rows.append(row)
+    return np.array(new_rows, dtype=int)

@@ -54,7 +54,7 @@ class Points:
         return Points(self.X[rows], self.F[rows], self.violation[rows])
 
     def followed_by(self, other: Points) -> Points:
-        """Return these points and then the other ones."""
+        """Return these points followed by ``other``."""
         return Points(
             np.concatenate([self.X, other.X]),
             np.concatenate([self.F, other.F]),

@@ -64,8 +64,8 @@ class Flat:
         c1, c2 : ndarray, shape (n,)
             Dimensionless.
         """
-        both = np.full(len(ranks), 2.0)
-        return both, both
+        factors = np.full(len(ranks), 2.0)
+        return factors, factors
 
     def mutation(
         self,

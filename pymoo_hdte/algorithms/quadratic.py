@@ -23,7 +23,7 @@ class Quadratic(NamedTuple):
         )
 
 
-_FREE, _RIDGE = 100.0, 1e-6
+_LINEAR_WEIGHT, _RIDGE = 100.0, 1e-6
 _HALVINGS = 16
 _LEAST_SHIFT = 1e-100
 """Keeps a model without slope and curvature at its place; its square is still a number."""
@@ -32,7 +32,7 @@ _LEAST_SHIFT = 1e-100
 def fitted(Z: NDArray[np.float64], F: NDArray[np.float64]) -> Quadratic:
     """Return quadratics near objectives ``F`` (n, m) at places ``Z`` (n, d) of size one.
 
-    Of all that fit alike it is the one of smallest second derivatives, so that fewer points than
+    Of all that fit alike they have the smallest second derivatives, so that fewer points than
     coefficients do: ridge regression with a polynomial kernel, in which constant and gradient are
     all but free (M. J. D. Powell, "The NEWUOA software for unconstrained optimization without
     derivatives", 2006, takes the smallest change of second derivatives).
@@ -43,11 +43,12 @@ def fitted(Z: NDArray[np.float64], F: NDArray[np.float64]) -> Quadratic:
         If places are such that nothing can be fitted.
     """
     products = Z @ Z.T
-    kernel = _FREE * (1.0 + products) + 0.5 * products**2
+    kernel = _LINEAR_WEIGHT * (1.0 + products) + 0.5 * products**2
     kernel[np.diag_indices(len(Z))] += _RIDGE * np.trace(kernel) / len(Z)
     parts = np.linalg.solve(kernel, F)
     return Quadratic(
-        _FREE * parts.T @ Z, np.array([(Z * part[:, np.newaxis]).T @ Z for part in parts.T])
+        _LINEAR_WEIGHT * parts.T @ Z,
+        np.array([(Z * part[:, np.newaxis]).T @ Z for part in parts.T]),
     )
 
 
@@ -131,9 +132,9 @@ class ModelStep:
         away = (known.X - centre) / np.where(self._reach > 0.0, self._reach, 1.0)
         distances = np.sqrt((away**2).sum(axis=1))
         nearest = min(len(distances), 3 * d + 20, self.LARGEST_FIT)
-        near = np.argpartition(distances, nearest - 1)[:nearest]
-        unit = float(np.median(distances[near]))
-        F = known.F[near] - known.F[distances.argmin()]
+        neighbours = np.argpartition(distances, nearest - 1)[:nearest]
+        unit = float(np.median(distances[neighbours]))
+        F = known.F[neighbours] - known.F[distances.argmin()]
         span = np.ptp(F, axis=0)
         if not unit > 0.0 or not np.isfinite(span).all():
             return np.zeros((n, d))
@@ -141,7 +142,7 @@ class ModelStep:
         weights = self._weights(F.shape[1], random_state)
         radii = 10.0 ** random_state.uniform(self.SMALLEST_EXPONENT, self.LARGEST_EXPONENT, n)
         try:
-            model = fitted(away[near] / unit, F).weighted(weights)
+            model = fitted(away[neighbours] / unit, F).weighted(weights)
             places = lowest_within(model, np.arange(n) % len(weights), radii)
         except np.linalg.LinAlgError:
             return np.zeros((n, d))

@@ -26,16 +26,16 @@ def most_spread(F: NDArray[np.float64], size: int) -> NDArray[np.int_]:
     span = np.ptp(F, axis=0)
     scaled = (F - F.min(axis=0)) / np.where(span > 0, span, 1.0)
     if not COMPILES:
-        return np.flatnonzero(_kept_in_numpy(scaled, size))
+        return np.flatnonzero(_selected_in_numpy(scaled, size))
     if F.shape[1] == 2:
         order = np.lexsort(scaled.T[::-1])
         if np.all(np.diff(scaled[order, 1]) <= 0.0):
-            return np.sort(order[_kept_of_chain(scaled[order], order, size)])
-    return np.flatnonzero(_kept(scaled, size))
+            return np.sort(order[_selected_of_chain(scaled[order], order, size)])
+    return np.flatnonzero(_selected(scaled, size))
 
 
 @compiled
-def _kept(scaled: NDArray[np.float64], size: int) -> NDArray[np.bool_]:
+def _selected(scaled: NDArray[np.float64], size: int) -> NDArray[np.bool_]:
     n = len(scaled)
     stays = np.ones(n, dtype=np.bool_)
     # Of every row the two nearest that stay, and their squared distances.
@@ -56,7 +56,7 @@ def _kept(scaled: NDArray[np.float64], size: int) -> NDArray[np.bool_]:
 
 
 @compiled
-def _kept_of_chain(
+def _selected_of_chain(
     scaled: NDArray[np.float64], number: NDArray[np.int_], size: int
 ) -> NDArray[np.bool_]:
     """Say the same of rows that ascend in one objective and descend in the other.
@@ -115,10 +115,10 @@ def _measure(
     for _ in range(2):
         lower = before[lower] if lower >= 0 else lower
         upper = after[upper] if upper < len(scaled) else upper
-        for other in (lower, upper):
-            if 0 <= other < len(scaled):
-                distance = (scaled[row, 0] - scaled[other, 0]) ** 2
-                distance += (scaled[row, 1] - scaled[other, 1]) ** 2
+        for neighbour in (lower, upper):
+            if 0 <= neighbour < len(scaled):
+                distance = (scaled[row, 0] - scaled[neighbour, 0]) ** 2
+                distance += (scaled[row, 1] - scaled[neighbour, 1]) ** 2
                 if distance < least:
                     least, second = distance, least
                 elif distance < second:
@@ -127,9 +127,9 @@ def _measure(
 
 
 @compiled
-def _closer(gaps: NDArray[np.float64], row: int, other: int) -> bool:
-    gap, least = gaps[row, 0], gaps[other, 0]
-    return bool(gap < least or (gap == least and gaps[row, 1] < gaps[other, 1]))
+def _closer(gaps: NDArray[np.float64], row: int, reference: int) -> bool:
+    gap, least = gaps[row, 0], gaps[reference, 0]
+    return bool(gap < least or (gap == least and gaps[row, 1] < gaps[reference, 1]))
 
 
 @compiled
@@ -140,24 +140,24 @@ def _find_neighbours(
     gaps: NDArray[np.float64],
     row: int,
 ) -> None:
-    first, second, gap, second_gap = row, row, np.inf, np.inf
-    for other in range(len(scaled)):
-        if not stays[other] or other == row:
+    nearest, second, gap, second_gap = row, row, np.inf, np.inf
+    for candidate in range(len(scaled)):
+        if not stays[candidate] or candidate == row:
             continue
         distance = 0.0
         for objective in range(scaled.shape[1]):
-            distance += (scaled[row, objective] - scaled[other, objective]) ** 2
+            distance += (scaled[row, objective] - scaled[candidate, objective]) ** 2
         if distance < gap:
-            first, second, gap, second_gap = other, first, distance, gap
+            nearest, second, gap, second_gap = candidate, nearest, distance, gap
         elif distance < second_gap:
-            second, second_gap = other, distance
+            second, second_gap = candidate, distance
     # One by one: assigning a tuple to a row takes three seconds more to compile.
-    neighbours[row, 0], neighbours[row, 1] = first, second
+    neighbours[row, 0], neighbours[row, 1] = nearest, second
     gaps[row, 0], gaps[row, 1] = gap, second_gap
 
 
-def _kept_in_numpy(scaled: NDArray[np.float64], size: int) -> NDArray[np.bool_]:
-    """Say the same as `_kept`, to the last bit, where there is no machine code."""
+def _selected_in_numpy(scaled: NDArray[np.float64], size: int) -> NDArray[np.bool_]:
+    """Say the same as `_selected`, to the last bit, where there is no machine code."""
     n = len(scaled)
     # Added up objective by objective, as machine code does.
     squared = np.zeros((n, n))
@@ -169,12 +169,12 @@ def _kept_in_numpy(scaled: NDArray[np.float64], size: int) -> NDArray[np.bool_]:
     rows = np.arange(n)
     for _ in range(n - size + 1):
         # Of the changed rows, the two nearest that stay.
-        near = squared[rows]
+        distances = squared[rows]
         for place in range(2):
-            found = near.argmin(axis=1)
-            here = np.arange(len(rows)), found
-            neighbours[rows, place], gaps[rows, place] = found, near[here]
-            near[here] = np.inf
+            nearest = distances.argmin(axis=1)
+            here = np.arange(len(rows)), nearest
+            neighbours[rows, place], gaps[rows, place] = nearest, distances[here]
+            distances[here] = np.inf
         if np.count_nonzero(stays) == size:
             break
         alive = np.flatnonzero(stays)

@@ -48,12 +48,12 @@ def survivors(points: Points, size: int, truncation: Truncation = most_spread) -
     copies = _copies(points)
     ranks[copies] += ranks.max()
     order = np.argsort(ranks, kind="stable")
-    last = ranks[order[size - 1]]
-    safe = np.flatnonzero(ranks < last)
-    front = np.flatnonzero(ranks == last)
+    last_rank = ranks[order[size - 1]]
+    safe = np.flatnonzero(ranks < last_rank)
+    front = np.flatnonzero(ranks == last_rank)
     room = size - len(safe)
     # Infeasible fronts are ordered by violation, and copies are all alike: no spread to keep.
-    spread = last <= ranks[~copies].max() and points.violation[front[0]] == 0.0
+    spread = last_rank <= ranks[~copies].max() and points.violation[front[0]] == 0.0
     chosen = truncation(points.F[front], room) if spread else np.arange(room)
     return np.sort(np.concatenate([safe, front[chosen]]))
 

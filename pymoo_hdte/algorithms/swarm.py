@@ -133,17 +133,17 @@ class ParticleSwarm(Swarm):
         self, particles: Population, V: NDArray[np.float64], best: Sequence[Individual | None]
     ) -> Population:
         """Give particles velocities and own bests, None if themselves, to travel in their data."""
-        for particle, velocity, one in zip(particles.tolist(), V, best, strict=True):
-            particle.data |= {"V": velocity.copy(), "best": one}
-        self.asked = particles
+        for particle, velocity, own_best in zip(particles.tolist(), V, best, strict=True):
+            particle.data |= {"V": velocity.copy(), "best": own_best}
+        self._requested = particles
         return particles
 
     def _evaluated(self, infills: Population | None) -> Points:
         points = super()._evaluated(infills)
-        for told, asked in zip(infills.tolist(), self.asked.tolist(), strict=True):  # type: ignore[union-attr]
+        for reported, requested in zip(infills.tolist(), self._requested.tolist(), strict=True):  # type: ignore[union-attr]
             # New individuals made from a particle's arrays lack its velocity and own best.
-            if "V" not in told.data:
-                told.data |= {"V": asked.data["V"], "best": asked.data["best"]}
+            if "V" not in reported.data:
+                reported.data |= {"V": requested.data["V"], "best": requested.data["best"]}
         return points
 
     def _initialize_advance(self, infills: Population | None = None, **kwargs: Any) -> None:
@@ -165,7 +165,7 @@ class ParticleSwarm(Swarm):
         ranks = constrained_ranks(swarm)
 
         best = personal_bests(particles)
-        own = np.array([one.X for one in best.tolist()])
+        own = np.array([individual.X for individual in best.tolist()])
         leader = self.leaders.draw(self.pop_size, random_state) if len(self.leaders) else own
         w = self.inertia(progress, self.leaders.points.F)
         c1, c2 = self.hierarchy.acceleration(ranks)

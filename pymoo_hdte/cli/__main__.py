@@ -17,7 +17,7 @@ def console() -> int:
 
 
 def main() -> int:
-    """Run it without a word on how it ends."""
+    """Run the command line and exit without a traceback."""
     from pymoo_hdte.cli.command_line import main as run
 
     return run()

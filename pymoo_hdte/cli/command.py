@@ -14,11 +14,11 @@ from pymoo_hdte._reports.folder import PAGE_FILE
 MISTAKE = 2
 """Exit code for input that the user can correct, as argparse has it."""
 Say = Callable[[str], None]
-"""Tells the user what is being done."""
+"""Shows the user what is being done."""
 
 
 class OneLineParser(argparse.ArgumentParser):
-    """Says what is wrong in one line; the usage is for ``--help``."""
+    """Parser whose errors are one line; the usage is for ``--help``."""
 
     def error(self, message: str) -> NoReturn:
         """Print the line and exit with `MISTAKE`."""
@@ -27,7 +27,7 @@ class OneLineParser(argparse.ArgumentParser):
 
 
 class Outcome(NamedTuple):
-    """What a command found: as a JSON-able document, and in a few lines for the terminal."""
+    """The result of a command: a document for JSON, and a few lines for the terminal."""
 
     document: dict[str, Any]
     summary: str
@@ -66,6 +66,8 @@ class Command:
         Takes the parsed options and `Say`. Heavy modules are imported there, not before, so that
         ``--help`` need not wait for them. It raises `InvalidInput`, `ArithmeticError` (such as
         `UnstableDrive`) or OSError for what a user can mend, and then leaves nothing half-written.
+    out : (str, str) or None
+        Placeholder of ``--out`` in the help, and what it is; None for a command without output.
     """
 
     name: str
@@ -73,3 +75,4 @@ class Command:
     details: str
     add_arguments: Callable[[argparse.ArgumentParser], None]
     run: Callable[[argparse.Namespace, Say], Outcome]
+    out: tuple[str, str] | None = ("DIR", "folder for the report")

@@ -13,13 +13,15 @@ from pymoo_hdte._interrupts import INTERRUPTED
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.cli.command import MISTAKE, OneLineParser
 from pymoo_hdte.cli.discrepancy import DISCREPANCY
+from pymoo_hdte.cli.export import EXPORT
 from pymoo_hdte.cli.identify import IDENTIFY
+from pymoo_hdte.cli.init import INIT
 from pymoo_hdte.cli.optimise import OPTIMISE
 from pymoo_hdte.cli.plan import PLAN
 from pymoo_hdte.cli.simulate import SIMULATE
 
-COMMANDS = (OPTIMISE, SIMULATE, IDENTIFY, PLAN, DISCREPANCY)
-"""In the order of the help."""
+COMMANDS = (OPTIMISE, SIMULATE, IDENTIFY, PLAN, INIT, DISCREPANCY, EXPORT)
+"""Commands in the order of the help."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -27,8 +29,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = _parser().parse_args(arguments)
     try:
         # Progress is for a terminal only; a log file gets errors alone.
-        told = sys.stderr.isatty() and not options.quiet
-        outcome = options.command.run(options, _say if told else _silent)
+        shows_progress = sys.stderr.isatty() and not options.quiet
+        outcome = options.command.run(options, _say if shows_progress else _silent)
         if options.json:
             _print(json.dumps(outcome.document, indent=1, ensure_ascii=False))
         elif not options.quiet:
@@ -56,19 +58,19 @@ def _parser() -> argparse.ArgumentParser:
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
     for command in COMMANDS:
         summary = command.summary
-        one = commands.add_parser(
+        subparser = commands.add_parser(
             command.name,
             help=summary,
             description=f"{summary[0].upper()}{summary[1:]}.",
             epilog=command.details,
             formatter_class=argparse.RawDescriptionHelpFormatter,
         )
-        one.set_defaults(command=command)
-        command.add_arguments(one)
-        one.add_argument(
-            "--out", type=Path, required=True, metavar="DIR", help="folder for the report"
-        )
-        output = one.add_mutually_exclusive_group()
+        subparser.set_defaults(command=command)
+        command.add_arguments(subparser)
+        if command.out is not None:
+            metavar, words = command.out
+            subparser.add_argument("--out", type=Path, required=True, metavar=metavar, help=words)
+        output = subparser.add_mutually_exclusive_group()
         output.add_argument("--json", action="store_true", help="print the result as JSON")
         output.add_argument("--quiet", action="store_true", help="print nothing but errors")
     return parser

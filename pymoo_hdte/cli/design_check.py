@@ -18,7 +18,8 @@ from pymoo_hdte.surrogate import TruncatedNormal, UniformBand
 from pymoo_hdte.surrogate._sparse.measures import Distribution
 
 SETS, DRIVES = 8, 256
-"""Independent sets of quasi-random drives, and drives in each: the sets tell the error."""
+"""Number of independent sets of quasi-random drives, whose scatter is the error, and of drives
+in each."""
 
 Values = NDArray[np.float64]
 
@@ -30,9 +31,9 @@ class Check:
     Attributes
     ----------
     means, stds : ndarray, shape (SETS,)
-        Of each set; NaN if one of its drives has no steady state. The share of the scatter that is
-        of first or second degree in the inputs is exact (control variates), the rest is that of
-        the set.
+        Values of each set, NaN if one of its drives has no steady state. The part of the scatter
+        that is of first or second degree in the inputs is exact (control variates); the residual
+        is estimated from the set.
     """
 
     means: Values
@@ -59,7 +60,7 @@ class Check:
         return standard_error(self.stds)
 
     def differs(self, objectives: Values, width: Values) -> float:
-        """Return by how much objectives differ from these at most, in widths.
+        """Return the largest difference of objectives from these moments, in widths.
 
         Parameters
         ----------
@@ -69,12 +70,12 @@ class Check:
         Returns
         -------
         float
-            The difference and two standard errors, so that what is known too badly does not pass
-            for agreement; inf if a drive has no steady state.
+            The difference plus two standard errors, so that uncertain moments do not pass for
+            agreement; inf if a drive has no steady state.
         """
-        found = np.array([self.mean, self.std])
+        moments = np.array([self.mean, self.std])
         doubt = 2.0 * np.array([self.mean_error, self.std_error])
-        most = (np.abs(objectives - found) + doubt) / width
+        most = (np.abs(objectives - moments) + doubt) / width
         return float(np.nan_to_num(most, nan=np.inf).max())
 
 
@@ -86,7 +87,7 @@ def standard_error(values: Values) -> float:
 def check_designs(
     problem: RobustDTEDirect, designs: Values, rng: np.random.Generator
 ) -> list[Check]:
-    """Ask the drive model for designs, shape (n, 4), on the same drives relative to each."""
+    """Check designs, shape (n, 4), by the drive model, on the same relative deviations for each."""
     standard, relative = _drives(problem, rng)
     basis = _basis(problem, standard)
     checks = []
@@ -101,7 +102,7 @@ def check_designs(
 
 
 def _drives(problem: RobustDTEDirect, rng: np.random.Generator) -> tuple[Values, Values]:
-    """Return inputs with mean 0 and variance 1, and as they multiply a design, (sets, drives, 5).
+    """Return inputs of mean 0 and variance 1, and as factors of a design, (sets, drives, 5).
 
     The first input, theta_s, is its value itself.
     """
@@ -127,7 +128,7 @@ def _basis(problem: RobustDTEDirect, standard: Values) -> Values:
         np.ones_like(standard[..., :1]),
         standard,
         (standard**2 - 1.0) / np.sqrt(fourth - 1.0),
-        np.stack([standard[..., one] * standard[..., other] for one, other in pairs], axis=-1),
+        np.stack([standard[..., i] * standard[..., j] for i, j in pairs], axis=-1),
     ]
     return np.concatenate(parts, axis=-1)
 
@@ -140,9 +141,9 @@ def _kurtosis(entry: TruncatedNormal | UniformBand) -> float:
 
 
 def _moments(basis: Values, dte: Values) -> tuple[float, float]:
-    """Return mean and standard deviation of one set, what the basis explains taken as exact."""
+    """Return mean and standard deviation of one set; the part that the basis explains is exact."""
     if np.isnan(dte).any():
         return np.nan, np.nan
     slopes = np.linalg.lstsq(basis, dte, rcond=None)[0]
-    rest = np.sum((dte - basis @ slopes) ** 2) / (len(dte) - len(slopes))
-    return float(slopes[0]), float(np.sqrt(np.sum(slopes[1:] ** 2) + rest))
+    residual_variance = np.sum((dte - basis @ slopes) ** 2) / (len(dte) - len(slopes))
+    return float(slopes[0]), float(np.sqrt(np.sum(slopes[1:] ** 2) + residual_variance))

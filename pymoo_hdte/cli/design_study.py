@@ -1,4 +1,4 @@
-"""A robust design study: the front of the drive model, a design of it, and whether both hold."""
+"""A robust design study: the front of the drive model, a chosen design, and a check of both."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ A front that is narrower counts as that wide: nobody needs its designs apart.
 CHECKED = 4
 """Designs along the front that are checked, beside those that preferences choose."""
 _SEARCHES = 3
-"""Searches at most, each but the first with more nodes."""
+"""Largest number of searches; each has more nodes than the one before."""
 _OF_QUADRATURE = 0.25
 """Share of `AGREEMENT` that doubled nodes may change when nodes are chosen anew."""
 
@@ -60,19 +60,19 @@ class Settings:
 
 @dataclass(frozen=True)
 class Gain:
-    """How far an objective falls from the nominal to the chosen design; negative where it rises.
+    """The reduction of an objective from the nominal to the chosen design.
 
     Attributes
     ----------
-    found : float
-        By the drive model on the checked drives, arcsec.
+    reduction : float
+        Reduction by the drive model on the checked drives, arcsec; negative for a rise.
     error : float
-        Standard error of ``found``, arcsec.
+        Standard error of ``reduction``, arcsec.
     share : float
-        Of ``found`` in the value at the nominal design.
+        ``reduction`` over the value at the nominal design.
     """
 
-    found: float
+    reduction: float
     error: float
     share: float
 
@@ -84,7 +84,7 @@ class DesignStudy:
     Attributes
     ----------
     problem : RobustDTEDirect
-        With as many nodes as it took.
+        The problem, with as many nodes as the study needed.
     settings : Settings
     search : FoundFront
         The front, by rising mean DTE.
@@ -93,15 +93,15 @@ class DesignStudy:
     chosen : dict of int
         Row of the front that each of `PREFERENCES` chooses.
     preference : str
-        The one that was asked for.
+        The preference that was requested.
     initial : ndarray, shape (2,)
         Mean and standard deviation at the nominal design, at the same tolerance.
     initial_check : Check
-        Of the nominal design.
+        Check of the nominal design.
     checks : dict of Check
-        By row of the front, of the chosen designs and of `CHECKED` along it.
+        Checks of the chosen designs and of `CHECKED` along the front, by row of the front.
     sources : SobolIndices
-        What causes the scatter that is left at the chosen design.
+        Causes of the scatter at the chosen design.
     """
 
     problem: RobustDTEDirect
@@ -132,12 +132,12 @@ class DesignStudy:
 
     @property
     def objectives(self) -> Values:
-        """Its mean and standard deviation, shape (2,), arcsec."""
+        """Mean and standard deviation of the chosen design, shape (2,), arcsec."""
         return self.front[self.chosen[self.preference]]
 
     @property
     def optimum_check(self) -> Check:
-        """Of the chosen design, on the same drives as the nominal one."""
+        """Check of the chosen design, on the same drives as the nominal design."""
         return self.checks[self.chosen[self.preference]]
 
     @property
@@ -156,11 +156,11 @@ class DesignStudy:
         return self.disagreement <= AGREEMENT
 
     @cached_property
-    def free(self) -> tuple[str, ...]:
-        """Names of the variables that move neither objective (`without_influence`)."""
+    def uninfluential(self) -> tuple[str, ...]:
+        """Names of the variables that move neither objective; see `without_influence`."""
         problem = self.problem
-        free = without_influence(problem.moments, problem.xl, problem.xu, self.design)
-        return tuple(name for name, one in zip(problem.var_names, free, strict=True) if one)
+        idle = without_influence(problem.moments, problem.xl, problem.xu, self.design)
+        return tuple(name for name, is_idle in zip(problem.var_names, idle, strict=True) if is_idle)
 
     @property
     def gains(self) -> dict[str, Gain]:
@@ -251,7 +251,7 @@ def run_design_study(
 
 
 def _difference(search: FoundFront, checks: dict[int, Check]) -> float:
-    return max(one.differs(search.front[row], search.width) for row, one in checks.items())
+    return max(check.differs(search.front[row], search.width) for row, check in checks.items())
 
 
 def _rows_to_check(n: int, chosen: list[int]) -> list[int]:
@@ -260,7 +260,7 @@ def _rows_to_check(n: int, chosen: list[int]) -> list[int]:
 
 
 def _later(notify: Notify | None, before: int) -> Notify | None:
-    """Return what notifies with the designs of earlier searches added."""
+    """Return a notifier that adds the designs of earlier searches."""
     if notify is None:
         return None
     return lambda evaluated, difference: notify(before + evaluated, difference)

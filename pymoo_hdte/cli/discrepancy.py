@@ -11,7 +11,7 @@ from typing import Any
 from pymoo_hdte._reports.folder import PAGE_FILE
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.cli.command import Command, Outcome, Say
-from pymoo_hdte.cli.own_effects import OPTION, own_effects, told_by_line
+from pymoo_hdte.cli.own_effects import OPTION, errors_by_line, own_effects
 
 ModelFiles = tuple[Path | None, Path | None]
 """Files of a model and its data sheet."""
@@ -21,9 +21,9 @@ _DETAILS = """example:
   pymoo-hdte discrepancy campaigns/rig-01 --believed reports/rig-01/revised_model.toml --out again
   pymoo-hdte discrepancy campaigns/rig-01 --effects my_effects.py --out reports/mine
 
-The campaign is a folder with campaign.toml and its records, of a harmonic drive, or with rig.toml
-and its records, of any other mechanism. DIR gets verdict.json, revised_model.toml and report.html;
-an earlier report there is replaced, anything else refused.
+CAMPAIGN holds records and campaign.toml (a harmonic drive) or rig.toml (any other mechanism).
+DIR gets verdict.json, revised_model.toml and report.html; an earlier report there is replaced,
+anything else refused.
 Exit codes: 0 a verdict was reached, whatever it is; 2 the input is at fault."""
 
 
@@ -38,7 +38,7 @@ def _add_arguments(parser: argparse.ArgumentParser) -> None:
         "--believed",
         type=Path,
         metavar="MODEL.toml",
-        help="model to be questioned instead of what the campaign believes: a revised_model.toml",
+        help="nominal model in place of the campaign's own, such as a revised_model.toml",
     )
     parser.add_argument(
         "--sheet",
@@ -50,7 +50,7 @@ def _add_arguments(parser: argparse.ArgumentParser) -> None:
         OPTION,
         type=Path,
         metavar="FILE.py",
-        help="Python file with effects of your own, which may be missing, too; the file is run",
+        help="Python file with effects of your own to look for as well; the file is run",
     )
 
 
@@ -63,7 +63,7 @@ def _run(options: argparse.Namespace, say: Say) -> Outcome:
     with FOLDER.held(options.out), registered():
         for effect in () if options.effects is None else own_effects(options.effects):
             register(effect)
-        with told_by_line(options.effects):
+        with errors_by_line(options.effects):
             document = _analysed(options, believed, say)
     return Outcome(document, _summary(document, options.out))
 
@@ -81,7 +81,7 @@ def _analysed(options: argparse.Namespace, believed: ModelFiles, say: Say) -> di
         analysis = analyse(measured, progress=simulated)
     say("locating the misfit")
     analysis.locate()
-    say("proving it on the records that were held out")
+    say("validating it on the held-out records")
     analysis.prove()
     say("choosing the next test and writing the report")
     document = analysis.report(options.out)
@@ -112,7 +112,7 @@ def _measured(folder: Path, data: Path | None, progress: Callable[[int, int], No
 
 
 def _believing(measured: Any, model: Path | None, sheet: Path | None) -> Any:
-    """Return what was measured, with the model of a file as what is believed."""
+    """Return the measurements, with the model of a file as the nominal one."""
     from pymoo_hdte.discrepancy import Campaign, read_drive_model, read_mechanism_model
 
     of_drive = isinstance(measured, Campaign)
@@ -126,13 +126,13 @@ def _believing(measured: Any, model: Path | None, sheet: Path | None) -> Any:
 
 def _summary(document: dict[str, Any], out: Path) -> str:
     torsion: dict[str, Any] = document.get("torsion", {"effects": [], "limits": []})
-    names = " + ".join(_name(one) for one in (*document["effects"], *torsion["effects"]))
+    names = " + ".join(_name(effect) for effect in (*document["effects"], *torsion["effects"]))
     lines = [
         f"{document['status']}{': ' + names if names else ''}",
         document["sentence"],
         *([relevance["sentence"]] if (relevance := document.get("relevance")) else []),
         document["location"]["sentence"],
-        f"On records kept out: {document['gap_sentence']}",
+        f"Validation: {document['gap_sentence']}",
         *document["limits"],
         *_remarks(document.get("record_remarks", [])),
         *torsion["limits"],
@@ -144,11 +144,11 @@ def _summary(document: dict[str, Any], out: Path) -> str:
 
 
 def _remarks(remarks: list[str]) -> list[str]:
-    """Return one line on how records were read; the report has them all."""
+    """Return one line on how records were read; the report has all remarks."""
     if len(remarks) < 2:
         return remarks
-    more = len(remarks) - 1
-    return [f"{remarks[0]} The report has {more} more such remark{'s' if more > 1 else ''}."]
+    further = len(remarks) - 1
+    return [f"{remarks[0]} The report has {further} more such remark{'s' if further > 1 else ''}."]
 
 
 def _name(effect: dict[str, Any]) -> str:
@@ -159,7 +159,7 @@ def _name(effect: dict[str, Any]) -> str:
 
 DISCREPANCY = Command(
     "discrepancy",
-    "find where model and measurement disagree, name the effect and prove it",
+    "find what a model lacks, and validate the corrected model",
     _DETAILS,
     _add_arguments,
     _run,

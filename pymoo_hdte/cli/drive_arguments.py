@@ -28,7 +28,7 @@ def add_drive_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def read_drive(options: argparse.Namespace) -> tuple[DriveModel, tuple[str, ...]]:
-    """Return the drive that the options name, and what to know of it, in sentences.
+    """Return the drive that the options name, with remarks on it in sentences.
 
     Raises
     ------
@@ -54,18 +54,18 @@ def read_drive(options: argparse.Namespace) -> tuple[DriveModel, tuple[str, ...]
 
 
 def _of_the_held_member(named: str, sheet: DataSheet) -> tuple[str, ...]:
-    """Say which member is taken for held, and the ratio that follows, if the file does not."""
+    """Say which member is assumed to be held, and the ratio that follows, if the file does not."""
     from pymoo_hdte._io.toml import read_toml
     from pymoo_hdte.drive.datasheet import MEMBERS
 
     if named == BUILT_IN_SHEET or read_toml(Path(named)).table("teeth").has("held"):
         return ()
     (member,) = set(MEMBERS) - {sheet.held}
-    held, other = sheet.held.replace("_", " "), member.replace("_", " ")
+    held, alternative = sheet.held.replace("_", " "), member.replace("_", " ")
     return (
         f"{Path(named).name} does not say which member is held (teeth.held). The {held} is taken, "
-        f"as makers state their ratios: ratio {sheet.ratio:g}; with the {other} held it would be "
-        f"{replace(sheet, held=member).ratio:g}.",
+        f"as makers state their ratios: ratio {sheet.ratio:g}; with the {alternative} held it "
+        f"would be {replace(sheet, held=member).ratio:g}.",
     )
 
 

@@ -1,4 +1,4 @@
-"""What a folder of bench records says of a series: stiffness, damping, errors of the components."""
+"""Identification of a series from bench records: stiffness, damping, errors of the components."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class Parameter:
     Attributes
     ----------
     name : str
-        Of `NOMINAL_FIELDS`, whose `unit_of` all values are in.
+        One of `NOMINAL_FIELDS`; all values are in its `unit_of`.
     fits : mapping of (prototype, repeat) to LinearFit
     """
 
@@ -60,14 +60,14 @@ class Parameter:
     @property
     def value(self) -> float:
         """Mean over the prototypes of the means of their repeats."""
-        found = self.series
-        return found.between.mean if found else float(np.mean(self._slopes))
+        series = self.series
+        return series.between.mean if series else float(np.mean(self._slopes))
 
     @property
     def interval(self) -> tuple[float, float]:
-        """95 % interval of `value`: over prototypes, else repeats, else of the fitted line."""
-        if found := self.series:
-            return found.between.mean_interval()
+        """95 % interval of `value`: over prototypes, else repeats, else the fitted line."""
+        if series := self.series:
+            return series.between.mean_interval()
         if len(self.fits) > 1:
             return NormalSample.of(self._slopes).mean_interval()
         return next(iter(self.fits.values())).slope_interval()
@@ -79,7 +79,7 @@ class Parameter:
 
 @dataclass(frozen=True, eq=False)
 class Identification:
-    """The outcome.
+    """The identified parameters, loops and errors of a folder.
 
     Attributes
     ----------
@@ -87,7 +87,7 @@ class Identification:
     parameters : tuple of Parameter
     loops : mapping of (prototype, repeat) to TorsionLoop
     errors : ErrorStatistics or None
-        In micrometres.
+        Errors of components in micrometres.
     """
 
     folder: str
@@ -129,7 +129,7 @@ def identify_drive(folder: Path) -> Identification:
     }
     return Identification(
         folder=folder.resolve().name or str(folder),
-        parameters=tuple(Parameter(name, found) for name, found in fits.items() if found),
+        parameters=tuple(Parameter(name, runs) for name, runs in fits.items() if runs),
         loops=loops,
         errors=error_statistics(*read_error_measurements(folder / ERRORS))
         if ERRORS in present

@@ -30,15 +30,15 @@ _TOO_EQUAL = 1e-3
 
 
 def write_identification_report(
-    found: Identification, sheet: DataSheet | None, out: Path
+    identification: Identification, sheet: DataSheet | None, out: Path
 ) -> dict[str, Any]:
     """Write a report; errors as `ReportFolder.write`.
 
     Parameters
     ----------
-    found : Identification
+    identification : Identification
     sheet : DataSheet or None
-        Gets the identified values; None for no data sheet.
+        Data sheet that receives the identified values; None for none.
     out : Path
 
     Returns
@@ -46,20 +46,26 @@ def write_identification_report(
     dict
         What ``parameters.json`` holds.
     """
-    document = identification_document(found, sheet)
+    document = identification_document(identification, sheet)
     others = {}
     if sheet is not None:
-        others[SHEET_FILE] = sheet_toml(identified_sheet(found, sheet))
-    FOLDER.write(out, _page(found, document), document, others)
+        others[SHEET_FILE] = sheet_toml(identified_sheet(identification, sheet))
+    FOLDER.write(out, _page(identification, document), document, others)
     return document
 
 
-def identified_sheet(found: Identification, sheet: DataSheet) -> DataSheet:
+def identified_sheet(identification: Identification, sheet: DataSheet) -> DataSheet:
     """Return a data sheet with the identified values; what was not identified stays."""
-    values = {NOMINAL_FIELDS[one.name]: one.value for one in found.parameters if one.value > 0.0}
+    values = {
+        NOMINAL_FIELDS[parameter.name]: parameter.value
+        for parameter in identification.parameters
+        if parameter.value > 0.0
+    }
     sources = sheet.error_sources
-    if found.errors is not None:
-        samples = dict(zip(found.errors.symbols, found.errors.samples, strict=True))
+    if identification.errors is not None:
+        samples = dict(
+            zip(identification.errors.symbols, identification.errors.samples, strict=True)
+        )
         sources = tuple(
             replace(
                 source,
@@ -72,13 +78,13 @@ def identified_sheet(found: Identification, sheet: DataSheet) -> DataSheet:
         )
     return replace(
         sheet,
-        source=f"{sheet.source}; identified from {found.folder}",
+        source=f"{sheet.source}; identified from {identification.folder}",
         nominal=replace(sheet.nominal, **values),
         error_sources=sources,
     )
 
 
-def check_filled_in(found: Identification, sheet: DataSheet) -> None:
+def check_filled_in(identification: Identification, sheet: DataSheet) -> None:
     """Refuse an identified stiffness that the rated load of the data sheet would twist too far.
 
     Raises
@@ -87,14 +93,18 @@ def check_filled_in(found: Identification, sheet: DataSheet) -> None:
         As `check_twist`.
     """
     cause = "likely torque_Nm or torsion_arcsec is in another unit"
-    check_twist(identified_sheet(found, sheet), f"{LOOPS}: stiffness", cause)
+    check_twist(identified_sheet(identification, sheet), f"{LOOPS}: stiffness", cause)
 
 
-def identification_document(found: Identification, sheet: DataSheet | None) -> dict[str, Any]:
+def identification_document(
+    identification: Identification, sheet: DataSheet | None
+) -> dict[str, Any]:
     """Return what ``parameters.json`` holds: parameters in SI, errors in micrometres."""
-    return heading("parameters", sentences(found), limits(found, sheet)) | {
-        "records": found.folder,
-        "parameters": {one.name: _parameter(one) for one in found.parameters},
+    return heading("parameters", sentences(identification), limits(identification, sheet)) | {
+        "records": identification.folder,
+        "parameters": {
+            parameter.name: _parameter(parameter) for parameter in identification.parameters
+        },
         "torsion_loops": [
             {
                 "prototype": prototype,
@@ -102,20 +112,20 @@ def identification_document(found: Identification, sheet: DataSheet | None) -> d
                 "hysteresis_width_arcsec": hysteresis_width(loop) / ARCSEC,
                 "lost_energy_J": lost_energy(loop),
             }
-            for (prototype, repeat), loop in found.loops.items()
+            for (prototype, repeat), loop in identification.loops.items()
         ],
-        "errors_um": {} if found.errors is None else _errors(found.errors),
+        "errors_um": {} if identification.errors is None else _errors(identification.errors),
     }
 
 
-def _parameter(one: Parameter) -> dict[str, Any]:
-    over = one.series
+def _parameter(parameter: Parameter) -> dict[str, Any]:
+    over = parameter.series
     return {
-        "value": one.value,
-        "unit": unit_of(one.name),
-        "interval95": list(one.interval),
-        "prototypes": len({prototype for prototype, _ in one.fits}),
-        "runs": len(one.fits),
+        "value": parameter.value,
+        "unit": unit_of(parameter.name),
+        "interval95": list(parameter.interval),
+        "prototypes": len({prototype for prototype, _ in parameter.fits}),
+        "runs": len(parameter.fits),
         "std_between_prototypes": over.between.std if over else None,
         "repeatability": over.repeatability if over and np.isfinite(over.repeatability) else None,
     }
@@ -144,96 +154,99 @@ def _errors(statistics: ErrorStatistics) -> dict[str, Any]:
     }
 
 
-def sentences(found: Identification) -> list[str]:
+def sentences(identification: Identification) -> list[str]:
     """Say what was identified."""
     said = []
-    for one in found.parameters:
-        low, high = one.interval
-        over = one.series
+    for parameter in identification.parameters:
+        low, high = parameter.interval
+        over = parameter.series
         scatter = f", {over.between.cv_percent:.1f} % over prototypes" if over else ""
         said.append(
-            f"{one.name} {number(one.value, 4)} {unit_of(one.name)} "
+            f"{parameter.name} {number(parameter.value, 4)} {unit_of(parameter.name)} "
             f"(95 %: {number(low, 4)} to {number(high, 4)}{scatter})."
         )
-    if found.errors is not None:
-        said.append(f"Errors of components: {len(found.errors.symbols)} with mean and scatter.")
+    if identification.errors is not None:
+        said.append(
+            f"Errors of components: {len(identification.errors.symbols)} with mean and scatter."
+        )
     return said
 
 
-def headline(found: Identification) -> str:
-    """Say in one sentence what was identified and how well; the rest stands in tables."""
+def headline(identification: Identification) -> str:
+    """Say in one sentence what was identified and how well; tables have the details."""
     said = []
-    for one in found.parameters:
-        low, high = one.interval
-        unit, half = unit_of(one.name), 50.0 * (high - low)
-        words = f"{one.name} {number(one.value, digits(low, high))} {unit}"
+    for parameter in identification.parameters:
+        low, high = parameter.interval
+        unit, half = unit_of(parameter.name), 50.0 * (high - low)
+        words = f"{parameter.name} {number(parameter.value, digits(low, high))} {unit}"
         said.append(
-            f"{words} ± {number(half / abs(one.value), 2)} % (95 %)" if one.value else words
+            f"{words} ± {number(half / abs(parameter.value), 2)} % (95 %)"
+            if parameter.value
+            else words
         )
-    if found.errors is not None:
-        symbols = ", ".join(found.errors.symbols)
+    if identification.errors is not None:
+        symbols = ", ".join(identification.errors.symbols)
         said.append(f"mean and scatter of the component errors {symbols}")
     return f"Identified: {'; '.join(said)}."
 
 
-def limits(found: Identification, sheet: DataSheet | None) -> list[str]:
-    """Say what these records do not tell."""
+def limits(identification: Identification, sheet: DataSheet | None) -> list[str]:
+    """Return what these records leave open, in sentences."""
     said = [
-        f"{one.name} came out at {number(one.value, 3)}: damping and stiffness are positive, so "
-        "noise or a zero error outweighs it, and the data sheet keeps its value."
-        for one in found.parameters
-        if one.value <= 0.0
+        f"{parameter.name} came out at {number(parameter.value, 3)}: damping and stiffness are "
+        "positive, so noise or a zero error outweighs it, and the data sheet keeps its value."
+        for parameter in identification.parameters
+        if parameter.value <= 0.0
     ]
-    single = [one.name for one in found.parameters if one.series is None]
+    single = [parameter.name for parameter in identification.parameters if parameter.series is None]
     if single:
         said.append(f"One prototype says nothing of the scatter of {', '.join(single)}.")
-    for one in found.parameters:
-        error = max(fit.slope_error for fit in one.fits.values())
-        if one.series is not None and one.series.between.std < _TOO_EQUAL * error:
+    for parameter in identification.parameters:
+        error = max(fit.slope_error for fit in parameter.fits.values())
+        if parameter.series is not None and parameter.series.between.std < _TOO_EQUAL * error:
             said.append(
-                f"The prototypes agree on {one.name} far better than one record can tell it: are "
-                "they copies of one another?"
+                f"The prototypes agree on {parameter.name} far better than one record determines "
+                "it: are they copies of one another?"
             )
-    if found.errors is not None:
-        said += found.errors.advice()
+    if identification.errors is not None:
+        said += identification.errors.advice()
         if sheet is not None:
             said.append(
-                "The errors go into the list of the data sheet. Its theta_s, and the DTE with it, "
-                "stay as they were; the Python function sample_static_error tells what theta_s "
-                "would be."
+                "The errors are listed in the data sheet; its theta_s and DTE stay the same. The "
+                "Python function sample_static_error computes theta_s from them."
             )
-        samples = zip(found.errors.symbols, found.errors.samples, strict=True)
+        samples = zip(identification.errors.symbols, identification.errors.samples, strict=True)
         negative = [symbol for symbol, sample in samples if sample.mean < 0.0]
         if negative:
             said.append(f"A data sheet takes no negative mean, so it lacks {', '.join(negative)}.")
         if sheet is not None:
             known = {source.symbol for source in sheet.error_sources}
-            strange = [symbol for symbol in found.errors.symbols if symbol not in known]
+            strange = [symbol for symbol in identification.errors.symbols if symbol not in known]
             if strange:
-                names = ", ".join(f"'{one}'" for one in strange)
+                names = ", ".join(f"'{symbol}'" for symbol in strange)
                 said.append(f"The data sheet has no error source called {names}.")
     return said
 
 
-def _page(found: Identification, document: dict[str, Any]) -> str:
+def _page(identification: Identification, document: dict[str, Any]) -> str:
     pictures = {}
-    if found.loops:
-        pictures["loops"] = data_uri(_loops_figure(found))
+    if identification.loops:
+        pictures["loops"] = data_uri(_loops_figure(identification))
     return page(
         "pymoo_hdte.cli",
         "identification.html.j2",
-        found=found,
+        identification=identification,
         document=document,
-        headline=headline(found),
-        pictures={**pictures, **_strips(found)},
+        headline=headline(identification),
+        pictures={**pictures, **_strips(identification)},
     )
 
 
-def _loops_figure(found: Identification) -> Figure:
-    """Draw all loops, the first one in front."""
+def _loops_figure(identification: Identification) -> Figure:
+    """Draw all loops, the first in front."""
     figure = Figure(figsize=(6.4, 3.8), layout="constrained")
     axis = figure.subplots()
-    for place, loop in enumerate(found.loops.values()):
+    for place, loop in enumerate(identification.loops.values()):
         colour, width = (BEFORE, 1.4) if place == 0 else (GREY, 0.5)
         axis.plot(
             loop.torsion / ARCSEC, loop.torque, color=colour, linewidth=width, zorder=3 - place
@@ -243,19 +256,19 @@ def _loops_figure(found: Identification) -> Figure:
     return figure
 
 
-def _strips(found: Identification) -> dict[str, str]:
+def _strips(identification: Identification) -> dict[str, str]:
     """Draw the value of every run over the number of its prototype, one figure per parameter."""
     pictures = {}
-    for one in found.parameters:
+    for parameter in identification.parameters:
         figure = Figure(figsize=(6.4, 2.4), layout="constrained")
         axis = figure.subplots()
-        numbers = [prototype for prototype, _ in one.fits]
-        errors = [2.0 * fit.slope_error for fit in one.fits.values()]
-        slopes = [fit.slope for fit in one.fits.values()]
+        numbers = [prototype for prototype, _ in parameter.fits]
+        errors = [2.0 * fit.slope_error for fit in parameter.fits.values()]
+        slopes = [fit.slope for fit in parameter.fits.values()]
         axis.errorbar(numbers, slopes, errors, fmt="o", color=AFTER, markersize=4, elinewidth=0.8)
-        axis.axhspan(*one.interval, color=BEFORE, alpha=0.2)
+        axis.axhspan(*parameter.interval, color=BEFORE, alpha=0.2)
         axis.set_xlabel("prototype")
-        axis.set_ylabel(f"{one.name} [{unit_of(one.name)}]")
+        axis.set_ylabel(f"{parameter.name} [{unit_of(parameter.name)}]")
         axis.xaxis.set_major_locator(MaxNLocator(integer=True))
-        pictures[one.name] = data_uri(figure)
+        pictures[parameter.name] = data_uri(figure)
     return pictures

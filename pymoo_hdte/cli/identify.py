@@ -40,10 +40,12 @@ def _run(options: argparse.Namespace, say: Say) -> Outcome:
     with FOLDER.held(options.out):
         sheet = read_sheet(options.datasheet) if options.datasheet is not None else None
         say("reading the records and fitting")
-        found = identify_drive(options.records)
+        identification = identify_drive(options.records)
         if sheet is not None:
-            check_filled_in(found, sheet)
-        return outcome_of(write_identification_report(found, sheet, options.out), options.out)
+            check_filled_in(identification, sheet)
+        return outcome_of(
+            write_identification_report(identification, sheet, options.out), options.out
+        )
 
 
 IDENTIFY = Command(

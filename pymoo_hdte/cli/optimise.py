@@ -31,26 +31,30 @@ def _add_arguments(parser: argparse.ArgumentParser) -> None:
         default="balanced",
         help="accuracy_first, balanced or robustness_first (default balanced)",
     )
-    parser.add_argument("--cycle", type=Path, metavar="CYCLE.csv", help="duty cycle, averaged over")
+    parser.add_argument(
+        "--cycle", type=Path, metavar="CYCLE.csv", help="duty cycle to average over"
+    )
     parser.add_argument(
         "--tolerance",
         type=float,
         default=0.05,
-        help="scatter of the parts around a design, as a share (default 0.05)",
+        help="relative scatter of the parts around a design (default 0.05)",
     )
     parser.add_argument(
         "--box",
         type=float,
         default=0.25,
-        help="how far a design may leave the data sheet, as a share (default 0.25)",
+        help="relative distance of designs from the data sheet (default 0.25)",
     )
     parser.add_argument(
         "--designs",
         type=int,
         default=600,
-        help="asked of the drive model in a search, after which no round begins (default 600)",
+        help="designs that the search may compute by the drive model (default 600)",
     )
-    parser.add_argument("--seed", type=int, default=1, help="of the random numbers (default 1)")
+    parser.add_argument(
+        "--seed", type=int, default=1, help="seed of the random numbers (default 1)"
+    )
 
 
 def _run(options: argparse.Namespace, say: Say) -> Outcome:

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from pymoo_hdte._io.text_table import csv_text
+from pymoo_hdte._io.csv_table import csv_text
 from pymoo_hdte._reports.folder import ReportFolder
 from pymoo_hdte._reports.front import Front, design_rows, front_svg
 from pymoo_hdte._reports.html import change, number, page, with_error
@@ -88,16 +88,16 @@ def optimum_document(study: DesignStudy, notes: Sequence[str]) -> dict[str, Any]
             for name, low, high in bands
             if study.recommended
         },
-        "matter_little": list(study.free),
+        "matter_little": list(study.uninfluential),
         "initial": dict(zip(problem.obj_names, study.initial.tolist(), strict=True)),
         "checked_on_the_model": {
             "drives": SETS * DRIVES,
             "initial": _checked(study.initial_check),
             "front": {str(row): _checked(check) for row, check in study.checks.items()},
             "falls_by_arcsec": {
-                name: {"model": gain.found, "standard_error": gain.error}
+                name: {"model": gain.reduction, "standard_error": gain.error}
                 for name, gain in zip(problem.obj_names, study.gains.values(), strict=True)
-                if np.isfinite(gain.found)
+                if np.isfinite(gain.reduction)
             },
         },
         "sources_of_scatter": dict(
@@ -128,7 +128,7 @@ def _design(study: DesignStudy, row: int) -> dict[str, Any]:
 
 
 def _finite(value: float) -> float | None:
-    """Return the number, or None, since JSON has no other way to say that there is none."""
+    """Return a finite number, or None, by which JSON says that there is none."""
     return value if np.isfinite(value) else None
 
 
@@ -147,28 +147,28 @@ def sentences(study: DesignStudy) -> list[str]:
         return [
             f"No design is recommended: front and drive model {_apart(study)}, "
             f"{100.0 * AGREEMENT:g} % are allowed.",
-            f"What is said of designs below is not to be built upon{_way_out(study)}.",
+            f"Do not build the designs below{_way_out(study)}.",
             _agreement(study),
         ]
     return [
         f"Take {_design_in_words(study)}.",
         _worth(study),
         f"Front and drive model agree to {100.0 * study.disagreement:.1f} % of the front's width "
-        f"({100.0 * AGREEMENT:g} % are allowed). {_agreement(study)}",
+        f"({100.0 * AGREEMENT:g} % allowed). {_agreement(study)}",
     ]
 
 
 def _design_in_words(study: DesignStudy) -> str:
-    """Return the chosen values; a variable without influence has none worth a number."""
+    """Return the chosen values in words; a variable without influence may have any value."""
     problem = study.problem
     changes = 100.0 * (study.design / problem.nominal - 1.0)
     parts = [
         f"{name} {number(float(value), 4)} {problem.units[name]} ({change(float(off))})"
         for name, value, off in zip(problem.var_names, study.design, changes, strict=True)
-        if name not in study.free
+        if name not in study.uninfluential
     ]
-    if study.free:
-        parts.append(f"any {' and '.join(study.free)} of the box")
+    if study.uninfluential:
+        parts.append(f"any {' and '.join(study.uninfluential)} of the box")
     return ", ".join(parts)
 
 
@@ -200,26 +200,26 @@ def _apart(study: DesignStudy) -> str:
 
 
 def _agreement(study: DesignStudy) -> str:
-    """Say what agreement means here."""
+    """Say what the report calls agreement of front and drive model."""
     search = study.search
-    mean, std = (number(float(one)) for one in search.width)
+    mean, std = (number(float(width)) for width in search.width)
     parts = [
         "Each design of the front is computed by the drive model itself, over "
         f"{math.prod(study.problem.moments.nodes)} drives (Gauss quadrature)."
     ]
     if np.isfinite(search.difference):
         parts.append(
-            f"The last of {study.evaluated} designs came out within "
-            f"{100.0 * search.difference:.1f} % of what had been interpolated for it."
+            f"The last of {study.evaluated} designs is within {100.0 * search.difference:.1f} % of "
+            "its interpolated value."
         )
     if np.isfinite(study.quadrature):
         parts.append(
-            f"Computed again on {SETS * DRIVES} other drives each, {len(study.checks)} designs "
-            f"differ by at most {100.0 * study.quadrature:.1f} %, two standard errors included."
+            f"On {SETS * DRIVES} other drives {len(study.checks)} designs differ by at most "
+            f"{100.0 * study.quadrature:.1f} %, two standard errors included."
         )
     parts.append(
-        f"Percentages are of the front's width, {mean} arcsec in the mean and {std} in the "
-        f"deviation, taken as {100.0 * HARDLY_WORTH:g} % of the least value where it is less."
+        f"Percentages are of the front's width: {mean} arcsec in the mean, {std} in the standard "
+        f"deviation, or {100.0 * HARDLY_WORTH:g} % of the least value if that is more."
     )
     return " ".join(parts)
 
@@ -229,31 +229,32 @@ def _moved(what: str, before: float, after: float) -> str:
 
 
 def _by(gain: Gain) -> str:
-    return f"by {with_error(abs(gain.found), 2.0 * gain.error)}"
+    return f"by {with_error(abs(gain.reduction), 2.0 * gain.error)}"
 
 
 def limits(study: DesignStudy, notes: Sequence[str]) -> list[str]:
     """Say what a reader should know before quoting the result; ``notes`` are of the drive."""
-    found = list(notes)
+    remarks = list(notes)
     lost = study.search.lost
     if len(lost):
-        found.append(
+        remarks.append(
             f"Of {study.search.evaluated} designs {len(lost)} are left out, the first for "
             f"{study.problem.without_steady_state(lost[0])}."
         )
-    if study.free:
-        found.append(
-            f"No value of {' or '.join(study.free)} within the box moves mean or standard "
-            f"deviation by {100.0 * LITTLE:g} %: what is said of it carries no information."
+    if study.uninfluential:
+        names = " and ".join(study.uninfluential)
+        remarks.append(
+            f"{names} {'have' if len(study.uninfluential) > 1 else 'has'} no influence "
+            f"(below {100.0 * LITTLE:g} %)."
         )
     shares = {what: gain.share for what, gain in study.gains.items()}
     if max(shares.values()) < HARDLY_WORTH:
         changes = ", ".join(f"{what} {change(-100.0 * share)}" for what, share in shares.items())
-        found.append(
+        remarks.append(
             f"Neither falls by {100.0 * HARDLY_WORTH:g} % ({changes}): this model has next to "
-            "nothing to gain by these design variables."
+            "nothing to gain from these design variables."
         )
-    return found
+    return remarks
 
 
 def _front_csv(study: DesignStudy) -> str:
@@ -265,7 +266,7 @@ def _front_csv(study: DesignStudy) -> str:
 
 def _page(study: DesignStudy, document: dict[str, Any]) -> str:
     problem = study.problem
-    sources = sorted(document["sources_of_scatter"].items(), key=lambda one: -one[1])
+    sources = sorted(document["sources_of_scatter"].items(), key=lambda source: -source[1])
     shown = [(name, share) for name, share in sources if share >= _LITTLE_SHARE]
     values = design_rows(study.designs, problem.nominal)
     # Without agreement no design is pointed at.

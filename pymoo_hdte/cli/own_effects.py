@@ -1,4 +1,4 @@
-"""Effects of a user's own, from a Python file that is named on the command line."""
+"""A user's own effects, from a Python file that is named on the command line."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ OPTION = "--effects"
 def own_effects(path: Path) -> tuple[Effect, ...]:
     """Return the effects that a Python file defines; the file is run.
 
-    Effects of the package that the file imports by name are not among them. It may register its
-    own itself.
+    Effects of the package that the file imports are not among them. The file may also register
+    its own effects.
 
     Raises
     ------
@@ -35,18 +35,18 @@ def own_effects(path: Path) -> tuple[Effect, ...]:
     from pymoo_hdte.effects import Effect, known_effects
 
     known = known_effects()
-    found: list[Effect] = []
+    effects: list[Effect] = []
     for value in _names_of(path).values():
-        if isinstance(value, Effect) and all(value is not one for one in (*known, *found)):
-            found.append(value)
-    if not found:
+        if isinstance(value, Effect) and all(value is not effect for effect in (*known, *effects)):
+            effects.append(value)
+    if not effects:
         raise InvalidInput(OPTION, str(path), "a Python file in which an Effect stands by a name")
-    return tuple(found)
+    return tuple(effects)
 
 
 @contextmanager
-def told_by_line(path: Path | None) -> Iterator[None]:
-    """Tell errors that an effect of the file makes later, in a fit, by the line of the file."""
+def errors_by_line(path: Path | None) -> Iterator[None]:
+    """Report errors of the file's effects, which occur later in a fit, with the file's line."""
     try:
         yield
     except InvalidInput:
@@ -54,7 +54,7 @@ def told_by_line(path: Path | None) -> Iterator[None]:
     except Exception as error:
         if path is None or not _line(error, path):
             raise
-        allowed = f"a Python file whose effects make no errors; {_told(error, path)}"
+        allowed = f"a Python file whose effects make no errors; {_on_one_line(error, path)}"
         raise InvalidInput(OPTION, str(path), allowed) from error
 
 
@@ -73,19 +73,19 @@ def _names_of(path: Path) -> dict[str, Any]:
         loader.exec_module(module)
     except (Exception, SystemExit) as error:
         del sys.modules[name]
-        allowed = f"a Python file that runs without errors; {_told(error, path)}"
+        allowed = f"a Python file that runs without errors; {_on_one_line(error, path)}"
         raise InvalidInput(OPTION, str(path), allowed) from error
     return vars(module)
 
 
-def _told(error: BaseException, path: Path) -> str:
+def _on_one_line(error: BaseException, path: Path) -> str:
     """Return an error with its line of the file, on one line."""
     message = " ".join(f"{type(error).__name__}: {error}".split())
     return f"{_line(error, path)}{message}"
 
 
 def _line(error: BaseException, path: Path) -> str:
-    """Return the line of the file at which it stopped, in words; nothing if it never began."""
+    """Return in words the line of the file that failed; an empty text if it never ran."""
     steps = traceback.extract_tb(error.__traceback__)
     lines = [step.lineno for step in steps if step.filename == str(path)]
     return f"line {lines[-1]}: " if lines else ""

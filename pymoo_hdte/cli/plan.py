@@ -1,4 +1,4 @@
-"""``pymoo-hdte plan``: before anything is measured, the tests that tell the effects apart."""
+"""``pymoo-hdte plan``: tests that tell the effects apart, chosen before anything is measured."""
 
 from __future__ import annotations
 
@@ -18,9 +18,7 @@ Exit codes: 0 there is a plan, and it says what no test separates; 2 the input i
 
 
 def _add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "model", type=Path, metavar="MODEL.toml", help="what is believed of a drive"
-    )
+    parser.add_argument("model", type=Path, metavar="MODEL.toml", help="nominal model of a drive")
     parser.add_argument(
         "--limits", type=Path, required=True, metavar="LIMITS.toml", help="what can be measured"
     )
@@ -46,7 +44,7 @@ def _run(options: argparse.Namespace, say: Say) -> Outcome:
 
 PLAN = Command(
     "plan",
-    "choose the tests that tell effects apart, before anything is measured",
+    "choose tests that separate effects, before anything is measured",
     _DETAILS,
     _add_arguments,
     _run,

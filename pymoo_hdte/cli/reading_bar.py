@@ -7,11 +7,11 @@ from typing import Any, ClassVar
 from tqdm import tqdm
 
 MANY_BYTES = 20_000_000
-"""Smaller records are read within a few seconds."""
+"""Bytes below which records are read within a few seconds, without a bar."""
 
 
 class _Bar:
-    """Follows what is done; none if quiet or without a terminal.
+    """A bar of progress, hidden if quiet or without a terminal.
 
     Parameters
     ----------
@@ -35,19 +35,19 @@ class _Bar:
         self._bar.update(done - self._bar.n)
 
     def close(self) -> None:
-        """Take the bar away."""
+        """Remove the bar."""
         if self._bar is not None:
             self._bar.close()
 
 
 class ReadingBar(_Bar):
-    """Follows the bytes that are read; none for few bytes."""
+    """A bar for the bytes that are read, hidden for few bytes."""
 
     looks: ClassVar[dict[str, Any]] = {"unit": "B", "unit_scale": True}
     least: ClassVar[int] = MANY_BYTES
 
 
 class SimulationBar(_Bar):
-    """Follows the windows of held-out records that are simulated."""
+    """A bar for the windows of held-out records that are simulated."""
 
     looks: ClassVar[dict[str, Any]] = {"unit": "window", "desc": "simulating"}

@@ -8,9 +8,9 @@ from pymoo_hdte.cli.command import Command, Outcome, Say, outcome_of
 from pymoo_hdte.cli.drive_arguments import DRIVE_DETAILS, add_drive_arguments, read_drive
 
 FASTEST_INPUT = 50_000.0
-"""r/min; faster than any strain wave gear turns."""
+"""Largest speed that is accepted, r/min: no strain wave gear turns faster."""
 LARGEST_LOAD = 1e6
-"""N.m; more than any strain wave gear bears."""
+"""Largest load that is accepted, N.m: no strain wave gear bears more."""
 
 _DETAILS = f"""example:
   pymoo-hdte simulate hs_20_100 --speed 1500 --load 20 --out reports/at-1500
@@ -47,8 +47,8 @@ def _run(options: argparse.Namespace, say: Say) -> Outcome:
         if options.load is not None:
             load = real_number("--load", options.load, at_least=0.0, at_most=LARGEST_LOAD)
         say("integrating the equations of motion, and the steady state over all speeds")
-        found = simulate_condition(model.at(speed, load))
-        return outcome_of(write_simulation_report(found, notes, options.out), options.out)
+        simulation = simulate_condition(model.at(speed, load))
+        return outcome_of(write_simulation_report(simulation, notes, options.out), options.out)
 
 
 SIMULATE = Command(

@@ -21,21 +21,21 @@ FASTEST = 2.0
 """Highest speed of the map, as a multiple of the condition's."""
 SPEEDS = 80
 SETTLE = 1.5
-"""s."""
+"""Time before the record begins, s."""
 TURNS_TO_SETTLE = 0.02
-"""Least output turns before the record begins, which count at low speed."""
+"""Least number of output turns before the record begins; it decides at low speed."""
 
 Values = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
 class Simulation:
-    """What the nominal design does.
+    """The motion of the nominal design under one condition.
 
     Attributes
     ----------
     model : DriveModel
-        At the condition that is simulated.
+        The model at the simulated condition.
     run : Run
         One output turn, integrated from rest with a free input angle.
     steady : float
@@ -43,7 +43,7 @@ class Simulation:
     lines : dict of float
         Amplitude of theta_d, arcsec, by order of the input turn.
     speeds : SpeedLoadMap
-        Over `SPEEDS` speeds up to `FASTEST` times this one, at this load.
+        DTE over `SPEEDS` speeds up to `FASTEST` times this speed, at this load.
     mode : TorsionalMode
     resonances : list of (order, input speed in r/min)
     """
@@ -63,7 +63,7 @@ class Simulation:
 
     @property
     def difference(self) -> float:
-        """Share by which the integration differs from the steady state."""
+        """Difference of the integration from the steady state, relative to the latter."""
         return self.run.dte_arcsec() / self.steady - 1.0
 
 

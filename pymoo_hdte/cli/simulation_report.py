@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from pymoo_hdte._io.text_table import csv_text
+from pymoo_hdte._io.csv_table import csv_text
 from pymoo_hdte._reports.figures import AFTER, BEFORE, GREY, data_uri
 from pymoo_hdte._reports.folder import ReportFolder
 from pymoo_hdte._reports.html import change, number, page
@@ -23,126 +23,137 @@ LINES_FILE = "order_lines.csv"
 SPEEDS_FILE = "speeds.csv"
 FOLDER = ReportFolder("simulation.json", (TURN_FILE, LINES_FILE, SPEEDS_FILE))
 
-_NEAR = 0.15
-"""A resonance this close to the speed, as a share, is mentioned."""
+_RESONANCE_MARGIN = 0.15
+"""Distance of speed and resonance, relative, below which the report mentions it."""
 _APART = 0.01
 """Share by which the two solvers may differ before the report mentions it."""
 _SMALL = 1e-3
 """Lines below this share of the largest are left out of figure and table."""
 
 
-def write_simulation_report(found: Simulation, notes: Sequence[str], out: Path) -> dict[str, Any]:
+def write_simulation_report(
+    simulation: Simulation, notes: Sequence[str], out: Path
+) -> dict[str, Any]:
     """Write a report and return its document; errors as `ReportFolder.write`.
 
     ``notes`` are sentences on the drive that belong to the limits of the result.
     """
-    document = simulation_document(found, notes)
-    run = found.run
+    document = simulation_document(simulation, notes)
+    run = simulation.run
     turn = [run.time, run.input_angle, run.input_speed, run.transmission_error / ARCSEC]
     columns = ("time_s", "input_angle_rad", "input_speed_rad_s", "transmission_error_arcsec")
-    speeds = np.column_stack([found.speeds.speeds, found.speeds.dte[0]])
+    speeds = np.column_stack([simulation.speeds.speeds, simulation.speeds.dte[0]])
     others = {
         TURN_FILE: csv_text(columns, np.column_stack(turn).tolist()),
-        LINES_FILE: csv_text(("order", "amplitude_arcsec"), found.lines.items()),
+        LINES_FILE: csv_text(("order", "amplitude_arcsec"), simulation.lines.items()),
         SPEEDS_FILE: csv_text(("input_speed_r_min", "dte_arcsec"), speeds.tolist()),
     }
-    FOLDER.write(out, _page(found, document), document, others)
+    FOLDER.write(out, _page(simulation, document), document, others)
     return document
 
 
-def simulation_document(found: Simulation, notes: Sequence[str]) -> dict[str, Any]:
+def simulation_document(simulation: Simulation, notes: Sequence[str]) -> dict[str, Any]:
     """Return what ``simulation.json`` holds."""
-    return heading("simulation", sentences(found), limits(found, notes)) | {
-        "input_speed_r_min": found.speed,
-        "load_torque_Nm": found.model.sheet.load_torque,
-        "dte_arcsec": {"steady_state": found.steady, "integrated": found.run.dte_arcsec()},
-        "order_lines_arcsec": {f"{order:g}": size for order, size in found.lines.items()},
+    return heading("simulation", sentences(simulation), limits(simulation, notes)) | {
+        "input_speed_r_min": simulation.speed,
+        "load_torque_Nm": simulation.model.sheet.load_torque,
+        "dte_arcsec": {
+            "steady_state": simulation.steady,
+            "integrated": simulation.run.dte_arcsec(),
+        },
+        "order_lines_arcsec": {f"{order:g}": size for order, size in simulation.lines.items()},
         "torsional_mode": {
-            "frequency_Hz": found.mode.frequency,
-            "damping_ratio": found.mode.damping_ratio,
+            "frequency_Hz": simulation.mode.frequency,
+            "damping_ratio": simulation.mode.damping_ratio,
         },
         "resonances": [
-            {"order": order, "input_speed_r_min": speed} for order, speed in found.resonances
+            {"order": order, "input_speed_r_min": speed} for order, speed in simulation.resonances
         ],
-        "model": found.model.to_dict(),
+        "model": simulation.model.to_dict(),
     }
 
 
-def sentences(found: Simulation) -> list[str]:
+def sentences(simulation: Simulation) -> list[str]:
     """Say how large the DTE is, of what it is made, and where the drive resonates."""
-    largest = sorted(_moving(found).items(), key=lambda one: -one[1])[:3]
+    largest = sorted(_moving(simulation).items(), key=lambda line: -line[1])[:3]
     made_of = ", ".join(f"order {order:g} ({number(size, 3)} arcsec)" for order, size in largest)
-    places = ", ".join(f"order {order:g} at {speed:.0f} r/min" for order, speed in found.resonances)
-    if found.mode.resonates:
+    places = ", ".join(
+        f"order {order:g} at {speed:.0f} r/min" for order, speed in simulation.resonances
+    )
+    if simulation.mode.resonates:
         mode = (
-            f"The torsional mode at {found.mode.frequency:.0f} Hz (damping ratio "
-            f"{number(found.mode.damping_ratio, 2)}) is met by {places}."
+            f"The torsional mode at {simulation.mode.frequency:.0f} Hz (damping ratio "
+            f"{number(simulation.mode.damping_ratio, 2)}) is met by {places}."
         )
     else:
         mode = "The torsional mode is damped too much to resonate."
     return [
-        f"DTE {found.steady:.2f} arcsec peak-to-peak at {found.speed:.0f} r/min and "
-        f"{number(found.model.sheet.load_torque)} N.m.",
+        f"DTE {simulation.steady:.2f} arcsec peak-to-peak at {simulation.speed:.0f} r/min and "
+        f"{number(simulation.model.sheet.load_torque)} N.m.",
         f"Its largest lines, by order of the input turn: {made_of}.",
         mode,
     ]
 
 
-def limits(found: Simulation, notes: Sequence[str]) -> list[str]:
+def limits(simulation: Simulation, notes: Sequence[str]) -> list[str]:
     """Say what a reader should know before quoting the result; ``notes`` are of the drive."""
     said = list(notes)
-    near = [o for o, speed in found.resonances if abs(found.speed / speed - 1.0) < _NEAR]
-    if near:
-        where = "resonances of orders" if near[1:] else "resonance of order"
-        orders = " and ".join(f"{order:g}" for order in near)
+    nearby_orders = [
+        o
+        for o, speed in simulation.resonances
+        if abs(simulation.speed / speed - 1.0) < _RESONANCE_MARGIN
+    ]
+    if nearby_orders:
+        where = "resonances of orders" if nearby_orders[1:] else "resonance of order"
+        orders = " and ".join(f"{order:g}" for order in nearby_orders)
         said.append(
-            f"This speed is within {100.0 * _NEAR:g} % of the {where} {orders}: the DTE depends "
-            "strongly on damping and inertia."
+            f"This speed is within {100.0 * _RESONANCE_MARGIN:g} % of the {where} {orders}: the "
+            "DTE depends strongly on damping and inertia."
         )
-    if abs(found.difference) > _APART:
+    if abs(simulation.difference) > _APART:
         said.append(
             "The integration in time differs from the steady state by "
-            f"{change(100.0 * found.difference)}: "
+            f"{change(100.0 * simulation.difference)}: "
             "the input angle itself fluctuates, or the motion has not settled."
         )
-    if found.speeds.unstable:
+    if simulation.speeds.unstable:
         said.append(
-            f"At {found.speeds.unstable} of {found.speeds.dte.size} speeds the drive has no steady "
-            "state."
+            f"At {simulation.speeds.unstable} of {simulation.speeds.dte.size} speeds the drive "
+            "has no steady state."
         )
     return said
 
 
-def _moving(found: Simulation) -> dict[float, float]:
-    """Return the lines that count, without the mean."""
-    lines = {order: size for order, size in found.lines.items() if order}
+def _moving(simulation: Simulation) -> dict[float, float]:
+    """Return the lines that are large enough to show, without the mean."""
+    lines = {order: size for order, size in simulation.lines.items() if order}
     least = _SMALL * max(lines.values(), default=0.0)
     return {order: size for order, size in lines.items() if size >= least}
 
 
-def _page(found: Simulation, document: dict[str, Any]) -> str:
+def _page(simulation: Simulation, document: dict[str, Any]) -> str:
     return page(
         "pymoo_hdte.cli",
         "simulation.html.j2",
-        found=found,
-        model=found.model,
+        simulation=simulation,
+        model=simulation.model,
         document=document,
-        lines=_moving(found),
+        lines=_moving(simulation),
         fastest=FASTEST,
         pictures={
-            "turn": data_uri(_turn_figure(found)),
-            "lines": data_uri(_lines_figure(found)),
-            "speeds": data_uri(_speeds_figure(found)),
+            "turn": data_uri(_turn_figure(simulation)),
+            "lines": data_uri(_lines_figure(simulation)),
+            "speeds": data_uri(_speeds_figure(simulation)),
         },
     )
 
 
-def _turn_figure(found: Simulation) -> Figure:
+def _turn_figure(simulation: Simulation) -> Figure:
     """Draw the transmission error over the output turn, about its mean."""
     figure = Figure(figsize=(11.0, 3.0), layout="constrained")
     axis = figure.subplots()
-    degrees = np.degrees(found.run.input_angle) / found.run.ratio
-    error = found.run.transmission_error / ARCSEC
+    degrees = np.degrees(simulation.run.input_angle) / simulation.run.ratio
+    error = simulation.run.transmission_error / ARCSEC
     axis.plot(degrees, error - error.mean(), color=AFTER, linewidth=0.7)
     axis.set_xlim(0.0, 360.0)
     axis.set_xlabel("output angle [deg]")
@@ -150,8 +161,8 @@ def _turn_figure(found: Simulation) -> Figure:
     return figure
 
 
-def _lines_figure(found: Simulation) -> Figure:
-    lines = _moving(found)
+def _lines_figure(simulation: Simulation) -> Figure:
+    lines = _moving(simulation)
     figure = Figure(figsize=(6.4, 3.4), layout="constrained")
     axis = figure.subplots()
     axis.stem(list(lines), list(lines.values()), linefmt=GREY, markerfmt="o", basefmt=" ")
@@ -161,12 +172,14 @@ def _lines_figure(found: Simulation) -> Figure:
     return figure
 
 
-def _speeds_figure(found: Simulation) -> Figure:
+def _speeds_figure(simulation: Simulation) -> Figure:
     figure = Figure(figsize=(6.4, 3.4), layout="constrained")
     axis = figure.subplots()
-    axis.plot(found.speeds.speeds, found.speeds.dte[0], color=AFTER)
-    axis.plot(found.speed, found.steady, "x", color=BEFORE, markersize=9, mew=2.2)
-    for orders, speed in neighbouring_resonances(found.model, float(found.speeds.speeds[-1])):
+    axis.plot(simulation.speeds.speeds, simulation.speeds.dte[0], color=AFTER)
+    axis.plot(simulation.speed, simulation.steady, "x", color=BEFORE, markersize=9, mew=2.2)
+    for orders, speed in neighbouring_resonances(
+        simulation.model, float(simulation.speeds.speeds[-1])
+    ):
         axis.axvline(speed, color=GREY, linestyle="-.", linewidth=1.0)
         axis.annotate(
             f"order {orders}",
@@ -178,7 +191,7 @@ def _speeds_figure(found: Simulation) -> Figure:
             fontsize=8,
         )
     # Above the curve there is room for the words.
-    axis.set_ylim(0.0, 1.5 * float(np.nanmax([found.steady, *found.speeds.dte[0]])))
+    axis.set_ylim(0.0, 1.5 * float(np.nanmax([simulation.steady, *simulation.speeds.dte[0]])))
     axis.set_xlabel("input speed [r/min]")
     axis.set_ylabel("DTE [arcsec]")
     return figure

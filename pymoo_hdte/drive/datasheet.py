@@ -17,7 +17,7 @@ MEMBERS = ("circular_spline", "flexspline")
 Either turns against the wave generator, which is always the input."""
 
 LARGEST_TWIST = 0.1
-"""rad; more than any load twists a strain wave gear.
+"""Largest twist that is accepted, rad: no load twists a strain wave gear by more.
 
 Thirty times the wind-up of catalogued drives at their rated torque, some 1 to 3 mrad; a stiffness
 whose power of ten was overlooked, 10^4 N.m/rad, gives 10 rad and more."""
@@ -39,7 +39,7 @@ class ErrorSource:
     error_class : str
         One of `ERROR_CLASSES`.
     mean, std : float
-        Of the normal distribution over prototypes, in metres.
+        Mean and standard deviation of the normal distribution over prototypes, m.
 
     Raises
     ------
@@ -64,7 +64,7 @@ class ErrorSource:
 
 @dataclass(frozen=True)
 class Mesh:
-    """What Eq. (2) needs to turn the motion error at the mesh into an angle of the output.
+    """The constants by which Eq. (2) turns the motion error at the mesh into an output angle.
 
     Attributes
     ----------
@@ -164,7 +164,7 @@ class DataSheet:
     Attributes
     ----------
     name, source : str
-        Of the drive, and of its numbers.
+        Name of the drive, and source of its numbers.
     flexspline_teeth, circular_spline_teeth : int
         Z_f < Z_c, by an even number: the wave generator has two ends, and both must mesh alike.
     held : {"circular_spline", "flexspline"}
@@ -260,10 +260,10 @@ class DataSheet:
 
 def _check_difference(difference: int, sheet: DataSheet) -> None:
     if difference % 2:
-        near = sheet.flexspline_teeth + difference
+        teeth = sheet.flexspline_teeth + difference
         allowed = (
             f"{sheet.flexspline_teeth} (flexspline_teeth) + 2, or another even number more: teeth "
             f"engage at both ends of the wave generator, which a difference of {difference} does "
             "not let them; likely a tooth number was miscounted or computed from a rounded ratio"
         )
-        raise InvalidInput("circular_spline_teeth", near, allowed)
+        raise InvalidInput("circular_spline_teeth", teeth, allowed)

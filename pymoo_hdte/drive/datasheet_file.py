@@ -42,7 +42,7 @@ def load_datasheet(path: str | Path) -> DataSheet:
     Parameters
     ----------
     path : str or Path
-        Of a TOML file, in which every quantity has its unit.
+        A TOML file, in which every quantity has its unit.
 
     Returns
     -------
@@ -51,7 +51,7 @@ def load_datasheet(path: str | Path) -> DataSheet:
     Raises
     ------
     InvalidInput
-        With file and line, for a wrong, missing, superfluous, negative, non-finite or unit-less
+        Naming file and line, for a wrong, missing, superfluous, negative, non-finite or unit-less
         field.
     OSError
         If the file cannot be read.
@@ -135,9 +135,9 @@ def check_twist(sheet: DataSheet, field: str = "stiffness", cause: str = LOST_PO
     ----------
     sheet : DataSheet
     field : str
-        What the error names.
+        The field that the error names.
     cause : str
-        What is likely wrong, as the end of a sentence.
+        The likely mistake, as the end of a sentence.
 
     Raises
     ------

@@ -49,8 +49,8 @@ class SpeedLoadMap:
     def peaks(self, row: int) -> list[tuple[float, float]]:
         """Return speed and DTE of every peak over speed at the load of that row."""
         dte = self.dte[row]
-        places, found = scipy.signal.find_peaks(np.nan_to_num(dte), prominence=0.0)
-        standing_out = found["prominences"] >= _PROMINENCE * dte[places]
+        places, properties = scipy.signal.find_peaks(np.nan_to_num(dte), prominence=0.0)
+        standing_out = properties["prominences"] >= _PROMINENCE * dte[places]
         return [(float(self.speeds[i]), float(dte[i])) for i in places[standing_out]]
 
 
@@ -82,7 +82,7 @@ class TorsionalMode:
 def torsional_mode(model: DriveModel) -> TorsionalMode:
     """Return the torsional mode of the nominal design, its bearings left out.
 
-    With an inertia in a clutch that of its least damped vibration, with bearings.
+    With an inertia in a clutch, it is the least damped vibration, bearings included.
     """
     coefficients = model.coefficients(model.nominal[None])
     if coefficients.coupled:
@@ -122,13 +122,15 @@ def neighbouring_resonances(model: DriveModel, fastest: float) -> list[tuple[str
     Orders whose speeds lie within 5 % of the highest are listed together.
     """
     within = [(order, speed) for order, speed in critical_speeds(model) if speed <= fastest]
-    found = []
+    resonances = []
     while within:
         speed = within[0][1]
-        together = [order for order, other in within if abs(other - speed) <= _NEIGHBOURS * speed]
-        found.append((" and ".join(f"{order:g}" for order in together), speed))
+        together = [
+            order for order, neighbour in within if abs(neighbour - speed) <= _NEIGHBOURS * speed
+        ]
+        resonances.append((" and ".join(f"{order:g}" for order in together), speed))
         within = within[len(together) :]
-    return found
+    return resonances
 
 
 def speed_load_map(

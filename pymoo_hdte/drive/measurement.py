@@ -14,13 +14,13 @@ from numpy.typing import ArrayLike, NDArray
 from pymoo_hdte.checks import InvalidInput, finite_array, real_number
 
 SAMPLING_RATE = 1000.0
-"""Hz."""
+"""Frequency in Hz."""
 
 CUTOFF = 100.0
-"""Hz."""
+"""Frequency in Hz."""
 
 FILTER_ORDER = 4
-"""Of the Butterworth filter, which runs forward and backward; the paper prints no type or order."""
+"""Order of the Butterworth filter, run forward and backward; the paper prints no type or order."""
 
 
 def low_pass(

@@ -155,9 +155,9 @@ class DriveModel(ModelValues):
         ArithmeticError
             If the harmonics of a deeply varying stiffness do not die out.
         """
-        found, spectrum = found_steady_states(self.coefficients(parameters))
-        dte = np.full(len(found), np.nan)
-        dte[found] = spectrum.peak_to_peak(self.sheet.ratio) / ARCSEC
+        has_state, spectrum = found_steady_states(self.coefficients(parameters))
+        dte = np.full(len(has_state), np.nan)
+        dte[has_state] = spectrum.peak_to_peak(self.sheet.ratio) / ARCSEC
         return dte
 
     def at(self, input_speed: float, load_torque: float) -> DriveModel:
@@ -205,7 +205,7 @@ class DriveModel(ModelValues):
         Parameters
         ----------
         path : str or path-like
-            Of a file in the format of ``docs/file_format.md``.
+            A file in the format of ``docs/file_format.md``.
 
         Returns
         -------
@@ -225,9 +225,9 @@ def load_model(path: str | Path, sheet: DataSheet) -> DriveModel:
     Parameters
     ----------
     path : str or Path
-        Of a TOML file, in which every quantity has its unit.
+        A TOML file, in which every quantity has its unit.
     sheet : DataSheet
-        Of the drive that the model is of.
+        Data sheet of the drive.
 
     Returns
     -------

@@ -22,7 +22,7 @@ from pymoo_hdte.units import ARCSEC
 
 @dataclass(frozen=True)
 class ModelValues:
-    """What `DriveModel` holds; the equations of motion are not needed for it.
+    """The values of a `DriveModel`, without its equations of motion.
 
     Attributes
     ----------
@@ -58,7 +58,7 @@ class ModelValues:
             raise InvalidInput("effects", names, "each effect once, at each port and order")
 
     def to_dict(self) -> dict[str, Any]:
-        """Return what makes the model, JSON-able, as a record beside results.
+        """Return the values of the model, JSON-able, as a record beside results.
 
         Units stand in the keys; ``nominal`` is in SI.
         """

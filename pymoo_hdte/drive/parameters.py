@@ -27,7 +27,7 @@ Examples
 """
 
 LARGEST_STATIC_ERROR = 0.1
-"""rad; any larger theta_s must be an angle in other units."""
+"""Largest theta_s, rad; any larger value must be in another unit."""
 
 
 def checked(parameters: ArrayLike) -> NDArray[np.float64]:

@@ -24,7 +24,7 @@ ANGLES = ("free", "prescribed")
 
 _POINTS_PER_TURN = 120
 _CLUTCH_TIMES = 20.0
-"""Of settling, after which exp(-20) of the slip of a clutch at the start is left."""
+"""Times of settling, after which exp(-20) remains of the slip of a clutch at the start."""
 
 
 @dataclass(frozen=True)
@@ -93,7 +93,7 @@ def simulate_drive(
     Parameters
     ----------
     model : DriveModel
-        With its effects.
+        The model, with its effects.
     parameters : array_like, shape (5,)
         `PARAMETERS` in SI units.
     angle : {"free", "prescribed"}

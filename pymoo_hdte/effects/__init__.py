@@ -15,12 +15,15 @@ from pymoo_hdte.effects import (
 from pymoo_hdte.effects.effect import Effect, effect_named, known_effects, register, registered
 from pymoo_hdte.effects.guess import Guess, Sizes
 from pymoo_hdte.effects.law import Aperiodic, Periodic, PortState, Response
+from pymoo_hdte.effects.portable import Formula, Lumped
 from pymoo_hdte.effects.unknowns import unknown
 
 __all__ = [
     "Aperiodic",
     "Effect",
+    "Formula",
     "Guess",
+    "Lumped",
     "Periodic",
     "PortState",
     "Response",

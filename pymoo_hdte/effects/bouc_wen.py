@@ -14,6 +14,7 @@ from pymoo_hdte.checks import real_number
 from pymoo_hdte.effects.effect import Effect, register
 from pymoo_hdte.effects.guess import Guess
 from pymoo_hdte.effects.law import Aperiodic, PortState, Response, Values
+from pymoo_hdte.effects.portable import PRESLIDING, Formula, Lumped
 from pymoo_hdte.effects.smooth_loop import Rise, follow, rise_of, slope_of, state_at, way_to
 from pymoo_hdte.effects.unknowns import Parameter, unknown
 
@@ -68,15 +69,15 @@ class BoucWen(Aperiodic):
 
     def recall(self, path: Values) -> tuple[Values, Values]:
         """Return how the torque along paths that recur depends on the step before and its way."""
-        _, slope, kept = self._along(path, True)
-        return kept[None], self.force / self.torsion * slope[None]
+        _, slope, retained = self._along(path, True)
+        return retained[None], self.force / self.torsion * slope[None]
 
     def _along(self, path: Values, recurs: bool) -> tuple[Values, Values, Values]:
         """Return z, its slope by the way in torsions of yield, and by z a step before."""
         path = np.ascontiguousarray(path) / self.torsion
-        z, slope, kept = np.empty(path.shape), np.empty(path.shape), np.empty(path.shape)
-        follow(path, recurs, self._rise, z, slope, kept)
-        return z, slope, kept
+        z, slope, retained = np.empty(path.shape), np.empty(path.shape), np.empty(path.shape)
+        follow(path, recurs, self._rise, z, slope, retained)
+        return z, slope, retained
 
     # Kept, as integrators ask for it in every step.
     @cached_property
@@ -105,14 +106,14 @@ class BoucWen(Aperiodic):
         """Return the slope of the torque in a direction."""
         return self.force / self.torsion * self._slope(kept, direction)
 
-    def _slope(self, kept: Values, direction: float) -> float:
+    def _slope(self, states: Values, direction: float) -> float:
         return float(
-            slope_of(math.copysign(1.0, direction) * self._z(kept), self.exponent, self.share)
+            slope_of(math.copysign(1.0, direction) * self._z(states), self.exponent, self.share)
         )
 
-    def _z(self, kept: Values) -> float:
+    def _z(self, states: Values) -> float:
         # An integrator may leave the range of the state by its error.
-        return min(max(float(kept[0]) / self.torsion, -1.0), 1.0)
+        return min(max(float(states[0]) / self.torsion, -1.0), 1.0)
 
     @property
     def creep(self) -> float:
@@ -124,6 +125,18 @@ class BoucWen(Aperiodic):
         """The torsion of yield, rad."""
         return self.torsion
 
+    @property
+    def formula(self) -> Formula:
+        """Its equations, with z as a torsion."""
+        size = "min(abs(wound) / torsion, 1) ** exponent"
+        rate = f"speed * (1 - {size} * (share * sign(wound * speed) + 1 - share))"
+        return Formula("force / torsion * wound", {"wound": rate})
+
+    @property
+    def lumped(self) -> Lumped:
+        """Dry friction of the largest force."""
+        return Lumped(level=self.force, missing=PRESLIDING.format(self.torsion))
+
 
 def bouc_wen(force: Parameter, torsion: Parameter, starts: Sequence[tuple[float, ...]]) -> Guess:
     """Guess a smooth loop, in the place of springs that slip.
@@ -133,13 +146,13 @@ def bouc_wen(force: Parameter, torsion: Parameter, starts: Sequence[tuple[float,
     Parameters
     ----------
     force, torsion : Parameter
-        Of the springs, N.m and rad.
+        Force and torsion of the springs, N.m and rad.
     starts : sequence of (float, float)
         Forces and torsions from which fits of springs start, the typical torsion among them.
     """
     exponent, share = unknown("exponent", 0.6, 4.0, 1.5), unknown("share", 0.3, 1.5, 0.6)
     # In the place of springs only the first is tried.
-    typical_first = sorted(starts, key=lambda one: one[1] != torsion.start)
+    typical_first = sorted(starts, key=lambda start: start[1] != torsion.start)
     sentence = (
         "The {force} at the {port} lags behind the motion in a smooth loop, of Bouc and Wen's form "
         "or Dahl's, which forgets gradually: it creeps after each change of the load, and how much "
@@ -147,7 +160,7 @@ def bouc_wen(force: Parameter, torsion: Parameter, starts: Sequence[tuple[float,
     )
     return Guess(
         (force, torsion, exponent, share),
-        [(*one, exponent.start, share.start) for one in typical_first],
+        [(*start, exponent.start, share.start) for start in typical_first],
         _built,
         form="bouc_wen",
         sentence=sentence,

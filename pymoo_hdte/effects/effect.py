@@ -73,7 +73,7 @@ class Effect:
     Attributes
     ----------
     name : str
-        In model files and verdicts: lower case with underscores, e.g. ``"coulomb_friction"``.
+        Name in model files and verdicts: lower case with underscores, e.g. ``"coulomb_friction"``.
     law : type or None
         Dataclass of the law, whose fields are numbers in SI; None if it is no law at a port.
     ports : tuple of str
@@ -86,7 +86,7 @@ class Effect:
         Its description in a report, which may contain ``{port}``, ``{order}`` and ``{force}``
         (``"torque"`` in a drive).
     guess : callable or None
-        From `Sizes` of a port to a list of `Guess`, empty where it is impossible; None: not sought.
+        Maps `Sizes` of a port to a list of `Guess`, empty where it is impossible; None: not sought.
     sought : tuple of str or None
         Ports of a drive where it is searched for; by default all of ``ports``.
     change : type or None
@@ -177,7 +177,7 @@ class Effect:
             allowed = '("mesh",): solvers keep inner states of laws at the mesh of a drive only'
             raise InvalidInput(f"{self.name}.ports", self.ports, allowed)
         for number in self.quantities:
-            one_of(f"{self.name}.quantities", number, [one.name for one in fields(self.kind)])
+            one_of(f"{self.name}.quantities", number, [field.name for field in fields(self.kind)])
         check_sentence(f"{self.name}.sentence", self.sentence)
         if self.forms:
             allowed_at = FORMS[one_of(f"{self.name}.forms", self.forms, FORMS)]
@@ -218,14 +218,16 @@ class Effect:
 
     def guesses(self, sizes: Sizes) -> Sequence[Guess]:
         """Return the forms that it may have, for the sizes of a port; each has to give numbers."""
-        for one in (found := [] if self.guess is None else self.guess(sizes)):
-            check_response(self.name, [part for _, part in self.parts(one, one.begins[0])], sizes)
-        return found
+        for guess in (guesses := [] if self.guess is None else self.guess(sizes)):
+            check_response(
+                self.name, [part for _, part in self.parts(guess, guess.begins[0])], sizes
+            )
+        return guesses
 
     def parts(self, guess: Guess, values: Sequence[float]) -> tuple[tuple[str, Any], ...]:
         """Return laws (or other changes) for the values of a guess, each with its name."""
         if guess.build is None:
-            names = [one.name for one in guess.unknowns]
+            names = [parameter.name for parameter in guess.unknowns]
             return ((self.name, self.kind(**dict(zip(names, values, strict=True)))),)
         return tuple((self._name_of(part), part) for part in guess.build(values))
 
@@ -233,9 +235,9 @@ class Effect:
         """Return the name of a part: an effect may include the law of another."""
         if any(kind is not None and isinstance(part, kind) for kind in (self.law, self.change)):
             return self.name
-        for one in _EFFECTS.values():
-            if type(part) in (one.law, one.change):
-                return one.name
+        for effect in _EFFECTS.values():
+            if type(part) in (effect.law, effect.change):
+                return effect.name
         allowed = "laws of registered effects only"
         raise InvalidInput(f"{self.name}.guess", type(part).__name__, allowed)
 
@@ -259,18 +261,20 @@ class Effect:
         Raises
         ------
         InvalidInput
-            With the field ``name.number``: for an unknown number, or one that is missing or that
+            Naming the field ``name.number``: for an unknown number, or one that is missing or that
             the law does not take.
         """
         if self.law is None:
             raise InvalidInput(f"{self.name}.law", None, "an effect that is a law at a port")
-        for one in values:
-            one_of(f"number of {self.name}", one, tuple(self.quantities))
+        for name in values:
+            one_of(f"number of {self.name}", name, tuple(self.quantities))
         for number in self.quantities:
             if number not in values and number not in self._defaults:
                 allowed = "a finite number (it is missing)"
                 raise InvalidInput(f"{self.name}.{number}", None, allowed)
-        numbers = {one: real_number(f"{self.name}.{one}", value) for one, value in values.items()}
+        numbers = {
+            name: real_number(f"{self.name}.{name}", value) for name, value in values.items()
+        }
         try:
             return self.law(**numbers)
         except InvalidInput as error:
@@ -289,7 +293,7 @@ class Effect:
         if type(law) is not self.law:
             wanted = getattr(self.law, "__name__", "no law")
             raise InvalidInput(f"{self.name}.law", law, f"a {wanted}")
-        return {one: float(getattr(law, one)) for one in self.quantities}
+        return {name: float(getattr(law, name)) for name in self.quantities}
 
     def from_fields(self, table: Fields) -> Any:
         """Return the law, or other change of a drive, from a table of a model file.
@@ -317,7 +321,9 @@ class Effect:
 
     @property
     def _defaults(self) -> dict[str, float]:
-        return {one.name: one.default for one in fields(self.kind) if one.default is not MISSING}
+        return {
+            field.name: field.default for field in fields(self.kind) if field.default is not MISSING
+        }
 
 
 _EFFECTS: dict[str, Effect] = {}
@@ -339,11 +345,11 @@ def register(effect: Effect) -> Effect:
 
 
 @contextmanager
-def registered(*more: Effect) -> Iterator[None]:
+def registered(*effects: Effect) -> Iterator[None]:
     """Make effects known inside a block only; those of the package that it imports stay known."""
     before = dict(_EFFECTS)
     try:
-        for effect in more:
+        for effect in effects:
             register(effect)
         yield
     finally:
@@ -362,9 +368,9 @@ def effect_named(name: str) -> Effect:
     return _EFFECTS[one_of("effect.name", name, _EFFECTS)]
 
 
-def is_contained(one: str, other: str) -> bool:
+def is_contained(name: str, other_name: str) -> bool:
     """Tell whether an effect is a special case of another, both by name, registered or not."""
-    this, that = _EFFECTS.get(one), _EFFECTS.get(other)
-    return (this is not None and other in this.special_case_of) or (
-        that is not None and one in that.contains
+    this, that = _EFFECTS.get(name), _EFFECTS.get(other_name)
+    return (this is not None and other_name in this.special_case_of) or (
+        that is not None and name in that.contains
     )

@@ -10,7 +10,16 @@ import numpy as np
 from pymoo_hdte.checks import real_number
 from pymoo_hdte.effects.effect import Effect, register
 from pymoo_hdte.effects.guess import Guess, Sizes
-from pymoo_hdte.effects.law import Aperiodic, Law, Periodic, PortState, Response, Values
+from pymoo_hdte.effects.law import (
+    Aperiodic,
+    Law,
+    Periodic,
+    PortState,
+    Response,
+    Values,
+    closest_line,
+)
+from pymoo_hdte.effects.portable import Formula, Lumped
 from pymoo_hdte.effects.shear_thinning import shear_thinning
 from pymoo_hdte.effects.unknowns import Family, starts_along_each, unknown
 
@@ -20,10 +29,12 @@ SMOOTHING_SPEED = 1e-4
 """rad/s. Dry friction follows tanh(speed / this): exact to rounding wherever a drive turns, and its
 sign is undecided only below 1 % of the slowest output speed of interest (10 r/min at the input)."""
 
+SIGN = f"tanh(speed / {SMOOTHING_SPEED})"
+"""`smoothed_sign` in a formula."""
 _WHOLE = 20.0
 """Argument beyond which a hyperbolic tangent is 1 to the last digit; it takes long to compute."""
 _NEGLIGIBLE_SPEED = 1e-150
-"""rad/s. Keeps a quotient finite at rest."""
+"""Speed that keeps a quotient finite at rest, rad/s."""
 
 
 def smoothed_sign(speed: Values) -> tuple[Values, Values]:
@@ -58,6 +69,16 @@ class CoulombFriction(Aperiodic):
     def constant(self) -> float:
         """The level, N.m."""
         return abs(self.level)
+
+    @property
+    def formula(self) -> Formula:
+        """Its equations."""
+        return Formula(f"level * {SIGN}")
+
+    @property
+    def lumped(self) -> Lumped:
+        """The level."""
+        return Lumped(level=self.level)
 
 
 def _constant(sizes: Sizes) -> list[Guess]:
@@ -121,6 +142,20 @@ class StribeckFriction(CoulombFriction):
         """Level and excess, N.m."""
         return max(self.level + self.excess, 0.0)
 
+    @property
+    def formula(self) -> Formula:
+        """Its equations."""
+        return Formula(f"(level + excess * exp(-((speed / fading) ** 2))) * {SIGN}")
+
+    @property
+    def lumped(self) -> Lumped:
+        """The level."""
+        return Lumped(
+            level=self.level,
+            missing=f"the level alone; {self.excess:.4g} more at rest, falling over a speed of "
+            f"{self.fading:.4g}, is left out",
+        )
+
 
 def _falling(sizes: Sizes) -> list[Guess]:
     """Guess friction that falls with the speed, slowly or before the port moves fast."""
@@ -160,7 +195,7 @@ class NonlinearDrag(Aperiodic):
     Attributes
     ----------
     coefficient : float
-        Of the quadratic drag with the same torque at the reference speed, N.m.s2/rad2.
+        Coefficient of the quadratic drag with the same torque at the reference speed, N.m.s2/rad2.
     exponent : float
         Power of the speed with which the torque grows.
     reference : float
@@ -185,6 +220,19 @@ class NonlinearDrag(Aperiodic):
         share = state.speed / size
         slope = damping * (1.0 + (self.exponent - 1.0) * share**2)
         return Response(damping * state.speed, damping=slope)
+
+    @property
+    def formula(self) -> Formula:
+        """Its equations."""
+        return Formula(
+            f"coefficient * speed * reference * (sqrt(speed ** 2 + ({SMOOTHING_SPEED} "
+            f"if exponent < 1 else {_NEGLIGIBLE_SPEED}) ** 2) / reference) ** (exponent - 1)"
+        )
+
+    @property
+    def lumped(self) -> Lumped:
+        """A straight line up to the reference."""
+        return closest_line(self, self.reference)
 
 
 def _drag(sizes: Sizes) -> list[Guess]:
@@ -243,10 +291,15 @@ class PeriodicFriction(Periodic):
         level = self.level * self.cosine(state)
         return Response(level * sign, damping=level * slope)
 
+    @property
+    def formula(self) -> Formula:
+        """Its equations."""
+        return Formula(f"level * cos(order * angle + phase) * {SIGN}")
+
 
 def _varying(sizes: Sizes) -> list[Guess]:
     """Guess friction that varies about a mean, which is Coulomb's."""
-    found = []
+    guesses = []
     for family in sizes.varying:
         mean = unknown("mean", 0.0, sizes.largest, sizes.force, linear=True)
         unknowns = (*family.waves("level", sizes.largest, sizes.residual), mean)
@@ -256,8 +309,8 @@ def _varying(sizes: Sizes) -> list[Guess]:
             varying = [PeriodicFriction(order, phase, level) for order, level, phase in lines]
             return (*varying, CoulombFriction(values[-1]))
 
-        found.append(Guess(unknowns, starts_along_each(unknowns), build, family, family.form))
-    return found
+        guesses.append(Guess(unknowns, starts_along_each(unknowns), build, family, family.form))
+    return guesses
 
 
 register(

@@ -11,6 +11,7 @@ from pymoo_hdte.checks import real_number
 from pymoo_hdte.effects.effect import Effect, register
 from pymoo_hdte.effects.guess import Guess, Sizes
 from pymoo_hdte.effects.law import Aperiodic, Law, PortState, Response
+from pymoo_hdte.effects.portable import Formula, Lumped
 from pymoo_hdte.effects.unknowns import polar, starts_along_each, wave
 
 
@@ -37,6 +38,16 @@ class Gravity(Aperiodic):
         """Return torque and tangents."""
         angle = state.position + self.phase
         return Response(self.torque * np.cos(angle), -self.torque * np.sin(angle))
+
+    @property
+    def formula(self) -> Formula:
+        """Its equations."""
+        return Formula("torque * cos(position + phase)")
+
+    @property
+    def lumped(self) -> Lumped:
+        """The weight."""
+        return Lumped(weight=self.torque * complex(np.exp(1j * self.phase)))
 
 
 def _weight(sizes: Sizes) -> list[Guess]:

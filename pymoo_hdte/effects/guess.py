@@ -38,13 +38,13 @@ class Sizes:
         Residual of the base in the balance there. The base absorbs no part of a line, so that this
         is the size of a line, while ``force`` is larger where the base absorbs most of a force.
     largest : float
-        The largest that may be missing.
+        Largest size of a force that may be missing there.
     speed : float
         Largest speed of the port.
     travel : float
         Largest deflection from the middle of its motion.
     stiffness, damping : float
-        Of the believed spring and damper there; 0 without.
+        Stiffness and damping of the nominal spring and damper there; 0 without.
     both_ways : bool
         Whether records move it in both directions.
     loaded : bool
@@ -106,14 +106,17 @@ class Sizes:
     def family(self, order: float, most: int = 2) -> Family:
         """Return an order of the port with its harmonics: what varies with an angle is no cosine.
 
-        Those of its first ``most`` in ``shown``, and further ones up to the fifth that are seen: a
+        It has its first ``most`` in ``shown``, and further ones up to the fifth that are seen: a
         rounded trapezoid has the third and the fifth.
         """
-        first = order / self.slower
-        count = harmonics_among(self.shown, first, most)
+        relative_order = order / self.slower
+        count = harmonics_among(self.shown, relative_order, most)
         further = range(count + 1, len(HARMONIC_NAMES) + 1)
         clear = set(self.shown) & {*self.seen, *self.clear}
-        multiples = [*range(1, count + 1), *(k for k in further if is_among(clear, k * first))]
+        multiples = [
+            *range(1, count + 1),
+            *(k for k in further if is_among(clear, k * relative_order)),
+        ]
         return Family(tuple(multiple * order for multiple in multiples))
 
     @property
@@ -142,10 +145,10 @@ class Guess:
     starts : sequence of sequence of float
         Values from which fits start; by default the typical ones.
     build : callable, optional
-        From values to laws (or other changes of a drive), (n,) to a tuple. By default the one law
+        Maps values (n,) to a tuple of laws (or other changes of a drive). By default the one law
         whose numbers are the unknowns, by name.
     family : Family, optional
-        Orders at which it varies.
+        Orders at which the effect varies.
     form : str
         Word for the form, where there are several.
     sentence : str
@@ -179,7 +182,7 @@ class Guess:
     def begins(self) -> tuple[tuple[float, ...], ...]:
         """Values from which fits start."""
         given = tuple(tuple(start) for start in self.starts)
-        return given or (tuple(one.start for one in self.unknowns),)
+        return given or (tuple(parameter.start for parameter in self.unknowns),)
 
 
 def guess_of_lines(
@@ -204,7 +207,7 @@ def guess_of_lines(
     largest, typical : float
         Amplitudes.
     line : callable
-        From order, amplitude and phase to a law (or another change of a drive).
+        Maps order, amplitude and phase to a law (or another change of a drive).
     form, sentence, name : str
     quantities : mapping of str to str
         As of `Guess`.
@@ -212,7 +215,7 @@ def guess_of_lines(
     unknowns = family.waves(strength, largest, typical)
 
     def build(values: Values) -> tuple[Any, ...]:
-        return tuple(line(*one) for one in family.lines(values))
+        return tuple(line(*numbers) for numbers in family.lines(values))
 
     starts = starts_along_each(unknowns)
     return Guess(unknowns, starts, build, family, form, sentence, name=name, quantities=quantities)
@@ -226,11 +229,11 @@ def check_response(name: str, parts: Sequence[Any], sizes: Sizes) -> None:
     Parameters
     ----------
     name : str
-        Of the effect.
+        Name of the effect.
     parts : sequence
         Laws; other changes of a drive are passed over.
     sizes : Sizes
-        Of the port.
+        Sizes of the port.
     """
     at = np.linspace(-1.0, 1.0, 6)[None]
     state = PortState(
@@ -241,7 +244,7 @@ def check_response(name: str, parts: Sequence[Any], sizes: Sizes) -> None:
         load=sizes.load * at,
         temperature=300.0,
     )
-    for law in (one for one in parts if hasattr(one, "respond")):
+    for law in (part for part in parts if hasattr(part, "respond")):
         with np.errstate(all="ignore"):
             response = law.respond(state)
         for what in ("torque", "slope", "damping"):

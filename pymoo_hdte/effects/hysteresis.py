@@ -14,6 +14,7 @@ from pymoo_hdte.effects.bouc_wen import bouc_wen
 from pymoo_hdte.effects.effect import Effect, register
 from pymoo_hdte.effects.guess import Guess, Sizes
 from pymoo_hdte.effects.law import Aperiodic, PortState, Response, Values
+from pymoo_hdte.effects.portable import PRESLIDING, Formula, Lumped
 from pymoo_hdte.effects.unknowns import Parameter, unknown
 
 SPRINGS = 4
@@ -92,6 +93,27 @@ class MaxwellSlip(Aperiodic):
         """The torsion of full slip, rad."""
         return self.torsion
 
+    @property
+    def formula(self) -> Formula:
+        """Its equations, with a stretch for each spring."""
+        slips = {
+            f"stretch_{place}": f"(torsion * {place / SPRINGS} ** spread)"
+            for place in range(1, SPRINGS + 1)
+        }
+        pulls = [f"max(min({one} / {slip}, 1), -1)" for one, slip in slips.items()]
+        return Formula(
+            f"force / {SPRINGS} * ({' + '.join(pulls)})",
+            {
+                one: f"0 if abs({one}) >= {slip} and {one} * speed > 0 else speed"
+                for one, slip in slips.items()
+            },
+        )
+
+    @property
+    def lumped(self) -> Lumped:
+        """Dry friction of the force at which all springs slip."""
+        return Lumped(level=self.force, missing=PRESLIDING.format(self.torsion))
+
 
 def _slipping(sizes: Sizes) -> list[Guess]:
     """Guess springs that slip, and a smooth loop in their place.
@@ -102,7 +124,7 @@ def _slipping(sizes: Sizes) -> list[Guess]:
         return []
     unknowns, starts = springs("force", sizes)
     force, torsion, _ = unknowns
-    return [Guess(unknowns, starts), bouc_wen(force, torsion, [one[:2] for one in starts])]
+    return [Guess(unknowns, starts), bouc_wen(force, torsion, [start[:2] for start in starts])]
 
 
 def springs(strength: str, sizes: Sizes) -> tuple[tuple[Parameter, ...], list[tuple[float, ...]]]:

@@ -15,8 +15,10 @@ from typing import ClassVar, Protocol, cast
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import nnls
 
 from pymoo_hdte.checks import real_number
+from pymoo_hdte.effects.portable import Formula, Lumped
 
 Values = NDArray[np.float64]
 
@@ -34,7 +36,7 @@ class PortState:
     Attributes
     ----------
     position, speed : ndarray
-        Of the port, rad and rad/s.
+        Position and speed of the port, rad and rad/s.
     phase : callable
         Gives ``order`` times the angle on which periodic laws depend, rad: of the input at the
         input and at the mesh, of the output at the output.
@@ -49,7 +51,7 @@ class PortState:
         over the ratio, without what accelerates inertias; at a port of another mechanism, what its
         ``load`` says.
     temperature : ndarray or float
-        Of the machine in kelvin; NaN where it is not known.
+        Temperature of the machine in kelvin; NaN where it is not known.
     recurs : bool
         Whether the second half of a ``path`` is the first again, and so on for ever: a law that
         forgets gradually has then come to repeat itself, too.
@@ -89,7 +91,7 @@ class Law(Protocol):
 
     @property
     def states(self) -> int:
-        """See `Behaviour`, which gives a law this and the following."""
+        """See `Behaviour`, which provides this and the following properties."""
         ...
 
     @property
@@ -143,6 +145,16 @@ class Law(Protocol):
         ...
 
     def with_input_locked(self) -> Law | None:
+        """See `Behaviour`."""
+        ...
+
+    @property
+    def formula(self) -> Formula | None:
+        """See `Behaviour`."""
+        ...
+
+    @property
+    def lumped(self) -> Lumped | None:
         """See `Behaviour`."""
         ...
 
@@ -231,6 +243,16 @@ class Behaviour:
         """
         return None
 
+    @property
+    def formula(self) -> Formula | None:
+        """Its equations for other tools; None if they are not stated."""
+        return None
+
+    @property
+    def lumped(self) -> Lumped | None:
+        """What a rigid-body engine can hold of it; None for nothing."""
+        return None
+
 
 @dataclass(frozen=True)
 class Aperiodic(Behaviour):
@@ -238,7 +260,7 @@ class Aperiodic(Behaviour):
 
     @property
     def orders(self) -> tuple[float, ...]:
-        """No orders."""
+        """An empty tuple: the law excites no order."""
         return ()
 
     def with_input_locked(self) -> Law | None:
@@ -259,7 +281,7 @@ class Periodic(Behaviour):
 
     @property
     def orders(self) -> tuple[float, ...]:
-        """The one order."""
+        """The order at which the law varies."""
         return (self.order,)
 
     def with_input_locked(self) -> Law | None:
@@ -272,6 +294,25 @@ class Periodic(Behaviour):
     def cosine(self, state: PortState) -> Values:
         """Return the cosine at the port."""
         return np.cos(state.phase(self.order) + self.phase)
+
+
+def closest_line(law: Law, fastest: float) -> Lumped:
+    """Return damper and dry friction whose force is closest to that of a law over speed.
+
+    Parameters
+    ----------
+    law : Law
+        Of the speed alone.
+    fastest : float
+        m/s or rad/s. From rest up to it squares of differences are least; neither part is negative.
+    """
+    speed = np.linspace(0.0, 1.0, 201)[1:]
+    zero = np.zeros_like(speed)
+    state = PortState(zero, fastest * speed, periodic_phase(zero), zero)
+    force = np.broadcast_to(law.respond(state).torque, speed.shape)
+    (level, slope), _ = nnls(np.column_stack([np.ones_like(speed), speed]), force)
+    missing = f"a straight line over speed in its place, the closest one up to {fastest:.4g} SI"
+    return Lumped(damping=slope / fastest, level=level, missing=missing)
 
 
 def periodic_phase(angle: Values | float) -> Callable[[float], Values]:

@@ -9,9 +9,10 @@ import numpy as np
 
 from pymoo_hdte.checks import real_number
 from pymoo_hdte.effects.effect import Effect, register
-from pymoo_hdte.effects.friction import smoothed_sign
+from pymoo_hdte.effects.friction import SIGN, smoothed_sign
 from pymoo_hdte.effects.guess import Guess, Sizes
 from pymoo_hdte.effects.law import Aperiodic, Law, PortState, Response
+from pymoo_hdte.effects.portable import Formula, Lumped
 from pymoo_hdte.effects.unknowns import starts_along_each, unknown
 
 FURTHEST = 20.0
@@ -30,6 +31,16 @@ class ConstantForce(Aperiodic):
     def respond(self, state: PortState) -> Response:
         """Return force and tangents."""
         return Response(np.full_like(state.position, self.force))
+
+    @property
+    def formula(self) -> Formula:
+        """Its equations."""
+        return Formula("force")
+
+    @property
+    def lumped(self) -> Lumped:
+        """The force."""
+        return Lumped(force=self.force)
 
 
 def _offset(sizes: Sizes) -> list[Guess]:
@@ -75,6 +86,11 @@ class DirectionalFriction(Aperiodic):
         force = self.level + self.viscous * size
         return Response(force * moving, damping=force * slope + self.viscous * sign * moving)
 
+    @property
+    def formula(self) -> Formula:
+        """Its equations."""
+        return Formula(f"(level + viscous * abs(speed)) * {SIGN} ** 2")
+
 
 def _one_sided(sizes: Sizes) -> list[Guess]:
     """Guess friction that differs between the directions, if the port moves in both."""
@@ -115,6 +131,16 @@ class LinearSpring(Aperiodic):
         """Return force and tangents."""
         return Response(self.coefficient * state.position, self.coefficient)
 
+    @property
+    def formula(self) -> Formula:
+        """Its equations."""
+        return Formula("coefficient * position")
+
+    @property
+    def lumped(self) -> Lumped:
+        """The spring."""
+        return Lumped(stiffness=self.coefficient)
+
 
 def _spring(sizes: Sizes) -> list[Guess]:
     """Guess a spring with its rest at position zero, or elsewhere where that may be gravity.
@@ -125,14 +151,14 @@ def _spring(sizes: Sizes) -> list[Guess]:
         return []
     typical, largest = sizes.force / sizes.travel, sizes.largest
     most = largest / sizes.travel
-    found = [Guess((unknown("coefficient", 0.0, most, typical),))]
+    guesses = [Guess((unknown("coefficient", 0.0, most, typical),))]
     if sizes.turns:
         # Far from zero a weak spring makes a large force there.
         unknowns = (
             unknown("coefficient", 0.0, most, typical, linear=True),
             unknown("force", -FURTHEST * largest, FURTHEST * largest, sizes.force, linear=True),
         )
-        found.append(
+        guesses.append(
             Guess(
                 unknowns,
                 starts_along_each(unknowns),
@@ -142,7 +168,7 @@ def _spring(sizes: Sizes) -> list[Guess]:
                 instead_of=("gravity",),
             )
         )
-    return found
+    return guesses
 
 
 def _preloaded(values: Sequence[float]) -> tuple[Law, ...]:
@@ -155,7 +181,7 @@ register(
         LinearSpring,
         (),
         {"coefficient": "stiffness"},
-        "There is a spring at the {port} where none is believed.",
+        "There is a spring at the {port} that the nominal model lacks.",
         _spring,
         of_fit={"force": "torque"},
         behind_gear=True,
@@ -176,6 +202,16 @@ class LinearDamper(Aperiodic):
         """Return force and tangents."""
         return Response(self.coefficient * state.speed, damping=self.coefficient)
 
+    @property
+    def formula(self) -> Formula:
+        """Its equations."""
+        return Formula("coefficient * speed")
+
+    @property
+    def lumped(self) -> Lumped:
+        """The damper."""
+        return Lumped(damping=self.coefficient)
+
 
 def _damper(sizes: Sizes) -> list[Guess]:
     typical, most = sizes.force / sizes.speed, sizes.largest / sizes.speed
@@ -188,7 +224,7 @@ register(
         LinearDamper,
         (),
         {"coefficient": "damping"},
-        "There is a friction that grows with speed at the {port} where none is believed.",
+        "There is viscous friction at the {port} that the nominal model lacks.",
         _damper,
         slows=True,
     )

@@ -10,9 +10,10 @@ import numpy as np
 
 from pymoo_hdte.checks import InvalidInput, real_number
 from pymoo_hdte.effects.effect import Effect, register
-from pymoo_hdte.effects.friction import smoothed_sign
+from pymoo_hdte.effects.friction import SIGN, smoothed_sign
 from pymoo_hdte.effects.guess import Guess, Sizes
 from pymoo_hdte.effects.law import Aperiodic, Law, PortState, Response
+from pymoo_hdte.effects.portable import Formula
 from pymoo_hdte.effects.unknowns import unknown
 
 
@@ -73,6 +74,13 @@ class LoadFriction(Aperiodic):
         uneven = (self.share - self.driven_share) / 2.0 * load
         torque = mean * sign + uneven * sign**2
         return Response(torque, damping=(mean + 2.0 * uneven * sign) * slope)
+
+    @property
+    def formula(self) -> Formula:
+        """Its equations."""
+        size = "reference * (abs(load) / reference) ** exponent"
+        mean, uneven = "(share + driven_share) / 2", "(share - driven_share) / 2"
+        return Formula(f"{size} * ({mean} * {SIGN} + {uneven} * sign(load) * {SIGN} ** 2)")
 
 
 def _shares(sizes: Sizes) -> list[Guess]:

@@ -11,6 +11,7 @@ from pymoo_hdte.checks import real_number
 from pymoo_hdte.effects.effect import Effect, register
 from pymoo_hdte.effects.guess import Guess, Sizes, guess_of_lines
 from pymoo_hdte.effects.law import Periodic, PortState, Response
+from pymoo_hdte.effects.portable import Formula
 
 
 @dataclass(frozen=True)
@@ -32,6 +33,11 @@ class PeriodicTorque(Periodic):
     def driving(self) -> complex:
         """Its phasor, N.m: the torque is the motor's."""
         return complex(self.amplitude * np.exp(1j * self.phase))
+
+    @property
+    def formula(self) -> Formula:
+        """Its equations."""
+        return Formula("-amplitude * cos(order * angle + phase)")
 
 
 def torque_line(order: float, amplitude: float, phase: float) -> PeriodicTorque:

@@ -13,7 +13,6 @@ from pymoo_hdte.checks import InvalidInput, one_of
 
 BLANKS = ("port", "order", "force")
 """What a sentence may leave open: the port, the orders, and the word for what acts there."""
-_OUT = " lies outside its tolerance."
 _PORT = r"([A-Za-z]\w*(?:\.\w+)*(?: of \w+)?)"
 _FORM = r"(?:/([a-z\d.+]+(?: s)?))?"
 """A form of an effect; that of a new zero is its time."""
@@ -44,7 +43,7 @@ def sentence_at(sentence: str, port: str, orders: str, force: str) -> str:
     Parameters
     ----------
     sentence : str
-        Of an effect or of one of its guesses.
+        Sentence of an effect or of one of its guesses.
     port, orders : str
         Where it is, and its orders in words; empty for an effect that has none.
     force : str
@@ -60,24 +59,11 @@ def sentence_at(sentence: str, port: str, orders: str, force: str) -> str:
 
 def out_of_tolerance_sentence(parameter: str) -> str:
     """Return the sentence for a base parameter, given in words, that is out of tolerance."""
-    return f"The {parameter}{_OUT}"
-
-
-def joined_sentences(sentences: Sequence[str]) -> str:
-    """Return sentences one after the other, all that are of values out of tolerance as one.
-
-    >>> joined_sentences([out_of_tolerance_sentence(one) for one in ("stiffness", "damping")])
-    'The stiffness and damping lie outside their tolerances.'
-    """
-    values = [one.removeprefix("The ").removesuffix(_OUT) for one in sentences if _OUT in one]
-    if len(values) < 2:
-        return " ".join(sentences)
-    of_values = f"The {listed(values)} lie outside their tolerances."
-    return " ".join([*(one for one in sentences if _OUT not in one), of_values])
+    return f"The {parameter} lies outside its tolerance."
 
 
 def listed(words: Sequence[str]) -> str:
-    """Return words as a list with commas and a last and; one word as it is."""
+    """Return words as a list with commas and a final "and"; a single word as it is."""
     return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
 
 
@@ -87,7 +73,7 @@ def orders_in_words(orders: Sequence[float]) -> str:
     >>> orders_in_words([200.0]), orders_in_words([200.0, 400.0])
     ('order 200', 'orders 200 and 400')
     """
-    return f"order{'s' if len(orders) > 1 else ''} {listed([f'{one:.5g}' for one in orders])}"
+    return f"order{'s' if len(orders) > 1 else ''} {listed([f'{order:.5g}' for order in orders])}"
 
 
 def in_words(text: str) -> str:
@@ -102,4 +88,4 @@ def _words(label: re.Match[str]) -> str:
     if name == "parameter":
         return f"{port} (out of tolerance)"
     details = [port, form, None if order is None else f"order {order}"]
-    return f"{name.replace('_', ' ')} ({', '.join(one for one in details if one)})"
+    return f"{name.replace('_', ' ')} ({', '.join(detail for detail in details if detail)})"

@@ -10,7 +10,8 @@ import numpy as np
 from pymoo_hdte.checks import real_number
 from pymoo_hdte.effects.effect import Effect, register
 from pymoo_hdte.effects.guess import Guess
-from pymoo_hdte.effects.law import Aperiodic, Law, PortState, Response
+from pymoo_hdte.effects.law import Aperiodic, Law, PortState, Response, closest_line
+from pymoo_hdte.effects.portable import Formula, Lumped
 from pymoo_hdte.effects.unknowns import Parameter, unknown
 
 
@@ -51,6 +52,16 @@ class ShearThinningDrag(Aperiodic):
         slope = size / self.thinning / np.hypot(1.0, share)
         return Response(size * np.arcsinh(share), damping=slope)
 
+    @property
+    def formula(self) -> Formula:
+        """Its equations."""
+        return Formula("level * asinh(speed / thinning) / asinh(reference / thinning)")
+
+    @property
+    def lumped(self) -> Lumped:
+        """A straight line up to the reference."""
+        return closest_line(self, self.reference)
+
 
 register(
     Effect(
@@ -73,9 +84,9 @@ def shear_thinning(level: Parameter, speed: float) -> Guess:
     Parameters
     ----------
     level : Parameter
-        Of the drag at the largest speed.
+        Torque of the drag at the largest speed.
     speed : float
-        That speed, rad/s. Thinning beyond half of it would be the damping of the port, to three
+        Largest speed, rad/s. Thinning beyond half of it would be the damping of the port, to three
         tenths of the torque; within a five-hundredth, the torque at a tenth of the speed is two
         thirds of the whole, as of dry friction beside a drag.
     """

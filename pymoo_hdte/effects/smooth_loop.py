@@ -94,8 +94,8 @@ def state_at(way: float, rise: Rise) -> tuple[float, float]:
     place = int(steps)
     s = steps - place
     start, end = _STEP * slope[place], _STEP * slope[place + 1]
-    rest = z[place + 1] - z[place]
-    bend, twist = 3.0 * rest - 2.0 * start - end, start + end - 2.0 * rest
+    growth = z[place + 1] - z[place]
+    bend, twist = 3.0 * growth - 2.0 * start - end, start + end - 2.0 * growth
     value = z[place] + s * (start + s * (bend + s * twist))
     return value, (start + s * (2.0 * bend + 3.0 * s * twist)) / _STEP
 
@@ -110,8 +110,8 @@ def way_to(z: float, rise: Rise) -> float:
     way = _STEP * (place - zero)
     if place == len(values) - 1:
         return way
-    rest = values[place + 1] - values[place]
-    way += _STEP * (z - values[place]) / rest if rest > 0.0 else 0.0
+    growth = values[place + 1] - values[place]
+    way += _STEP * (z - values[place]) / growth if growth > 0.0 else 0.0
     for _ in range(3):
         there, slope = state_at(way, rise)
         way += (z - there) / slope if slope > _FLAT else 0.0
@@ -126,7 +126,7 @@ def _passed(
     rise: Rise,
     along: Values,
     slope: Values,
-    kept: Values,
+    retained: Values,
 ) -> float:
     """Follow a path from a state and a position; return how the last state depends on the first."""
     product, side, way = 1.0, 1.0, way_to(z, rise)
@@ -138,14 +138,14 @@ def _passed(
             side = -side
             way = way_to(side * z, rise)
             going = state_at(way, rise)[1]
-        first = going
+        slope_before = going
         way += abs(change)
         z, going = state_at(way, rise)
         z *= side
         along[step], slope[step] = z, going
         # States that differ by little stay apart as long as it takes to pass their difference.
-        kept[step] = going / first if first > 0.0 else 0.0
-        product *= kept[step]
+        retained[step] = going / slope_before if slope_before > 0.0 else 0.0
+        product *= retained[step]
     return product
 
 
@@ -156,18 +156,18 @@ def follow(
     rise: Rise,
     along: Values,
     slope: Values,
-    kept: Values,
+    retained: Values,
 ) -> None:
     """Follow paths (n, steps) from rest; where their second half recurs, as it does for ever."""
     rows, steps = path.shape
     half = steps // 2
     for row in range(rows):
         if not (recurs and np.ptp(path[row]) > _RESTS):
-            _passed(path[row], 0.0, 0.0, rise, along[row], slope[row], kept[row])
+            _passed(path[row], 0.0, 0.0, rise, along[row], slope[row], retained[row])
             continue
-        _settle(path[row, half:], rise, along[row, half:], slope[row, half:], kept[row, half:])
-        for one in (along, slope, kept):
-            one[row, :half] = one[row, half:]
+        _settle(path[row, half:], rise, along[row, half:], slope[row, half:], retained[row, half:])
+        for column in (along, slope, retained):
+            column[row, :half] = column[row, half:]
 
 
 @compiled
@@ -176,7 +176,7 @@ def _settle(
     rise: Rise,
     along: Values,
     slope: Values,
-    kept: Values,
+    retained: Values,
 ) -> None:
     """Follow a path from the state to which it returns.
 
@@ -186,7 +186,7 @@ def _settle(
     """
     z, low, high = 0.0, -1.0, 1.0
     for _ in range(_PASSAGES):
-        product = _passed(path, z, path[-1], rise, along, slope, kept)
+        product = _passed(path, z, path[-1], rise, along, slope, retained)
         change = along[-1] - z
         if abs(change) <= max(_SETTLED * (1.0 - product), _ROUNDING):
             break

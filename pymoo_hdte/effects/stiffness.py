@@ -13,6 +13,7 @@ from pymoo_hdte.checks import real_number
 from pymoo_hdte.effects.effect import Effect, register
 from pymoo_hdte.effects.guess import Guess, Sizes
 from pymoo_hdte.effects.law import Aperiodic, Law, Periodic, PortState, Response, Values
+from pymoo_hdte.effects.portable import Formula
 from pymoo_hdte.effects.unknowns import Family, Parameter, polar, unknown, wave
 
 
@@ -49,6 +50,13 @@ class HardeningStiffness(Aperiodic):
             slope = slope + added * (1.0 - share)
         return Response(torque, slope)
 
+    @property
+    def formula(self) -> Formula:
+        """Its equations."""
+        return Formula(
+            f"coefficient * position ** 3 + stiffening * stiffness * (position - {_WOUND})"
+        )
+
 
 def _sharpness() -> Parameter:
     """Guess the corner of a curve: from no corner to one that measured points cannot resolve.
@@ -73,7 +81,7 @@ def _hardening(sizes: Sizes) -> list[Guess]:
     if not sizes.loaded:
         # Of a motion's misfit the root mean square says little about the force at peak travel.
         most = max(most, _MOST_AT_PEAK * sizes.stiffness / travel**2)
-    found = [Guess((unknown("coefficient", 0.0, most, typical),))]
+    guesses = [Guess((unknown("coefficient", 0.0, most, typical),))]
     if sizes.loaded:
         corner = (
             unknown("stiffening", 0.0, 0.9, 0.2),
@@ -82,8 +90,8 @@ def _hardening(sizes: Sizes) -> list[Guess]:
         )
         starts = [(0.2, share * travel, 3.0) for share in (0.25, 0.5)]
         sentence = "The {port} grows stiffer beyond a {force}."
-        found.append(Guess(corner, starts, form="corner", sentence=sentence))
-    return found
+        guesses.append(Guess(corner, starts, form="corner", sentence=sentence))
+    return guesses
 
 
 register(
@@ -124,6 +132,11 @@ class SoftWindup(Aperiodic):
         wound, slope = _wound(state.position, self.torsion, self.sharpness)
         return Response(-lost * wound, -lost * slope)
 
+    @property
+    def formula(self) -> Formula:
+        """Its equations."""
+        return Formula(f"-softening * stiffness * {_WOUND}")
+
 
 def _soft(sizes: Sizes) -> list[Guess]:
     if sizes.stiffness == 0.0:
@@ -149,6 +162,10 @@ register(
         with_load=True,
     )
 )
+
+
+_WOUND = "position / (1 + abs(position / torsion) ** sharpness) ** (1 / sharpness)"
+"""`_wound` in a formula."""
 
 
 def _wound(position: Values, torsion: float, sharpness: float) -> tuple[Values, Values]:
@@ -191,6 +208,17 @@ def _dead_zone(state: PortState, half_width: Values | float) -> Response:
     return Response(-state.stiffness * lost, -state.stiffness * slope)
 
 
+def _lost_in(half_width: str) -> Formula:
+    """Return `_dead_zone` as a formula, of a half-width that is one itself."""
+    rounding = f"({ROUNDING} * max({half_width}, 1e-12))"
+    # log(1 + exp(x)), which does not overflow this way.
+    left, right = (
+        f"max({way}, 0) + log(1 + exp(-abs({way})))"
+        for way in (f"(position {sign} {half_width}) / {rounding}" for sign in "+-")
+    )
+    return Formula(f"-stiffness * ({rounding} * ({left} - ({right})) - {half_width})")
+
+
 @dataclass(frozen=True)
 class DeadZone(Aperiodic):
     """T = K (dz(d) - d): no spring torque within +-half_width (rad) of zero torsion."""
@@ -204,6 +232,11 @@ class DeadZone(Aperiodic):
     def respond(self, state: PortState) -> Response:
         """Return torque and tangents."""
         return _dead_zone(state, self.half_width)
+
+    @property
+    def formula(self) -> Formula:
+        """Its equations."""
+        return _lost_in("half_width")
 
 
 def _play(sizes: Sizes) -> list[Guess]:
@@ -268,6 +301,11 @@ class PeriodicClearance(Periodic):
         width = self.half_width + self.variation * self.cosine(state)
         return _dead_zone(state, np.maximum(width, 0.0))
 
+    @property
+    def formula(self) -> Formula:
+        """Its equations."""
+        return _lost_in("max(half_width + variation * cos(order * angle + phase), 0)")
+
 
 def _uneven(sizes: Sizes) -> list[Guess]:
     """Guess a play that varies with the shaft, by half of its mean and more.
@@ -277,7 +315,7 @@ def _uneven(sizes: Sizes) -> list[Guess]:
     """
     if sizes.stiffness == 0.0 or sizes.between:
         return []
-    travel, found = sizes.travel, []
+    travel, guesses = sizes.travel, []
     size, widest = 0.02 * travel, 0.5 * travel
     for order in sizes.expected:
 
@@ -291,9 +329,9 @@ def _uneven(sizes: Sizes) -> list[Guess]:
             unknown("locked", 0.0, 2.0 * widest, size, linear=True),
         )
         shapes = ((1, 0, 1, 1), (0, 1, 1, 1), (0, 0, 1, 1), (0, 0, 1, 2))
-        starts = [[size * one for one in shape] for shape in shapes]
-        found.append(Guess(unknowns, starts, build, Family((order,))))
-    return found
+        starts = [[size * factor for factor in shape] for shape in shapes]
+        guesses.append(Guess(unknowns, starts, build, Family((order,))))
+    return guesses
 
 
 register(

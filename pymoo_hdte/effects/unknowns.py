@@ -63,8 +63,8 @@ class Parameter:
     @property
     def line(self) -> str:
         """Name of the line that it is a part of; empty for other unknowns."""
-        found = self.name.removesuffix(_COSINE).removesuffix(_SINE)
-        return "" if found == self.name else found
+        line_name = self.name.removesuffix(_COSINE).removesuffix(_SINE)
+        return "" if line_name == self.name else line_name
 
     @property
     def begins_line(self) -> bool:
@@ -97,18 +97,18 @@ def wave(
     Parameters
     ----------
     name : str
-        Of the amplitude.
+        Name of the amplitude.
     largest, typical : float
         Amplitudes.
     harmonics : sequence of int
         Multiples of its order from 1, the line alone, to 5.
     """
-    found = []
+    parameters = []
     for multiple in harmonics:
         size = typical if multiple == 1 else _HARMONIC_SHARE * typical
         start = typical if multiple == 1 else 0.0
-        found += _parts(f"{HARMONIC_NAMES[multiple - 1]}{name}", start, largest, size)
-    return tuple(found)
+        parameters += _parts(f"{HARMONIC_NAMES[multiple - 1]}{name}", start, largest, size)
+    return tuple(parameters)
 
 
 def _parts(name: str, start: float, largest: float, size: float) -> list[Parameter]:
@@ -125,7 +125,7 @@ def number_of(name: str) -> str:
     Parameters
     ----------
     name : str
-        Of a line or of another unknown.
+        Name of a line or of another unknown.
 
     Examples
     --------
@@ -136,7 +136,7 @@ def number_of(name: str) -> str:
 
 
 def starts_along_each(parameters: Sequence[Parameter]) -> tuple[tuple[float, ...], ...]:
-    """Return one start along each unknown, which are those of a `wave` or others that add up."""
+    """Return one start along each unknown of a `wave`, or of other unknowns that add up."""
     sizes = np.diag([parameter.scale for parameter in parameters])
     return tuple(tuple(row) for row in sizes.tolist())
 
@@ -204,8 +204,8 @@ def harmonics_among(orders: Sequence[float], order: float, most: int) -> int:
 
 
 def is_among(orders: Iterable[float], order: float) -> bool:
-    """Tell whether ``orders`` hold one, to within rounding."""
-    return any(abs(order - one) < 1e-6 for one in orders)
+    """Tell whether an order is among ``orders``, to within rounding."""
+    return any(abs(order - known) < 1e-6 for known in orders)
 
 
 def line_with_variance(

@@ -119,8 +119,8 @@ class ErrorStatistics:
         if self.independent and len(self.symbols) > 1:
             limit = detectable_correlation(len(self.values), len(self.symbols))
             sentences.append(
-                f"No correlation is significant, but {len(self.values)} prototypes show none "
-                f"below {limit:.2f}: independence is an assumption."
+                f"No correlation is significant, but {len(self.values)} prototypes cannot show one "
+                f"below {limit:.2f}: independence remains an assumption."
             )
         return tuple(sentences)
 

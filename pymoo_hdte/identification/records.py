@@ -25,8 +25,8 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from pymoo_hdte._io.csv_table import LARGEST, read_text_table
 from pymoo_hdte._io.text_columns import TextTable
-from pymoo_hdte._io.text_table import LARGEST, read_text_table
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.identification.damping import NoLoadRun
 from pymoo_hdte.identification.prototypes import RunKey

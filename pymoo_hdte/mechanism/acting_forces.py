@@ -20,7 +20,7 @@ Values = NDArray[np.float64]
 
 _TURN = 1e-7
 _SOON = 1e-6
-"""s. Step of a difference quotient by time."""
+"""Step of a difference quotient by time, s."""
 
 
 class PortForce:
@@ -46,12 +46,15 @@ class PortForce:
         self.spring = (port.stiffness.value, port.damping.value)
         self.slopes = np.outer(self.spring, self.row)
         self.linear = not (laws or port.error)
-        self.lines = [(mechanism.coordinates.index(one.coordinate), one) for one in port.error]
+        self.lines = [
+            (mechanism.coordinates.index(error_line.coordinate), error_line)
+            for error_line in port.error
+        ]
         self.turning = [line.order * np.eye(len(self.row))[place] for place, line in self.lines]
         self.turning += [order * self.row for law in laws for order in law.orders]
         self.laws = [law for law in laws if not law.states]
         self.memories = [cast(Memory, law) for law in laws if law.states]
-        self.kept = [np.zeros(law.states) for law in self.memories]
+        self.memory_states = [np.zeros(law.states) for law in self.memories]
         # Inner states depend on the way between reversals only.
         way = self.motion(passed)[0]
         turns = np.flatnonzero(np.diff(np.sign(np.diff(way)))) + 1
@@ -60,9 +63,9 @@ class PortForce:
             self._pass(d)
 
     def motion(self, states: Values) -> tuple[Any, Any, list[tuple[int, Any, Any]]]:
-        """Return d, d', and by error line its coordinate and the slopes of d and d' over it.
+        """Return d, d' and, for each error line, its coordinate and the slopes of d and d' over it.
 
-        Of states of shape (..., 2, coordinates).
+        States have shape (..., 2, coordinates).
         """
         d, rate = (states @ self.row).T
         bends = []
@@ -85,19 +88,19 @@ class PortForce:
             load, growth = self._load_at(time)
             here = replace(here, load=load)
         for law in self.laws:
-            found = law.respond(here)
+            response = law.respond(here)
             if law.loaded and self.load is not None:
                 later = law.respond(replace(here, load=load + _SOON * growth)).torque
-                grows += np.asarray(later - found.torque).item() / _SOON
-            force += np.asarray(found.torque).item()
-            stiffness += np.asarray(found.slope).item()
-            damping += np.asarray(found.damping).item()
+                grows += np.asarray(later - response.torque).item() / _SOON
+            force += np.asarray(response.torque).item()
+            stiffness += np.asarray(response.slope).item()
+            damping += np.asarray(response.damping).item()
             if law.orders:
                 # A law's slope is at constant phase, which varies with the position here.
                 turned = law.respond(replace(here, phase=periodic_phase(d + _TURN)))
-                stiffness += np.asarray(turned.torque - found.torque).item() / _TURN
-        for law, kept in zip(self.memories, self.kept, strict=True):
-            moved = kept + (d - self.since)
+                stiffness += np.asarray(turned.torque - response.torque).item() / _TURN
+        for law, states in zip(self.memories, self.memory_states, strict=True):
+            moved = states + (d - self.since)
             force += law.torque(moved)
             stiffness += law.tangent(moved, math.copysign(1.0, rate))
         slopes[0], slopes[1] = stiffness * self.row, damping * self.row
@@ -108,7 +111,7 @@ class PortForce:
     def _load_at(self, time: float) -> tuple[Values, Values]:
         """Return the load that the port passes on, a straight line between samples, and its slope.
 
-        Shape (1,) each.
+        Each has shape (1,).
         """
         assert self.load is not None
         place = min(max(int(np.searchsorted(self.time, time, "right")), 1), len(self.time) - 1)
@@ -119,19 +122,21 @@ class PortForce:
 
     def turns(self, before: Values, after: Values, step: float, rtol: float) -> float:
         """Return the share of a step after which laws with memory reverse, 1 for none."""
-        first, last = self.motion(before)[1], self.motion(after)[1]
-        missed = min(abs(first), abs(last)) * step
-        if first * last >= 0.0 or missed <= rtol * min(law.shortest for law in self.memories):
+        rate_before, rate_after = self.motion(before)[1], self.motion(after)[1]
+        missed = min(abs(rate_before), abs(rate_after)) * step
+        if rate_before * rate_after >= 0.0 or missed <= rtol * min(
+            law.shortest for law in self.memories
+        ):
             return 1.0
-        return float(min(max(first / (first - last), 0.01), 0.99))
+        return float(min(max(rate_before / (rate_before - rate_after), 0.01), 0.99))
 
     def settle(self, state: Values) -> None:
-        """Keep the inner states of laws, which up to a reversal depend on the way only."""
+        """Store the inner states of laws; up to a reversal they depend on the way only."""
         self._pass(self.motion(state)[0])
 
     def _pass(self, d: Values) -> None:
-        for law, kept in zip(self.memories, self.kept, strict=True):
-            kept[:] = law.moved(kept, d - self.since)
+        for law, states in zip(self.memories, self.memory_states, strict=True):
+            states[:] = law.moved(states, d - self.since)
         self.since = d
 
     def along(self, path: Values) -> Values:
@@ -158,7 +163,7 @@ class Command:
         self.rates = np.diff(self.reference) / np.diff(self.time)
         gains = (-loop.position_gain, -loop.speed_gain)
         self.slopes = np.outer(gains, coordinate_row(mechanism, {loop.coordinate: 1.0}))
-        driven = next(one for one in mechanism.inputs if one.name == loop.input)
+        driven = next(driver for driver in mechanism.inputs if driver.name == loop.input)
         self.column = driven.gain.value * coordinate_row(mechanism, driven.acts)
 
     def at(self, state: Values, time: float, slopes: Values) -> tuple[float, float]:
@@ -179,5 +184,5 @@ class Command:
 
 
 def coordinate_row(mechanism: Mechanism, shares: Mapping[str, float]) -> Values:
-    """Return shares of coordinates as a row of all, shape (coordinates,)."""
+    """Return shares of coordinates as a row over all coordinates, shape (coordinates,)."""
     return np.array([float(shares.get(name, 0.0)) for name in mechanism.coordinates])

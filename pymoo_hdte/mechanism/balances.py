@@ -33,7 +33,7 @@ from pymoo_hdte.mechanism.working_rate import frequencies, highest_known, workin
 
 Values = NDArray[np.float64]
 
-_KEPT = 64
+_CACHED = 64
 
 
 def balance_names(mechanism: Mechanism) -> tuple[str, ...]:
@@ -63,19 +63,19 @@ class ForceBalance:
         Hz, up to which the motion is known. Force sensors are compared with the motion up to ten
         samples in a period.
     known : sequence of LawAt
-        Dry friction that is known leaves rests out: see `moving_rows`.
+        Known laws; with dry friction among them rests are left out, see `moving_rows`.
 
     Attributes
     ----------
     frequency : ndarray, shape (n_bins,)
-        Of the coefficients, Hz.
+        Frequencies of the coefficients, Hz.
     kept : bool ndarray, shape (n_balances, n_bins)
         Whether a coefficient is within the frequencies up to which a balance is known.
     terms : ndarray, shape (n_balances, n_quantities, n_bins)
         Coefficients of the contribution of each of `quantity_names` to each of `balance_names` per
         unit.
     constant : ndarray, shape (n_balances, n_bins)
-        Of the readings of force sensors.
+        Coefficients of the readings of force sensors.
     noise : ndarray, shape (n_balances, n_bins)
         Standard deviation that the sensors' noise gives them, for the believed quantities.
     ports : dict of str to PortMotion
@@ -83,7 +83,7 @@ class ForceBalance:
     moving : MovingRows
         Rows of the working rate that are not left out.
     motions : dict of str to Motion
-        Of the coordinates and of followed angles, at the rate of the record.
+        Motions of the coordinates and of followed angles, at the rate of the record.
     cutoff : float
 
     Raises
@@ -109,13 +109,13 @@ class ForceBalance:
             name: self.motions[name].acceleration[self._rows] for name in mechanism.coordinates
         }
         signals = {
-            one.name: smooth(self.record.channel(one.name), record.step, highest)
-            for one in mechanism.inputs
+            actuation.name: smooth(self.record.channel(actuation.name), record.step, highest)
+            for actuation in mechanism.inputs
         }
-        self._inputs = {name: one[self._rows] for name, one in signals.items()}
+        self._inputs = {name: signal[self._rows] for name, signal in signals.items()}
         self.ports = self._port_motions(
-            {name: one.position[self._rows] for name, one in self.motions.items()},
-            {name: one.speed[self._rows] for name, one in self.motions.items()},
+            {name: motion.position[self._rows] for name, motion in self.motions.items()},
+            {name: motion.speed[self._rows] for name, motion in self.motions.items()},
             self._inputs,
         )
         step = record.step * stride
@@ -149,20 +149,20 @@ class ForceBalance:
         ----------
         effects : sequence of LawAt
         stiffness : mapping of str to float, optional
-            Of ports, N/m or N.m/rad, for play and curved springs; by default the believed one.
+            Stiffness of ports, N/m or N.m/rad, for play and curved springs; by default the nominal.
         zeros : mapping of str to float, optional
-            Of ports with a followed angle, N or N.m; by default 0.
+            Zeros of ports with a followed angle, N or N.m; by default 0.
         """
         names = balance_names(self.mechanism)
-        found = np.zeros((len(names), self._bins))
+        coefficients = np.zeros((len(names), self._bins))
         for effect in effects:
             port = self.mechanism.port(effect.port)
             here = (stiffness or {}).get(port.name, port.stiffness.value)
             zero = (zeros or {}).get(port.name, 0.0) if port.followed else 0.0
             force = self._law_coefficients(effect, here, zero / here if zero else 0.0)
             for name, share in self._rows_of(port).items():
-                found[names.index(name)] += share * force
-        return found
+                coefficients[names.index(name)] += share * force
+        return coefficients
 
     def _law_coefficients(self, effect: LawAt, stiffness: float, shift: float) -> Values:
         """Return the coefficients of the force of one effect, (n_bins,), its port being shifted.
@@ -171,7 +171,7 @@ class ForceBalance:
         """
         key = effect, stiffness, shift
         if key not in self._known:
-            while len(self._known) >= _KEPT:
+            while len(self._known) >= _CACHED:
                 self._known.pop(next(iter(self._known)))
             motion = self._fine[effect.port]
             motion = replace(motion, position=motion.position + shift) if shift else motion
@@ -181,13 +181,13 @@ class ForceBalance:
         return self._known[key]
 
     def in_time(self, coefficients: Values) -> Values:
-        """Return the signal, (n,), at the working rate of coefficients (n_bins,); 0 if left out."""
+        """Return the signal (n,) of coefficients (n_bins,); it is 0 in rows that are left out."""
         missing = self.moving.count - self._bins
         return self.moving.put(dct(np.pad(coefficients, (0, missing)), type=3, norm="ortho"))
 
     @property
     def left_out(self) -> int:
-        """Number of rows of the record that are left out: see `moving_rows`."""
+        """Number of rows of the record that are left out; see `moving_rows`."""
         return round(self.moving.left_out * len(self.record.time))
 
     @property
@@ -198,11 +198,11 @@ class ForceBalance:
     def _port_motions(
         self, position: dict[str, Values], speed: dict[str, Values], inputs: dict[str, Values]
     ) -> dict[str, PortMotion]:
-        found = {}
+        motions = {}
         for port in self.mechanism.ports:
             load = load_at_port(port, self.mechanism.inputs, inputs)
-            found[port.name] = motion_at_port(port, position, speed, load)
-        return found
+            motions[port.name] = motion_at_port(port, position, speed, load)
+        return motions
 
     def _between(self, stride: int, signals: dict[str, Values]) -> dict[str, PortMotion]:
         """Return the motion of ports at ``_finer`` moments around each of the working rate."""
@@ -216,8 +216,8 @@ class ForceBalance:
 
         loads = {name for port in self.mechanism.ports for name in port.load}
         return self._port_motions(
-            {name: at_moments(one.position) for name, one in self.motions.items()},
-            {name: at_moments(one.speed) for name, one in self.motions.items()},
+            {name: at_moments(motion.position) for name, motion in self.motions.items()},
+            {name: at_moments(motion.speed) for name, motion in self.motions.items()},
             {name: at_moments(signals[name]) for name in loads},
         )
 
@@ -230,12 +230,12 @@ class ForceBalance:
 
     def _terms(self) -> Values:
         names, quantities = balance_names(self.mechanism), quantity_names(self.mechanism)
-        found = np.zeros((len(names), len(quantities), self._bins))
+        terms = np.zeros((len(names), len(quantities), self._bins))
 
         def add(quantity: str, shares: dict[str, float], signal: Values) -> None:
             if quantity in quantities:
                 for name, share in shares.items():
-                    row = found[names.index(name), quantities.index(quantity)]
+                    row = terms[names.index(name), quantities.index(quantity)]
                     row += share * self._transform(signal)
 
         for name, acceleration in self._acceleration.items():
@@ -246,9 +246,9 @@ class ForceBalance:
             add(f"stiffness of {port.name}", shares, motion.position)
             add(f"damping of {port.name}", shares, motion.speed)
             add(f"zero of {port.name}", shares, np.ones_like(motion.position))
-        for one in self.mechanism.inputs:
-            add(f"gain of {one.name}", dict(one.acts), self._inputs[one.name])
-        return found
+        for actuation in self.mechanism.inputs:
+            add(f"gain of {actuation.name}", dict(actuation.acts), self._inputs[actuation.name])
+        return terms
 
     def _noise(self, stride: int) -> Values:
         """Return the sensors' noise in the balances, by the believed mechanism.
@@ -264,9 +264,9 @@ class ForceBalance:
         for port in mechanism.ports:
             if port.read:
                 power[names.index(port.name)] += self.record.noise_of(port.name, jumps=True) ** 2
-        for one in mechanism.inputs:
-            spread = one.gain.value * self.record.noise_of(one.name, jumps=True)
-            for name, share in one.acts.items():
+        for actuation in mechanism.inputs:
+            spread = actuation.gain.value * self.record.noise_of(actuation.name, jumps=True)
+            for name, share in actuation.acts.items():
                 power[names.index(name)] += (share * spread) ** 2
         for port in mechanism.ports:
             spread = port.stiffness.value * torsion_noise(port, record) if port.followed else 0.0
@@ -287,8 +287,8 @@ class ForceBalance:
         """Return believed inertia, damping and stiffness, (n_balances, n_coordinates)."""
         mechanism, names = self.mechanism, balance_names(self.mechanism)
         inertia, damping, stiffness = np.zeros((3, len(names), len(mechanism.coordinates)))
-        for place, one in enumerate(mechanism.inertias.values()):
-            inertia[place, place] = one.value
+        for place, believed in enumerate(mechanism.inertias.values()):
+            inertia[place, place] = believed.value
         for port in mechanism.ports:
             for row, share in self._rows_of(port).items():
                 for name, part in port.motion.items():

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from pymoo_hdte.checks import InvalidInput, real_number
 
 LARGEST_FACTOR = 1e6
-"""Of a believed value: nobody is further off who knows its unit."""
+"""Largest factor of a nominal value: nobody who knows its unit is further off."""
 SMALLEST_SHARE = 1.0 / LARGEST_FACTOR
-"""Of a believed value, the least in a fit: a mass of zero cannot be simulated, and a value of zero
-has no tolerance to be believed within."""
+"""Least fitted value as a share of the nominal one: a mass of zero cannot be simulated, and a
+value of zero has no tolerance."""
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ class BelievedValue:
 
     @property
     def known(self) -> bool:
-        """Whether it is known exactly."""
+        """Whether the value is known exactly."""
         return self.tolerance == 0.0 and self.factor == 1.0
 
     @property

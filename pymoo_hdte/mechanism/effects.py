@@ -15,11 +15,15 @@ from pymoo_hdte.mechanism.parts import LawAt
 def law_effects() -> list[Effect]:
     """Return the effects that are laws, at ports or of readings.
 
-    None of them of temperature, and none whose contacts bend in torsion sweeps of a drive only:
-    hysteresis says the same at any port.
+    Laws of temperature are left out, and those whose contacts bend in torsion sweeps of a drive
+    only: hysteresis says the same at any port.
     """
-    laws = [one for one in known_effects() if one.law is not None]
-    return [one for one in laws if not (getattr(one.law, "warmed", False) or _bends(one.law))]
+    laws = [effect for effect in known_effects() if effect.law is not None]
+    return [
+        effect
+        for effect in laws
+        if not (getattr(effect.law, "warmed", False) or _bends(effect.law))
+    ]
 
 
 def table_of(effect: LawAt) -> dict[str, Any]:

@@ -33,18 +33,18 @@ class ExponentialIntegrator:
         self, inertias: Values, forces: Sequence[PortForce | Command], rows: Values, rtol: float
     ) -> None:
         n = len(inertias)
-        self.curved = [one for one in forces if not one.linear]
-        self.memories = [cast(PortForce, one) for one in self.curved if one.memories]
+        self.curved = [force for force in forces if not force.linear]
+        self.memories = [cast(PortForce, force) for force in self.curved if force.memories]
         linear, whole = np.zeros((2, n, n)), np.zeros((2, n, n))
-        for one in forces:
-            slopes = one.slopes[:, None] * (one.column / inertias)[:, None]
+        for force in forces:
+            slopes = force.slopes[:, None] * (force.column / inertias)[:, None]
             whole += slopes
-            linear += one.linear * slopes
-        columns = np.reshape([one.column / inertias for one in self.curved], (-1, n)).T
+            linear += force.linear * slopes
+        columns = np.reshape([force.column / inertias for force in self.curved], (-1, n)).T
         self.plant = linear, np.ascontiguousarray(columns), np.vstack([np.eye(n), rows])
         companion = np.vstack([np.eye(n, 2 * n, n), np.hstack([whole[0], whole[1]])])
         self.swing = float(np.max(np.abs(np.linalg.eigvals(companion).imag), initial=1e-9))
-        self.turning = [row for one in self.curved for row in one.turning]
+        self.turning = [row for force in self.curved for row in force.turning]
         self.rtol, self.trial = rtol, math.inf
 
     def follow(self, time: Values, pushes: Values, begin: Values, bound: float) -> Values:
@@ -62,12 +62,12 @@ class ExponentialIntegrator:
         samples = len(time) + self.swing * (time[-1] - time[0])
         self.steps_left = int(finer * (_STEPS_ANYWAY + _STEPS_PER_SAMPLE * samples))
         for index, interval in enumerate(np.diff(time).tolist()):
-            drift, left = (pushes[index + 1] - pushes[index]) / interval, interval
-            while left > 0.0:
-                passed = interval - left
+            drift, remaining = (pushes[index + 1] - pushes[index]) / interval, interval
+            while remaining > 0.0:
+                passed = interval - remaining
                 moment, push = float(time[index]) + passed, pushes[index] + passed * drift
-                state, step = self.advance(state, moment, left, push, drift)
-                left -= step
+                state, step = self.advance(state, moment, remaining, push, drift)
+                remaining -= step
                 if not (np.abs(state[0]) < bound).all():
                     raise ArithmeticError(
                         f"at t = {moment:g} s the positions {state[0]} have left +-{bound:g}"
@@ -76,17 +76,17 @@ class ExponentialIntegrator:
         return path
 
     def advance(
-        self, state: Values, time: float, left: float, push: Values, drift: Values
+        self, state: Values, time: float, remaining: float, push: Values, drift: Values
     ) -> tuple[Values, float]:
         """Return the state after one accepted step, which ends at the next sample or before."""
         tangent = self.tangent(state, time)
-        longest, shortest = min(left, self.longest(state)), _SHORTEST * left
+        longest, shortest = min(remaining, self.longest(state)), _SHORTEST * remaining
         while True:
             self.steps_left -= 1
             if self.steps_left < 0:
                 raise ArithmeticError(f"too many steps by t = {time:g} s: a law jumps or is stiff")
             step = min(self.trial, longest)
-            step = left if step > 0.999 * left else step
+            step = remaining if step > 0.999 * remaining else step
             moves, exponential = _predict(step, state, push, drift, self.plant, tangent)
             missed = []
             # Checked at the end alone, a motion that reverses within the step would look like rest.
@@ -94,11 +94,11 @@ class ExponentialIntegrator:
                 there = self.tangent(state + move, time + share * step)[0]
                 missed.append(_correct(step, share, move, exponential, there, self.plant, tangent))
             after = state + moves[1] + missed[1]
-            found = [
-                _judge(after, one, self.origin, self.plant[2], self.reach, self.rtol)
-                for one in missed
+            judgements = [
+                _judge(after, error, self.origin, self.plant[2], self.reach, self.rtol)
+                for error in missed
             ]
-            reach, size = found[1][0], max(found[0][1], found[1][1])
+            reach, size = judgements[1][0], max(judgements[0][1], judgements[1][1])
             change = max(0.1, 0.9 * max(size, 6e-3) ** (-1.0 / 3.0))
             share = self.turn(state, after, step) if size <= 1.0 else change
             if share >= 1.0 or step <= shortest:
@@ -106,16 +106,16 @@ class ExponentialIntegrator:
             self.trial = share * step
         self.trial = max(step * change, self.trial if step < self.trial else 0.0)
         self.reach = reach
-        for one in self.memories:
-            one.settle(after)
+        for force in self.memories:
+            force.settle(after)
         return after, step
 
     def tangent(self, state: Values, time: float) -> Triple:
         """Return the nonlinear parts: forces (r,), slopes by state (r, 2, coordinates), by time."""
         count = len(self.curved)
         forces, slopes, rates = np.empty(count), np.empty((count, *state.shape)), np.empty(count)
-        for place, one in enumerate(self.curved):
-            forces[place], rates[place] = one.at(state, time, slopes[place])
+        for place, force in enumerate(self.curved):
+            forces[place], rates[place] = force.at(state, time, slopes[place])
         return forces, slopes, rates
 
     def longest(self, state: Values) -> float:
@@ -126,7 +126,7 @@ class ExponentialIntegrator:
 
     def turn(self, before: Values, after: Values, step: float) -> float:
         """Return the share of a step after which the first slipping springs reverse."""
-        shares = (one.turns(before, after, step, self.rtol) for one in self.memories)
+        shares = (force.turns(before, after, step, self.rtol) for force in self.memories)
         return min(shares, default=1.0)
 
 
@@ -229,7 +229,7 @@ def _exponentials(matrix: Values) -> tuple[Values, Values]:
 
 @compiled
 def _product(first: Values, second: Values) -> Values:
-    """Return the product of matrices that are small, with many zeros."""
+    """Return the product of small matrices with many zeros."""
     result = np.zeros((len(first), second.shape[1]))
     for i in range(len(first)):
         for k in range(len(second)):

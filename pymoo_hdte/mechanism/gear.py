@@ -25,7 +25,7 @@ class Gear:
         Turns of the input per turn of the output, dimensionless; at least 1.
     kind : {"harmonic drive", "other"}
     pole_pairs : int
-        Of the motor at the input; 0 if unknown.
+        Pole pairs of the motor at the input; 0 if unknown.
 
     Raises
     ------
@@ -50,20 +50,20 @@ class Gear:
     @property
     def expected(self) -> dict[float, str]:
         """Orders at which a ripple is expected, cycles per turn of the output, each in words."""
-        found = {}
+        meanings = {}
         if self.kind == "harmonic drive":
             for count in _PER_TURN:
-                found[count * self.ratio] = f"{count} per input turn"
+                meanings[count * self.ratio] = f"{count} per input turn"
                 # The output turns as well, the same way or, of a flexible spline, the other way.
                 for output in (-1.0, 1.0):
                     order = count * (self.ratio + output)
-                    found[order] = f"{count} per input turn against the output"
+                    meanings[order] = f"{count} per input turn against the output"
         for count in _PER_FIELD if self.pole_pairs else ():
             words = f"{count * self.pole_pairs} per input turn, {count} per pole pair"
-            found.setdefault(count * self.pole_pairs * self.ratio, words)
-        found.setdefault(self.ratio, "1 per input turn")
-        found.setdefault(1.0, "1 per turn of the output")
-        return found
+            meanings.setdefault(count * self.pole_pairs * self.ratio, words)
+        meanings.setdefault(self.ratio, "1 per input turn")
+        meanings.setdefault(1.0, "1 per turn of the output")
+        return meanings
 
     def check_at(self, port: str, motion: Mapping[str, float], angles: Collection[str]) -> None:
         """Refuse a port that can be neither the output of a gear nor its torsion.
@@ -84,8 +84,8 @@ class Gear:
             is no angle.
         """
         moved = [name for name, share in motion.items() if share]
-        one = len(moved) == 1 or torsion_of(motion) is not None
-        if not one or any(name not in angles for name in moved):
+        fits = len(moved) == 1 or torsion_of(motion) is not None
+        if not fits or any(name not in angles for name in moved):
             allowed = (
                 "a port whose motion is the angle of the gear's output; or its torsion, 1 the "
                 "input's angle, divided by the ratio already, and -1 the output's"
@@ -100,20 +100,26 @@ class Gear:
         order : float
             Cycles per turn of the output.
         within : float
-            Distance from an expected order, cycles per turn, up to which it may be that one.
+            Largest distance from an expected order, cycles per turn of the output.
 
         Returns
         -------
         str
-            The nearest first; empty if none is near.
+            The expected orders within that distance, the nearest first; empty for none.
         """
-        off = {one: abs(one - order) for one in self.expected}
-        near = sorted((one for one in off if off[one] <= within), key=off.__getitem__)
-        return "; ".join(f"{one:.5g} is {self.expected[one]}" for one in near)
+        off = {expected_order: abs(expected_order - order) for expected_order in self.expected}
+        candidates = sorted(
+            (expected_order for expected_order in off if off[expected_order] <= within),
+            key=off.__getitem__,
+        )
+        return "; ".join(
+            f"{expected_order:.5g} is {self.expected[expected_order]}"
+            for expected_order in candidates
+        )
 
 
 def torsion_of(motion: Mapping[str, float]) -> tuple[str, str] | None:
-    """Return the angles of input and output whose difference a motion is; None for another one.
+    """Return the angles of input and output whose difference a motion is, or None.
 
     Parameters
     ----------

@@ -83,7 +83,7 @@ class Mechanism:
         for port in self.ports:
             for what, element in (("stiffness", port.stiffness), ("damping", port.damping)):
                 real_number(f"{what} of {port.name}", element.value, at_least=0.0)
-        named = [*self.inertias, *self.port_names, *(one.name for one in self.inputs)]
+        named = [*self.inertias, *self.port_names, *(actuation.name for actuation in self.inputs)]
         for name in named:
             if not isinstance(name, str) or not name or named.count(name) > 1:
                 allowed = "a name of its own for each coordinate, port and input"
@@ -98,18 +98,22 @@ class Mechanism:
                 turning = self.coordinates if self.angles is None else self.angles
                 port.gear.check_at(port.name, port.motion, turning)
             for name, share in port.load.items():
-                one_of(f"load of {port.name}", name, [one.name for one in self.inputs])
+                one_of(f"load of {port.name}", name, [actuation.name for actuation in self.inputs])
                 real_number(f"load of {port.name}.{name}", share)
-        for one in self.inputs:
-            self._check_shares(f"acts of {one.name}", one.acts)
+        for actuation in self.inputs:
+            self._check_shares(f"acts of {actuation.name}", actuation.acts)
         for name in self.angles or ():
             one_of("mechanism.angles", name, self.coordinates)
         for name in self.lengths or ():
-            others = [one for one in self.coordinates if one not in (self.angles or ())]
+            others = [
+                coordinate
+                for coordinate in self.coordinates
+                if coordinate not in (self.angles or ())
+            ]
             one_of("mechanism.lengths", name, others)
         self._check_scales()
         for loop in self.loops:
-            one_of("loop.input", loop.input, [one.name for one in self.inputs])
+            one_of("loop.input", loop.input, [actuation.name for actuation in self.inputs])
             one_of("loop.coordinate", loop.coordinate, self.coordinates)
             real_number("loop.position_gain", loop.position_gain)
             real_number("loop.speed_gain", loop.speed_gain)
@@ -138,13 +142,13 @@ class Mechanism:
     @property
     def quantities(self) -> dict[str, BelievedValue]:
         """Believed values, SI, by the names that fits use; those that are 0 are left out."""
-        found = {f"inertia of {name}": one for name, one in self.inertias.items()}
+        quantities = {f"inertia of {name}": inertia for name, inertia in self.inertias.items()}
         for port in self.ports:
-            found[f"stiffness of {port.name}"] = port.stiffness
-            found[f"damping of {port.name}"] = port.damping
-        for one in self.inputs:
-            found[f"gain of {one.name}"] = one.gain
-        return {name: one for name, one in found.items() if one.value != 0.0}
+            quantities[f"stiffness of {port.name}"] = port.stiffness
+            quantities[f"damping of {port.name}"] = port.damping
+        for actuation in self.inputs:
+            quantities[f"gain of {actuation.name}"] = actuation.gain
+        return {name: believed for name, believed in quantities.items() if believed.value != 0.0}
 
     def with_values(self, values: Mapping[str, float], exactly: bool = True) -> Mechanism:
         """Return the mechanism with other values of `quantities`.
@@ -172,7 +176,9 @@ class Mechanism:
                 return before
             return replace(NOTHING if exactly else before, value=float(values[name]))
 
-        inertias = {name: known(f"inertia of {name}", one) for name, one in self.inertias.items()}
+        inertias = {
+            name: known(f"inertia of {name}", inertia) for name, inertia in self.inertias.items()
+        }
         ports = [
             replace(
                 port,
@@ -181,7 +187,10 @@ class Mechanism:
             )
             for port in self.ports
         ]
-        inputs = [replace(one, gain=known(f"gain of {one.name}", one.gain)) for one in self.inputs]
+        inputs = [
+            replace(actuation, gain=known(f"gain of {actuation.name}", actuation.gain))
+            for actuation in self.inputs
+        ]
         return replace(self, inertias=inertias, ports=ports, inputs=inputs)
 
     def _lengths(self) -> tuple[str, ...] | None:
@@ -193,15 +202,17 @@ class Mechanism:
 
     def _check_scales(self) -> None:
         """Refuse an input without a gain beside anything that is not in units of its signal."""
-        known = [name for name, one in self.quantities.items() if one.known]
+        known = [name for name, believed in self.quantities.items() if believed.known]
         sensors = [f"force sensor {port.name}" for port in self.ports if port.read]
         for driving in self.inputs:
             own, allowed = f"gain of {driving.name}", "a number, with a tolerance or factor: "
             exact = [f"{name} is known exactly" for name in known if name != own]
-            further = [f"input {one.name}" for one in self.inputs if one is not driving]
+            further = [
+                f"input {actuation.name}" for actuation in self.inputs if actuation is not driving
+            ]
             scales = [f"{name} has a scale of its own" for name in (*further, *sensors)]
-            for other in (*exact, *scales) if not driving.scaled else ():
-                raise InvalidInput(own, None, allowed + other)
+            for reason in (*exact, *scales) if not driving.scaled else ():
+                raise InvalidInput(own, None, allowed + reason)
 
     def _check_shares(self, name: str, shares: Mapping[str, float]) -> None:
         for coordinate, share in shares.items():

@@ -88,14 +88,14 @@ def highest_frequency(
     step : float
         s.
     deviation : float
-        Standard deviation of its white noise.
+        Standard deviation of the position's white noise.
     share : float
         Largest result as a share of the sampling rate.
 
     Raises
     ------
     InvalidInput
-        If it does so at no frequency, or not at the lowest ones.
+        If the position exceeds its noise at no frequency, or not at the lowest ones.
     """
     # Second differences, because the spectrum of a position falls too steeply for a window.
     difference = np.diff(position, 2)
@@ -109,12 +109,12 @@ def highest_frequency(
     if not (np.all(stands_out[:_FEWEST]) or (strongest >= _FEWEST and stands_out[strongest])):
         raise _no_cutoff(frequency[1:], power[1:] / np.maximum(noise[1:], 1e-300))
     quiet = np.flatnonzero(~stands_out[strongest:])
-    last = strongest + quiet[0] if quiet.size else len(stands_out)
-    return float(min(frequency[last], highest_share(step, share)))
+    end = strongest + quiet[0] if quiet.size else len(stands_out)
+    return float(min(frequency[end], highest_share(step, share)))
 
 
 def _no_cutoff(frequency: Values, ratio: Values) -> InvalidInput:
-    """Return the reason why no cutoff is found, with where a motion shows if it does anywhere."""
+    """Return why no cutoff was found, and at which frequencies a motion shows, if at any."""
     shown = frequency[_FEWEST:][ratio[_FEWEST:] > _STANDS_OUT]
     if not shown.size:
         allowed = f"more than {_STANDS_OUT:g} at some frequency, or nothing is known of its motion"

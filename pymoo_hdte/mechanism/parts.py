@@ -21,7 +21,7 @@ class Port:
     motion : mapping of str to float
         Share of each coordinate in the motion d of the port, by name.
     stiffness, damping : BelievedValue
-        Of the linear spring and damper at the port, N/m and N.s/m or N.m/rad and N.m.s/rad.
+        Linear spring and damper at the port, N/m and N.s/m or N.m/rad and N.m.s/rad.
     read : bool
         True for a force sensor: the force at the port is measured, as the channel of this name, and
         does not act on the coordinates.
@@ -61,7 +61,7 @@ class Input:
     Attributes
     ----------
     name : str
-        Its channel.
+        Name of its channel.
     acts : mapping of str to float
         Share with which it acts on each coordinate, by name.
     gain : BelievedValue
@@ -94,7 +94,7 @@ class Loop:
     input, reference : str
         The input that it commands, and the channel of the reference.
     coordinate : str
-        That it controls.
+        The coordinate that it controls.
     position_gain, speed_gain : float
         Units of the input per m or rad, and per m/s or rad/s.
     limit : float
@@ -121,7 +121,7 @@ class LawAt:
     Attributes
     ----------
     name : str
-        Of the effect, as in verdicts.
+        Name of the effect, as in verdicts.
     port : str
         Name of the port.
     law : Law

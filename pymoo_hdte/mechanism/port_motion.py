@@ -63,7 +63,7 @@ def load_at_port(
     """
     if not port.load:
         return None
-    gains = {one.name: one.gain.value for one in inputs}
+    gains = {actuation.name: actuation.gain.value for actuation in inputs}
     parts = [share * gains[name] * signals[name] for name, share in port.load.items()]
     return np.asarray(np.sum(parts, axis=0))
 
@@ -95,7 +95,7 @@ def followed_angles(mechanism: Mechanism) -> tuple[str, ...]:
 def torsion_noise(port: Port, record: Record) -> float:
     """Return the standard deviation of the noise of a motion that follows a measured angle, SI.
 
-    Of the difference of the angles: what jitter of the samples adds to both of them cancels there.
+    The noise is that of the difference of the angles, in which jitter of the samples cancels.
     """
     shares = {**port.motion, **port.followed}
     if all(name in record.noise for name in shares):

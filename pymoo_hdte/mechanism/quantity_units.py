@@ -6,7 +6,7 @@ from pymoo_hdte.mechanism.mechanism import Mechanism
 from pymoo_hdte.units import si_unit
 
 _AT_A_SHAFT = {"force": "torque", "position": "angle", "speed": "speed"}
-"""Names of these quantities in `pymoo_hdte.units.UNITS`."""
+"""Names of the quantities at a shaft in `pymoo_hdte.units.UNITS`."""
 _BASE = ("inertia", "stiffness", "damping")
 """Kinds of values with a unit of `UNITS` at a shaft; a zero has that of a force."""
 
@@ -18,7 +18,7 @@ def unit_of(mechanism: Mechanism, name: str, quantity: str = "force") -> str:
     ----------
     mechanism : Mechanism
     name : str
-        Of a coordinate, or of a port.
+        Name of a coordinate or of a port.
     quantity : str
         ``"force"``, ``"position"`` or ``"speed"``.
 
@@ -38,9 +38,9 @@ def unit_at(mechanism: Mechanism, name: str, unit: str) -> str:
     ----------
     mechanism : Mechanism
     name : str
-        Of a coordinate, or of a port.
+        Name of a coordinate or of a port.
     unit : str
-        What it is at a shaft.
+        Unit of the number at a shaft.
 
     Returns
     -------
@@ -70,11 +70,11 @@ def unit_of_number(mechanism: Mechanism, name: str, number: str, unit: str) -> s
     ----------
     mechanism : Mechanism
     name : str
-        Of a coordinate, or of a port.
+        Name of a coordinate or of a port.
     number : str
         Such as ``"order"`` or ``"amplitude"``.
     unit : str
-        What it is at a shaft.
+        Unit of the number at a shaft.
 
     Returns
     -------
@@ -128,12 +128,14 @@ def unit_at_length(unit: str) -> str:
 def _turning(mechanism: Mechanism, name: str) -> bool | None:
     """Tell whether a coordinate or port turns; None where its forces or motion have no unit."""
     angles, lengths = mechanism.angles or (), mechanism.lengths or ()
-    if any(not one.scaled for one in mechanism.inputs):
+    if any(not actuation.scaled for actuation in mechanism.inputs):
         return None
     moved = [name]
     if name in mechanism.port_names:
         port = mechanism.port(name)
-        moved = [one for one, share in port.motion.items() if share] + [*port.followed]
-    if all(one in angles for one in moved):
+        moved = [coordinate for coordinate, share in port.motion.items() if share] + [
+            *port.followed
+        ]
+    if all(coordinate in angles for coordinate in moved):
         return True
-    return False if all(one in lengths for one in moved) else None
+    return False if all(coordinate in lengths for coordinate in moved) else None

@@ -25,9 +25,9 @@ class Record:
     Attributes
     ----------
     name : str
-        Of the test.
+        Name of the test.
     role : {"train", "held_out"}
-        To be fitted, or only to judge the result.
+        Whether the record is fitted, or only used to judge the result.
     time : ndarray, shape (n,)
         s, uniform within 1 % of a step; at least 16 of them.
     channels : dict of str to ndarray, shape (n,)

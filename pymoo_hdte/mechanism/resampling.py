@@ -19,7 +19,7 @@ COARSEST_SHARE = 1.0 / 3.0
 """Largest cutoff as a share of the sampling rate: three samples in a period. The theorem asks for
 two; a filter of finite length needs the way from a third to half of the rate to fall."""
 _REACH = 32
-"""Samples to either side from which a value between two of them is made."""
+"""Number of samples on either side that determine a value between two samples."""
 _KAISER = 8.0
 """Shape of the filter's window: what it lets pass beyond half of the rate is below 1e-4."""
 _SEGMENT = 512
@@ -66,7 +66,7 @@ def share_beyond(signal: Values, step: float, frequency: float) -> float:
 def refined(record: Record, factor: int) -> Record:
     """Return a record with ``factor`` times as many samples, on the band-limited curve through it.
 
-    Its first and last samples are left out, between which the filter has one side only. The stated
+    Samples at both ends are left out, where the filter has one side only. The stated
     noise is that of white noise of the same power at each frequency of the former band.
 
     Parameters
@@ -80,12 +80,12 @@ def refined(record: Record, factor: int) -> Record:
     Record
     """
     taps = firwin(2 * _REACH * factor + 1, 1.0 / factor, window=("kaiser", _KAISER))
-    kept = slice(_REACH * factor, (len(record.time) - 1 - _REACH) * factor + 1)
-    time = record.time[0] + record.step / factor * np.arange(factor * len(record.time))[kept]
+    interior = slice(_REACH * factor, (len(record.time) - 1 - _REACH) * factor + 1)
+    time = record.time[0] + record.step / factor * np.arange(factor * len(record.time))[interior]
     channels, noise = {}, {}
     for name, channel in record.channels.items():
         middle = float(np.mean(channel))
-        channels[name] = resample_poly(channel - middle, factor, 1, window=taps)[kept] + middle
+        channels[name] = resample_poly(channel - middle, factor, 1, window=taps)[interior] + middle
         deviation = noise_between(record, name, jumps=True)
         if deviation > 0.0:
             noise[name] = deviation * factor**0.5

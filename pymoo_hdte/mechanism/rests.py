@@ -28,13 +28,13 @@ like a force."""
 _WHOLE = 0.999
 """Weight of a row that counts fully, but for rounding."""
 _FEWEST = 100
-"""Coefficients of force balances that have to be left, or the record is taken as it is. They hold
+"""Least number of coefficients of force balances without rests, or rests stay in. They hold
 the dozen unknowns of a mechanism with three effects, and their chi-square is known to 14 %."""
 
 
 @dataclass(frozen=True, eq=False)
 class MovingRows:
-    """The rows of a record of which the force balances are taken, one after the other.
+    """The rows of a record that enter the force balances, one after the other.
 
     Without those that are left out, so that a transform has no more coefficients than they tell:
     with zeros in their place its coefficients would be correlated, and count as more.
@@ -59,24 +59,24 @@ class MovingRows:
 
     @property
     def whole(self) -> NDArray[np.bool_]:
-        """Where rows count fully, (n,)."""
+        """Which rows count fully, shape (n,)."""
         return self.weight > _WHOLE
 
     @property
     def power(self) -> float:
-        """Mean square of their weights."""
+        """Mean square of the weights of these rows."""
         return float(np.sum(self.weight**2) / self.count)
 
     def take(self, signal: Values) -> Values:
-        """Return their weighted values, (k count,), of a signal, (k n,), at k moments a row."""
+        """Return the weighted values, (k count,), of a signal, (k n,), with k moments a row."""
         weight = np.repeat(self.weight, len(signal) // len(self.weight))
         return (weight * signal)[weight > 0.0]
 
     def put(self, values: Values) -> Values:
         """Return a signal, (n,), with values (count,) in their places and zeros elsewhere."""
-        found = np.zeros_like(self.weight)
-        found[self.weight > 0.0] = values
-        return found
+        signal = np.zeros_like(self.weight)
+        signal[self.weight > 0.0] = values
+        return signal
 
 
 def moving_rows(
@@ -95,39 +95,41 @@ def moving_rows(
     ----------
     mechanism : Mechanism
     record : Record
-        With the noise of its channels.
+        The record, with the noise of its channels.
     cutoff : float
         Hz, up to which the motion is known.
     ports : dict of str to PortMotion
     step : float
-        Of them, s.
+        Time step of the motions, s.
     known : sequence of LawAt
-        Only ports with one that holds them at rest have rests.
+        Known laws; only ports with a law that can hold them at rest have rests.
     """
     period = max(round(1.0 / (cutoff * step)), 2)
     rests = np.zeros(len(next(iter(ports.values())).speed), dtype=bool)
-    for name in {one.port for one in known if one.law.breakaway > 0.0}:
+    for name in {friction.port for friction in known if friction.law.breakaway > 0.0}:
         port = mechanism.port(name)
         noise = [
-            share * smoothed_noise(record.noise_of(one), record.step, cutoff)[1]
-            for one, share in {**port.motion, **port.followed}.items()
+            share * smoothed_noise(record.noise_of(channel), record.step, cutoff)[1]
+            for channel, share in {**port.motion, **port.followed}.items()
         ]
         rests |= _long(np.abs(ports[name].speed) < _STILL * np.hypot.reduce(noise), period)
-    near = _spread(rests, round((_FADES + 0.5) * period))
+    around_rests = _spread(rests, round((_FADES + 0.5) * period))
     window = np.hanning(period + 2)
     edges = len(window) // 2, len(window) - 1 - len(window) // 2
-    away = np.convolve(np.pad(~near, edges, mode="edge"), window / window.sum(), mode="valid")
+    away = np.convolve(
+        np.pad(~around_rests, edges, mode="edge"), window / window.sum(), mode="valid"
+    )
     enough = 2.0 * np.count_nonzero(away) * step * cutoff >= _FEWEST
     return MovingRows(away if enough and rests.any() else np.ones_like(away))
 
 
 def _long(still: NDArray[np.bool_], least: int) -> NDArray[np.bool_]:
-    """Return only those runs of True that have at least so many rows, (n,)."""
+    """Return only the runs of True with at least `least` rows, (n,)."""
     edges = np.flatnonzero(np.diff(np.pad(still.astype(int), 1)))
-    found = np.zeros_like(still)
+    runs = np.zeros_like(still)
     for start, end in edges.reshape(-1, 2):
-        found[start:end] = end - start >= least
-    return found
+        runs[start:end] = end - start >= least
+    return runs
 
 
 def _spread(rows: NDArray[np.bool_], way: int) -> NDArray[np.bool_]:

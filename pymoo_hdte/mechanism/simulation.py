@@ -117,29 +117,30 @@ def simulate_mechanism(
     passed = _history(mechanism, begin, history)
     state = mechanism, passed, record
     ports = [
-        PortForce(port, [one.law for one in effects if one.port == port.name], *state)
+        PortForce(port, [effect.law for effect in effects if effect.port == port.name], *state)
         for port in mechanism.ports
     ]
     loops = _closed_loops(mechanism, record, closed_loop)
     commands = {loop.input: Command(loop, mechanism, record) for loop in loops}
-    inertias = np.array([one.value for one in mechanism.inertias.values()])
+    inertias = np.array([inertia.value for inertia in mechanism.inertias.values()])
     inputs, pushes = {}, np.zeros((len(record.time), len(inertias)))
-    for one in mechanism.inputs:
-        if one.name not in commands:
-            inputs[one.name] = record.channel(one.name)
+    for actuation in mechanism.inputs:
+        if actuation.name not in commands:
+            inputs[actuation.name] = record.channel(actuation.name)
             pushes += np.outer(
-                inputs[one.name], one.gain.value * coordinate_row(mechanism, one.acts)
+                inputs[actuation.name],
+                actuation.gain.value * coordinate_row(mechanism, actuation.acts),
             )
-    acting = [one for one in ports if not one.port.read]
-    rows = np.reshape([one.row for one in ports], (-1, len(inertias)))
+    acting = [force for force in ports if not force.port.read]
+    rows = np.reshape([force.row for force in ports], (-1, len(inertias)))
     integrator = ExponentialIntegrator(inertias, [*acting, *commands.values()], rows, rtol)
     known = [*mechanism.coordinates, *(loop.reference for loop in mechanism.loops)]
     scales = [np.max(np.abs(record.channels[name])) for name in known if name in record.channels]
     bound = _FARTHEST * (max([*np.abs(begin[0]), *scales]) or 1.0)
     with np.errstate(over="ignore", invalid="ignore"):
         path = integrator.follow(record.time, pushes / inertias, begin, bound)
-    forces = {one.port.name: one.along(path) for one in ports if one.port.read}
-    inputs |= {name: one.along(path) for name, one in commands.items()}
+    forces = {force.port.name: force.along(path) for force in ports if force.port.read}
+    inputs |= {name: command.along(path) for name, command in commands.items()}
     position, speed = (
         dict(zip(mechanism.coordinates, rows, strict=True)) for rows in path.transpose(1, 2, 0)
     )
@@ -170,8 +171,8 @@ def _history(mechanism: Mechanism, begin: Values, given: Mapping[str, ArrayLike]
         one_of("history", name, mechanism.coordinates)
     for name in mechanism.coordinates:
         one_of("coordinate of history", name, tuple(given))
-    first = next(iter(given))
-    shape = (len(finite_array(f"history of {first}", given[first], (None,))),)
+    coordinate = next(iter(given))
+    shape = (len(finite_array(f"history of {coordinate}", given[coordinate], (None,))),)
     passed = np.zeros((*shape, 2, len(mechanism.coordinates)))
     for place, name in enumerate(mechanism.coordinates):
         passed[:, 0, place] = finite_array(f"history of {name}", given[name], shape)
@@ -187,7 +188,7 @@ def _start(mechanism: Mechanism, record: Record, given: Mapping[str, ArrayLike])
         if name in given:
             begin[:, place] = finite_array(f"start of {name}", given[name], (2,))
         elif name in record.channels:
-            first = record.channels[name][:_START_SAMPLES]
-            time = record.time[: len(first)] - record.time[0]
-            begin[:, place] = first[0], np.polyfit(time, first, 2)[1]
+            samples = record.channels[name][:_START_SAMPLES]
+            time = record.time[: len(samples)] - record.time[0]
+            begin[:, place] = samples[0], np.polyfit(time, samples, 2)[1]
     return begin

@@ -47,7 +47,7 @@ def minimize_asynchronously(
     algorithm : ElitistSwarm
         Or a `CompactSwarm`; it is copied.
     termination : Termination or tuple
-        Of pymoo: ``("n_eval", 500)``, or a time. Every finished design counts as a generation. What
+        Termination of pymoo, as ``("n_eval", 500)`` or a time. Each design is a generation. What
         is under way when another termination ends the run is dropped.
     at_once : int, optional
         Evaluations under way; by default as many as the executor says that it has workers.
@@ -112,7 +112,7 @@ class _SteadyState:
         self._evaluations = runner.evaluations
         self._f = swarm.problem.elementwise_func(swarm.problem, (), {})
         self._limit = evaluation_limit(swarm.termination)
-        self._first = list(swarm.ask().tolist())
+        self._initial = list(swarm.ask().tolist())
         self._arrived: list[Individual] = []
         # Which move made a design, to be credited; None of a first or random one.
         self._under_way: dict[int, tuple[Individual, NDArray[np.int_] | None]] = {}
@@ -126,16 +126,16 @@ class _SteadyState:
             if not self._under_way:
                 break
             number, output = self._evaluations.next()
-            self._tell(*self._under_way.pop(number), output)
+            self._report(*self._under_way.pop(number), output)
         if not self._swarm.is_initialized and self._arrived:
             # Fewer evaluations than the first swarm has designs.
             self._swarm.pop_size = len(self._arrived)
-            self._tell_the_first()
+            self._report_initial()
 
     def _start(self) -> None:
         move = None
-        if self._first:
-            particle = self._first.pop(0)
+        if self._initial:
+            particle = self._initial.pop(0)
         elif not self._swarm.is_initialized:
             particle = self._random()
         else:
@@ -150,22 +150,22 @@ class _SteadyState:
         drawn = FloatRandomSampling().do(swarm.problem, 1, random_state=swarm.random_state)
         return swarm.repair.do(swarm.problem, drawn, random_state=swarm.random_state)[0]
 
-    def _tell(self, particle: Individual, move: NDArray[np.int_] | None, output: Any) -> None:
+    def _report(self, particle: Individual, move: NDArray[np.int_] | None, output: Any) -> None:
         swarm = self._swarm
         self._runner.deliver(self._evaluations.filled(self._f, output))
-        told = Population([particle])
-        swarm.evaluator.eval(swarm.problem, told, algorithm=swarm)
+        reported = Population([particle])
+        swarm.evaluator.eval(swarm.problem, reported, algorithm=swarm)
         if move is not None:
             swarm.chosen = move
-            swarm.tell(infills=told)
+            swarm.tell(infills=reported)
         elif swarm.is_initialized:
             # Not asked for as an offspring: it joins the swarm as from a callback.
-            swarm.pop = Population.merge(swarm.pop, told)
+            swarm.pop = Population.merge(swarm.pop, reported)
         else:
             self._arrived.append(particle)
             if len(self._arrived) == swarm.pop_size:
-                self._tell_the_first()
+                self._report_initial()
 
-    def _tell_the_first(self) -> None:
+    def _report_initial(self) -> None:
         self._evaluations.refuse_failures()
         self._swarm.tell(infills=Population(self._arrived))

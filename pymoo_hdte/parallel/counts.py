@@ -23,7 +23,7 @@ class Counts:
     repeated : int
         Evaluations made again because the first one failed.
     first_loss : str
-        What was said at the first loss; empty without one.
+        Text of the first loss; empty without one.
 
     Examples
     --------
@@ -45,16 +45,16 @@ class Counts:
         Parameters
         ----------
         kind : str
-            One of the four.
+            One of the four kinds.
         text : str
-            What was said.
+            Text of the loss.
         """
         self.first_loss = self.first_loss or text
         self.lost[kind] += 1
 
     @property
     def n_lost(self) -> int:
-        """Designs without a result."""
+        """Number of designs without a result."""
         return self.lost.total()
 
     def __str__(self) -> str:

@@ -13,7 +13,7 @@ import numpy as np
 
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.parallel.counts import Counts
-from pymoo_hdte.parallel.kept_designs import KeptDesigns, Output, Row
+from pymoo_hdte.parallel.stored_designs import Output, Row, StoredDesigns
 from pymoo_hdte.problems._simulator.children import NOT_A_NUMBER, TOO_LONG, Failure
 from pymoo_hdte.problems._simulator.runs import SimulatorFailed
 
@@ -34,20 +34,20 @@ class Evaluations:
     Parameters
     ----------
     workers : Workers or VirtualWorkers
-        That make the evaluations.
+        Workers that make the evaluations.
     tries : int
-        How often one is made that fails.
+        How often a failing evaluation is made.
     cache : path or None
-        File of finished ones.
+        File of finished evaluations.
     counts : Counts
-        Where they are counted.
+        Counts of their outcomes.
     """
 
     def __init__(
         self, workers: Any, tries: int, cache: str | os.PathLike[str] | None, counts: Counts
     ) -> None:
         self._workers, self._tries, self._cache, self._counts = workers, tries, cache, counts
-        self._kept: KeptDesigns | None = None
+        self._stored: StoredDesigns | None = None
         self._known: list[tuple[int, int, Row]] = []
         self._same: dict[Row, list[int]] = {}
         self._tasks: dict[int, _Task] = {}
@@ -61,7 +61,7 @@ class Evaluations:
         number : int
             Tells the design from others under way.
         f : callable
-            Of pymoo: from a design to its outputs by name.
+            Function of pymoo that maps a design to its outputs by name.
         x : object
             The design; with a file n_var real numbers.
 
@@ -72,9 +72,9 @@ class Evaluations:
         """
         row = None if self._cache is None else _row(x)
         if row is not None:
-            self._kept = self._kept or self._opened(f, len(row))
-            if row in self._kept.order:
-                heapq.heappush(self._known, (self._kept.order[row], number, row))
+            self._stored = self._stored or self._opened(f, len(row))
+            if row in self._stored.order:
+                heapq.heappush(self._known, (self._stored.order[row], number, row))
                 return
             if row in self._same:
                 self._same[row].append(number)
@@ -83,7 +83,7 @@ class Evaluations:
         self._tasks[number] = task = _Task(_without_runner(f), x, row)
         self._workers.start(number, task.f, x)
 
-    def _opened(self, f: Callable[[Any], Output], n_var: int) -> KeptDesigns:
+    def _opened(self, f: Callable[[Any], Output], n_var: int) -> StoredDesigns:
         bare = _without_runner(f)
 
         def again(row: Row) -> Output | Failure:
@@ -96,7 +96,7 @@ class Evaluations:
 
         assert self._cache is not None
         problem, limit = getattr(bare, "problem", f), self._workers.time_limit
-        return KeptDesigns(self._cache, problem, n_var, again, limit)
+        return StoredDesigns(self._cache, problem, n_var, again, limit)
 
     def next(self) -> tuple[int, Output | None]:
         """Return number and outputs of the next design that is finished, None if it is lost.
@@ -116,17 +116,17 @@ class Evaluations:
             self._counts.repeated += 1
             self._workers.start(number, task.f, task.x)
         del self._tasks[number]
-        if task.row is not None and self._kept is not None:
-            gave = self._kept.keep(task.row, gave)
-            for other in self._same.pop(task.row):
-                heapq.heappush(self._known, (self._kept.order[task.row], other, task.row))
+        if task.row is not None and self._stored is not None:
+            gave = self._stored.keep(task.row, gave)
+            for duplicate in self._same.pop(task.row):
+                heapq.heappush(self._known, (self._stored.order[task.row], duplicate, task.row))
         self._counts.made += not isinstance(gave, Failure)
         return number, self._counted(gave)
 
     def _from_file(self) -> tuple[int, Output | None]:
         _, number, row = heapq.heappop(self._known)
-        assert self._kept is not None
-        gave = self._kept[row]
+        assert self._stored is not None
+        gave = self._stored[row]
         self._counts.from_file += not isinstance(gave, Failure)
         return number, self._counted(gave)
 
@@ -153,7 +153,7 @@ class Evaluations:
         Raises
         ------
         SimulatorFailed
-            Then, with what was said at the first one.
+            In that case, with the text of the first failure.
         """
         if self._counts.n_lost and not self._counts.made + self._counts.from_file:
             raise SimulatorFailed(f"no evaluation gave a result: {self._counts}")

@@ -9,7 +9,7 @@ from typing import Any
 from pymoo_hdte.checks import InvalidInput, whole_number
 from pymoo_hdte.parallel.counts import Counts
 from pymoo_hdte.parallel.evaluations import Evaluations
-from pymoo_hdte.parallel.kept_designs import Output
+from pymoo_hdte.parallel.stored_designs import Output
 from pymoo_hdte.parallel.virtual import VirtualWorkers
 from pymoo_hdte.problems._simulator.workers import Workers
 
@@ -28,7 +28,7 @@ class ExecutorParallelization:
     Parameters
     ----------
     executor : int or object, optional
-        Of `concurrent.futures`, or a client of Dask; or a number of processes of our own, each of
+        Executor of `concurrent.futures`, client of Dask, or a number of own processes, each of
         which is ended and replaced alone; or `VirtualWorkers`. Without one, evaluations run here,
         one after the other.
     time_limit : float, optional
@@ -98,7 +98,7 @@ class ExecutorParallelization:
 
     @property
     def evaluations(self) -> Evaluations:
-        """What is under way.
+        """The evaluations under way.
 
         Raises
         ------
@@ -116,7 +116,7 @@ class ExecutorParallelization:
         Parameters
         ----------
         f : callable
-            Of pymoo: from a design to its outputs by name.
+            Function of pymoo that maps a design to its outputs by name.
         X : sequence
             Designs.
 
@@ -153,7 +153,7 @@ class ExecutorParallelization:
         Parameters
         ----------
         output : dict
-            By name, from `evaluations`.
+            Outputs by name, from `evaluations`.
         """
         self._delivered = output
 

@@ -59,7 +59,7 @@ class VirtualWorkers:
         if time_limit is not None:
             self.time_limit = real_number("time_limit", time_limit, above=0.0)
         self.now = self.busy = 0.0
-        self._free = [0.0] * self.number
+        self._free_at = [0.0] * self.number
         self._running: list[tuple[float, int, float, Hashable, Any]] = []
         self._count = 0
 
@@ -89,8 +89,8 @@ class VirtualWorkers:
         lasts = min(wanted, self.time_limit)
         if not 0.0 <= lasts < float("inf"):
             raise InvalidInput("seconds of an evaluation", wanted, "finite, or with a time_limit")
-        begins = max(self.now, heapq.heappop(self._free))
-        heapq.heappush(self._free, begins + lasts)
+        begins = max(self.now, heapq.heappop(self._free_at))
+        heapq.heappush(self._free_at, begins + lasts)
         call = None if wanted > self.time_limit else (function, *arguments)
         # The count keeps the order of the queue where two end at once.
         self._count += 1
@@ -110,7 +110,7 @@ class VirtualWorkers:
     def cancel(self) -> None:
         """Forget all calls under way, whose workers are free at once."""
         self._running.clear()
-        self._free = [min(one, self.now) for one in self._free]
+        self._free_at = [min(time, self.now) for time in self._free_at]
 
     def close(self) -> None:
         """Do as `cancel`; nothing else is held."""

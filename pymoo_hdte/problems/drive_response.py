@@ -27,7 +27,7 @@ SURROGATE_BOX = 0.35
 PAPERS_ORDER = 3
 
 HIGHEST_ORDER = 6
-"""At order 6 the surrogate takes 16,807 model runs; time and memory grow with the tenth power."""
+"""Highest order: its 16,807 model runs, time and memory grow with the tenth power."""
 
 DESIGN_VARIABLES = PARAMETERS[1:]
 """U = (K, J_in, B_in, B_fc) of Section 5.1; theta_s is noise."""
@@ -39,7 +39,7 @@ UNITS |= dict.fromkeys(OBJECTIVES, "arcsec")
 """Units of design variables and objectives, by name."""
 
 _SHARE_DECIMALS = 12
-"""Shares of weights are rounded to this: weights in other units then give the same front."""
+"""Decimals to which shares of weights are rounded, so that weights in any unit give one front."""
 
 
 class DriveResponse:
@@ -111,7 +111,7 @@ class DriveResponse:
 
     @property
     def settings(self) -> dict[str, Any]:
-        """What defines the response, JSON-able, without names and descriptions.
+        """The values that define the response, JSON-able, without names and descriptions.
 
         A duty cycle replaces the model's own speed and load.
         """

@@ -72,9 +72,9 @@ class ModelMoments:
         self._points = np.stack(grids, axis=-1).reshape(-1, len(PARAMETERS))
         self._rules = [weights for _, weights in rules]
         # Softest with heaviest and stiffest with lightest: the slowest and the fastest vibration.
-        last = np.array(self.nodes) - 1
+        top = np.array(self.nodes) - 1
         extremes = np.array([[1, 0, 1, 0, 0], [1, 1, 0, 0, 0], [1, 0, 0, 0, 0], [1, 1, 1, 0, 0]])
-        self._outermost = np.ravel_multi_index(tuple((extremes * last).T), self.nodes)
+        self._outermost = np.ravel_multi_index(tuple((extremes * top).T), self.nodes)
         self._weights = np.ones(1)
         for weights in self._rules:
             self._weights = np.multiply.outer(self._weights, weights).ravel()
@@ -96,9 +96,9 @@ class ModelMoments:
 
     def with_nodes(self, nodes: Sequence[int]) -> ModelMoments:
         """Return the moments by other numbers of nodes, which count the same runs."""
-        other = ModelMoments(self.model, self.conditions, self.inputs, nodes)
-        other.n_runs = self.n_runs
-        return other
+        moments = ModelMoments(self.model, self.conditions, self.inputs, nodes)
+        moments.n_runs = self.n_runs
+        return moments
 
     def at_least_two(self) -> ModelMoments:
         """Return moments of two nodes or more for each input, as far as `MOST_NODES` goes."""
@@ -115,7 +115,7 @@ class ModelMoments:
         Parameters
         ----------
         designs : ndarray, shape (n, 4)
-            Those looked at; they have steady states.
+            Designs at which the change is measured; they have steady states.
         wanted : ndarray, shape (2,)
             Largest change of mean and standard deviation, summed over the inputs, arcsec.
 
@@ -142,15 +142,15 @@ class ModelMoments:
         dte = self._at_nodes(design[None]).reshape(self.nodes)
         mean, std = self._moments_over(dte, range(len(PARAMETERS)))
         variance = float(std) ** 2
-        first, total = np.zeros((2, len(PARAMETERS)))
+        first_order, total = np.zeros((2, len(PARAMETERS)))
         for axis in range(len(PARAMETERS)) if variance > 0.0 else ():
-            others = [other for other in range(len(PARAMETERS)) if other != axis]
+            others = [index for index in range(len(PARAMETERS)) if index != axis]
             alone = self._moments_over(dte, others)[0]
-            rest = self._moments_over(dte, [axis])[0]
-            first[axis] = self._rules[axis] @ (alone - mean) ** 2 / variance
+            averaged = self._moments_over(dte, [axis])[0]
+            first_order[axis] = self._rules[axis] @ (alone - mean) ** 2 / variance
             without = self._rules[:axis] + self._rules[axis + 1 :]
-            total[axis] = 1.0 - _expectation((rest - mean) ** 2, without) / variance
-        return SobolIndices(PARAMETERS, float(mean), variance, first, total)
+            total[axis] = 1.0 - _expectation((averaged - mean) ** 2, without) / variance
+        return SobolIndices(PARAMETERS, float(mean), variance, first_order, total)
 
     def lost(self, design: Values) -> dict[str, float] | None:
         """Return `PARAMETERS` of the first node of a design without a steady state, or None."""
@@ -159,8 +159,8 @@ class ModelMoments:
             return None
         # Where an outermost one is lost, the others have not been tried.
         tried = self._outermost[gone[self._outermost]]
-        first = tried[0] if tried.size else np.flatnonzero(gone)[0]
-        return dict(zip(PARAMETERS, self._drives(design[None])[0, first].tolist(), strict=True))
+        node = tried[0] if tried.size else np.flatnonzero(gone)[0]
+        return dict(zip(PARAMETERS, self._drives(design[None])[0, node].tolist(), strict=True))
 
     def _moments_over(self, dte: Values, axes: Sequence[int]) -> tuple[Values, Values]:
         """Return expectation and deviation over some axes of values on the grid."""
@@ -177,22 +177,22 @@ class ModelMoments:
         takes longer than one that succeeds.
         """
         drives = self._drives(designs)
-        found = np.full((len(designs), len(self._points)), np.nan)
+        dte = np.full((len(designs), len(self._points)), np.nan)
         outermost = np.isin(np.arange(len(self._points)), self._outermost)
         rows = np.arange(len(designs))
         for nodes in (np.flatnonzero(outermost), np.flatnonzero(~outermost)):
             place = np.ix_(rows, nodes)
-            found[place] = self._runs(drives[place].reshape(-1, len(PARAMETERS))).reshape(
+            dte[place] = self._runs(drives[place].reshape(-1, len(PARAMETERS))).reshape(
                 len(rows), len(nodes)
             )
-            rows = np.flatnonzero(np.isfinite(found[:, outermost]).all(axis=1))
-        return found
+            rows = np.flatnonzero(np.isfinite(dte[:, outermost]).all(axis=1))
+        return dte
 
     def _runs(self, drives: Values) -> Values:
         self.n_runs += len(drives)
         parts = [
-            duty_cycle_dte_where_found(self.model, self.conditions, drives[first:][:_RUNS_AT_ONCE])
-            for first in range(0, len(drives), _RUNS_AT_ONCE)
+            duty_cycle_dte_where_found(self.model, self.conditions, drives[start:][:_RUNS_AT_ONCE])
+            for start in range(0, len(drives), _RUNS_AT_ONCE)
         ]
         return np.concatenate([np.empty(0), *parts])
 
@@ -225,7 +225,7 @@ def _doubled(nodes: tuple[int, ...], axis: int) -> tuple[int, ...]:
 def _checked_nodes(nodes: Sequence[int]) -> tuple[int, ...]:
     allowed = f"{len(PARAMETERS)} whole numbers from 1 on, of a product up to {MOST_NODES}"
     given = tuple(nodes)
-    whole = all(isinstance(one, int | np.integer) and one >= 1 for one in given)
+    whole = all(isinstance(number, int | np.integer) and number >= 1 for number in given)
     if len(given) != len(PARAMETERS) or not whole or int(np.prod(given)) > MOST_NODES:
         raise InvalidInput("nodes", given, allowed)
-    return tuple(int(one) for one in given)
+    return tuple(int(number) for number in given)

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from pymoo_hdte._io.text_table import read_text_table
+from pymoo_hdte._io.csv_table import read_text_table
 from pymoo_hdte.checks import InvalidInput, real_number
 from pymoo_hdte.drive import DriveModel, UnstableDrive
 from pymoo_hdte.units import REVOLUTION_PER_MINUTE
@@ -69,13 +69,13 @@ def load_conditions(path: str | Path) -> tuple[OperatingCondition, ...]:
     Parameters
     ----------
     path : str or Path
-        Of the file, with the columns ``speed_rpm``, ``load_Nm`` and ``weight`` in any order. Speeds
+        The file, with the columns ``speed_rpm``, ``load_Nm`` and ``weight`` in any order. Speeds
         are in r/min, loads in N.m. Blank lines and lines that start with ``#`` are skipped.
 
     Returns
     -------
     tuple of OperatingCondition
-        In the order of the file, SI.
+        The conditions in the order of the file, SI.
 
     Raises
     ------

@@ -23,7 +23,7 @@ _FOLDER = files("pymoo_hdte.problems") / "data"
 class ReferenceFront:
     """The true Pareto front of a surrogate, or of the drive model, and its set, row for row.
 
-    Those of two objectives are sorted by the first.
+    Fronts of two objectives are sorted by the first.
 
     Attributes
     ----------

@@ -59,7 +59,7 @@ class RobustProblem(Problem):
     Parameters
     ----------
     moments : ExactMoments, SampledMoments or VariableBandMoments
-        Of the response, over the designs.
+        Moments of the response, over the designs.
     obj_names : tuple of str
         Names of the objectives: of these two, and of those that a subclass adds.
     units : dict of str
@@ -131,7 +131,7 @@ class RobustProblem(Problem):
     def _evaluate(
         self, x: NDArray[np.float64], out: dict[str, Any], *args: Any, **kwargs: Any
     ) -> None:
-        """Fill ``F``, and ``dF`` if asked for.
+        """Fill ``F``, and ``dF`` if requested.
 
         Raises
         ------

@@ -60,7 +60,7 @@ class RobustDTE(StoredFront, RobustProblem):
     inputs : tuple of TruncatedNormal and UniformBand
         Scatter of ``PARAMETERS``, of the design variables relative to the design.
     moments : ExactMoments or SampledMoments
-        Of the surrogate, over the designs.
+        Moments of the surrogate, over the designs.
     nominal : ndarray, shape (4,)
         The initial design, SI units.
     var_names, obj_names, units

@@ -40,7 +40,7 @@ class RobustDTEDirect(StoredFront, Problem):
     conditions : sequence of OperatingCondition, optional
         As for `RobustDTE`.
     nodes : sequence of int
-        Of the Gauss rules of theta_s, K, J_in, B_in and B_fc.
+        Numbers of nodes of the Gauss rules of theta_s, K, J_in, B_in and B_fc.
 
     Attributes
     ----------
@@ -96,12 +96,12 @@ class RobustDTEDirect(StoredFront, Problem):
     def _evaluate(
         self, x: NDArray[np.float64], out: dict[str, Any], *args: Any, **kwargs: Any
     ) -> None:
-        found = self.moments(x)
-        gone = np.flatnonzero(np.isnan(found).any(axis=1))
+        objectives = self.moments(x)
+        gone = np.flatnonzero(np.isnan(objectives).any(axis=1))
         if gone.size:
             # A NaN objective would pass for a non-dominated one.
             raise ArithmeticError(self.without_steady_state(x[gone[0]]))
-        out["F"] = found
+        out["F"] = objectives
 
     def without_steady_state(self, design: NDArray[np.float64]) -> str:
         """Say around which design, and where, there is no steady state.
@@ -117,11 +117,11 @@ class RobustDTEDirect(StoredFront, Problem):
         """
         node = self.moments.lost(design)
         around = ", ".join(self._values(dict(zip(self.var_names, design, strict=True))))
-        found = f"no steady state around the design {around}"
+        text = f"no steady state around the design {around}"
         if node is None:
-            return found
+            return text
         where = ", ".join(self._values({name: node[name] for name in self.var_names}))
-        return f"{found}: none at {where}"
+        return f"{text}: none at {where}"
 
     def _values(self, entries: dict[str, float]) -> list[str]:
         return [f"{name} = {value:.4g} {self.units[name]}" for name, value in entries.items()]

@@ -224,14 +224,14 @@ class RobustDTEGrades(StoredFront, RobustProblem):
 
 def _classes(model: DriveModel) -> list[tuple[str, ...]]:
     """Return the error classes of the data sheet behind each line of theta_s."""
-    found = []
+    classes = []
     for order in model.kinematic_error.orders:
         names = [name for name, own in model.sheet.error_orders.items() if np.isclose(own, order)]
         if not _sources(model.sheet, names):
             allowed = "orders at which error sources of the data sheet err"
             raise InvalidInput("kinematic_error.orders", model.kinematic_error.orders, allowed)
-        found.append(tuple(names))
-    return found
+        classes.append(tuple(names))
+    return classes
 
 
 def _sources(sheet: DataSheet, classes: Sequence[str]) -> list[str]:

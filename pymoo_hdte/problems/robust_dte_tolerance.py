@@ -54,7 +54,7 @@ class RobustDTETolerance(StoredFront, RobustProblem):
     model, conditions, surrogate, nominal, var_names, obj_names, units
         As in `RobustDTE`; the tolerance and its cost are pure numbers.
     moments : VariableBandMoments
-        Of the surrogate, over designs and tolerances.
+        Moments of the surrogate, over designs and tolerances.
 
     Raises
     ------

@@ -86,14 +86,14 @@ class RobustToy(RobustProblem):
         mean, std : ndarray, shape (n,)
             Dimensionless.
         """
-        first, second, third = designs.T
+        x1, x2, x3 = designs.T
         band = self.tolerance**2 / 3.0
         variance = (
-            band * (first**2 + second**2)
-            + _NOISE[0].truncated_std ** 2 * ((3.0 - first) ** 2 + band * first**2)
-            + _NOISE[1].truncated_std ** 2 * ((third - 1.5) ** 2 + band * third**2)
+            band * (x1**2 + x2**2)
+            + _NOISE[0].truncated_std ** 2 * ((3.0 - x1) ** 2 + band * x1**2)
+            + _NOISE[1].truncated_std ** 2 * ((x3 - 1.5) ** 2 + band * x3**2)
         )
-        return first + second, np.sqrt(variance)
+        return x1 + x2, np.sqrt(variance)
 
     def _calc_pareto_set(self) -> NDArray[np.float64]:
         """Return the true set: u_2 = 1 and u_3 = (3/2) / (1 + t^2 / 3), for every u_1."""
@@ -110,5 +110,5 @@ class RobustToy(RobustProblem):
 
 def response(points: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return y, shape (n,), for points (a_1, a_2, x_1, x_2, x_3) of shape (n, 5)."""
-    first_noise, second_noise, first, second, third = points.T
-    return first + second + first_noise * (3.0 - first) + second_noise * (third - 1.5)
+    first_noise, second_noise, x1, x2, x3 = points.T
+    return x1 + x2 + first_noise * (3.0 - x1) + second_noise * (x3 - 1.5)

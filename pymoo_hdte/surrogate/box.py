@@ -195,8 +195,8 @@ class Box:
             np.minimum(_half_unit(bound), _LARGEST_MOVE * self.half_width)
             for bound in (self.lower, self.upper)
         )
-        near = (physical >= self.lower - below) & (physical <= self.upper + above)
-        settled = np.where(near, inside, physical)
+        touching = (physical >= self.lower - below) & (physical <= self.upper + above)
+        settled = np.where(touching, inside, physical)
         self.check_inside(settled)
         return settled
 

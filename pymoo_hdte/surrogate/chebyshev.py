@@ -163,7 +163,7 @@ class ChebyshevSurrogate:
         Parameters
         ----------
         path : str or path-like
-            Of the file.
+            The file.
 
         Returns
         -------

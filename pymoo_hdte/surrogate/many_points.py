@@ -35,8 +35,8 @@ class ManyPoints:
 
     def __init__(self, series: Sequence[Array]) -> None:
         self._split = series[0].ndim // 2
-        self._series = [np.ascontiguousarray(one) for one in series]
-        self._longest = max(max(one.shape) for one in series)
+        self._series = [np.ascontiguousarray(coefficients) for coefficients in series]
+        self._longest = max(max(coefficients.shape) for coefficients in series)
 
     def __call__(self, x: Array) -> Array:
         """Return the values, shape (len(series), n), at points of the cube, shape (d, n)."""
@@ -44,8 +44,8 @@ class ManyPoints:
 
         def fill(block: slice) -> None:
             basis = chebyshev_basis(x[:, block], self._longest)
-            for one, row in zip(self._series, values, strict=True):
-                row[block] = self._sum(one, basis)
+            for coefficients, row in zip(self._series, values, strict=True):
+                row[block] = self._sum(coefficients, basis)
 
         in_blocks(fill, x.shape[1], _BLOCK)
         return values

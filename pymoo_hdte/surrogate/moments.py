@@ -18,7 +18,7 @@ from pymoo_hdte.surrogate.tensor import (
     chebyshev_nodes,
     coefficients_from_nodes,
 )
-from pymoo_hdte.surrogate.threads import MANY
+from pymoo_hdte.surrogate.threads import ENOUGH_FOR_THREADS
 
 
 class ExactMoments:
@@ -88,11 +88,13 @@ class ExactMoments:
             If ``designs`` is no array of numbers of shape (n, m).
         """
         cube = self.design_box.to_cube(designs).T
-        mean, variance = (self._polynomial if cube.shape[1] < MANY else self._many)(cube)
+        mean, variance = (
+            self._polynomial if cube.shape[1] < ENOUGH_FOR_THREADS else self._many_points
+        )(cube)
         return mean, _square_root(variance)
 
     @cached_property
-    def _many(self) -> ManyPoints:
+    def _many_points(self) -> ManyPoints:
         mean, variance = self._polynomial.coefficients
         # The mean is of half the degrees of the variance.
         return ManyPoints([mean[tuple(slice((size + 1) // 2) for size in mean.shape)], variance])
@@ -136,15 +138,15 @@ def _moments_on_grid(
     mean = coefficients.reshape(1, -1)
     covariance = np.broadcast_to(0.0, (1, coefficients.size, coefficients.size))
     for axis, size in enumerate(coefficients.shape):
-        first, spread = _basis_moments(uncertainty, axis, size)
-        second = spread + first[:, :, None] * first[:, None, :]
-        rows, rest = len(mean), mean.shape[1] // size
-        parts = mean.reshape(rows, size, rest)
-        covariances = covariance.reshape(rows, size, rest, size, rest)
+        means, spread = _basis_moments(uncertainty, axis, size)
+        second = spread + means[:, :, None] * means[:, None, :]
+        rows, remaining = len(mean), mean.shape[1] // size
+        parts = mean.reshape(rows, size, remaining)
+        covariances = covariance.reshape(rows, size, remaining, size, remaining)
         total = np.einsum("iab,darbs->dirs", second, covariances)
         total += np.einsum("iab,dar,dbs->dirs", spread, parts, parts, optimize=True)
-        mean = np.einsum("ia,dar->dir", first, parts).reshape(-1, rest)
-        covariance = total.reshape(-1, rest, rest)
+        mean = np.einsum("ia,dar->dir", means, parts).reshape(-1, remaining)
+        covariance = total.reshape(-1, remaining, remaining)
     grid = [2 * coefficients.shape[axis] - 1 for axis in uncertainty.design_axes]
     return mean.reshape(grid), covariance.reshape(grid)
 
@@ -167,6 +169,6 @@ def _basis_moments(
             design.centre[design_axis] + design.half_width[design_axis] * nodes, values
         )
     basis = chebyshev_basis((points - box.centre[axis]) / box.half_width[axis], size)
-    first = basis @ weights
-    deviation = basis - first[:, :, None]
-    return first.T, np.einsum("aiq,biq,q->iab", deviation, deviation, weights)
+    means = basis @ weights
+    deviation = basis - means[:, :, None]
+    return means.T, np.einsum("aiq,biq,q->iab", deviation, deviation, weights)

@@ -32,9 +32,9 @@ class SobolIndices:
     Attributes
     ----------
     names : tuple of str, length d
-        Of the inputs.
+        Names of the inputs.
     mean, variance : float
-        Of the output, in its unit and the square of that.
+        Mean and variance of the output, in its unit and the square of that.
     first : ndarray, shape (d,)
         First-order indices: the share of the variance that is due to one input alone. The
         variance would be less by it, on average, if the input were known.
@@ -125,7 +125,7 @@ def sobol_indices_over_box(surrogate: ChebyshevSurrogate, box: Box) -> SobolIndi
     surrogate : ChebyshevSurrogate
         Polynomial in d variables, of any orders.
     box : Box
-        Of the surrogate's variables, e.g. ``surrogate.box`` itself.
+        Box of the surrogate's variables, e.g. ``surrogate.box`` itself.
 
     Returns
     -------
@@ -167,12 +167,12 @@ def _indices(surrogate: ChebyshevSurrogate, rules: Sequence[Rule]) -> SobolIndic
         variance, shares = 0.0, np.zeros_like(shares)
     else:
         shares /= variance
-    first, total = np.empty((2, shares.ndim))
+    first_order, total = np.empty((2, shares.ndim))
     for axis in range(shares.ndim):
         by_degree = np.moveaxis(shares, axis, 0).reshape(shares.shape[axis], -1)
-        first[axis] = by_degree[1:, 0].sum()
+        first_order[axis] = by_degree[1:, 0].sum()
         total[axis] = by_degree[1:].sum()
-    return SobolIndices(surrogate.box.names, mean, variance, first, total)
+    return SobolIndices(surrogate.box.names, mean, variance, first_order, total)
 
 
 def _orthonormal_coefficients(

@@ -30,8 +30,8 @@ def chebyshev_basis(x: NDArray[np.float64], size: int) -> NDArray[np.float64]:
     basis[1:2] = x
     twice = 2.0 * x
     rows = list(basis)
-    for before, last, new in zip(rows, rows[1:], rows[2:], strict=False):
-        np.multiply(twice, last, out=new)
+    for before, current, new in zip(rows, rows[1:], rows[2:], strict=False):
+        np.multiply(twice, current, out=new)
         np.subtract(new, before, out=new)
     return basis
 
@@ -135,9 +135,9 @@ def _factors(
     outputs, rows, columns = matrices.shape
     scale = np.abs(matrices).max(axis=(1, 2), keepdims=True)
     scaled = matrices / np.where(scale > 0.0, scale, 1.0)
-    left, values, right = np.linalg.svd(scaled.reshape(-1, columns), full_matrices=False)
+    left_vectors, values, right = np.linalg.svd(scaled.reshape(-1, columns), full_matrices=False)
     rank = max(1, int(np.sum(values > np.finfo(float).eps * values[0])))
-    weighted = (left[:, :rank] * values[:rank]).reshape(outputs, rows, rank) * scale
+    weighted = (left_vectors[:, :rank] * values[:rank]).reshape(outputs, rows, rank) * scale
     return weighted.transpose(0, 2, 1).reshape(-1, rows), right[:rank]
 
 

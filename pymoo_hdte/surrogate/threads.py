@@ -6,8 +6,8 @@ import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 
-MANY = 4096
-"""Designs from which on threads, and machine code that is made at its first use, pay."""
+ENOUGH_FOR_THREADS = 4096
+"""Least number of designs for which threads, and machine code made at its first use, pay."""
 _SHARES = 4
 """Shares of the work for each core: one that is kept busy by others then holds up less."""
 
@@ -33,8 +33,8 @@ def in_blocks(work: Callable[[slice], None], n: int, step: int) -> None:
         return
     count = min(_SHARES * cores, len(blocks))
 
-    def share(first: int) -> None:
-        for block in blocks[first::count]:
+    def share(offset: int) -> None:
+        for block in blocks[offset::count]:
             work(block)
 
     with ThreadPoolExecutor(cores) as threads:

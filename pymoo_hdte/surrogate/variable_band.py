@@ -112,10 +112,10 @@ class VariableBandMoments:
         for block in self._blocks(len(points)):
             rows = list(self._rows(points[block]))
             stages = self._expand([values for values, _, _ in rows])
-            first, others = np.zeros_like(stages[-1]), stages[-1].copy()
-            first[:, 0], others[:, 0] = 1.0, 0.0
+            of_mean, others = np.zeros_like(stages[-1]), stages[-1].copy()
+            of_mean[:, 0], others[:, 0] = 1.0, 0.0
             std = _deviation(stages[-1])[:, None]
-            dmean[block] = _pulled_back(first, stages, rows)
+            dmean[block] = _pulled_back(of_mean, stages, rows)
             dstd[block] = divide_or_zero(_pulled_back(others, stages, rows), std)
         return dmean, dstd
 

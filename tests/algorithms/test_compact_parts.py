@@ -102,7 +102,7 @@ def test_the_archive_has_the_front_of_all_it_was_given(rng):
 
 
 def test_the_archive_is_bounded_and_thinned_out_evenly():
-    archive = FrontArchive(40, most_spread, left=30)
+    archive = FrontArchive(40, most_spread, thinned_to=30)
     line = np.random.default_rng(2).random(2000)
     for some in line.reshape(100, 20):
         offer(archive, np.column_stack([some, 1.0 - some]))
@@ -116,7 +116,7 @@ def test_the_archive_is_bounded_and_thinned_out_evenly():
 @pytest.mark.parametrize(("offered", "kept"), [(20, 20), (21, 21), (22, 11), (40, 11)])
 def test_the_archive_is_thinned_out_once_it_is_more_than_full(offered, kept):
     """Then to what it leaves, the ends of the front among it, and no pair nearer than before."""
-    archive = FrontArchive(21, most_spread, left=11)
+    archive = FrontArchive(21, most_spread, thinned_to=11)
     line = np.linspace(0.0, 1.0, offered)
     offer(archive, np.column_stack([line, 1.0 - line]))
     members = archive.members.get("F")

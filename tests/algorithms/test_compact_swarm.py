@@ -16,7 +16,7 @@ from pymoo.optimize import minimize
 from pymoo.problems import get_problem
 from swarm_problems import Cliff, Parabolas, Unreachable, assert_clean_front, digest
 
-from experiments.studies.contest.moved_zdt import MovedZDT
+from experiments.studies.contest.problems import MovedZDT
 from pymoo_hdte.algorithms import CompactSwarm, ElitistSwarm
 from pymoo_hdte.algorithms.compact import size_for
 from pymoo_hdte.algorithms.moves import Attraction

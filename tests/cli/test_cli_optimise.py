@@ -235,7 +235,7 @@ class TestStudy:
         words = optimum_report.sentences(study)[1]
         assert f"falls from {before.mean:.2f} to {after.mean:.2f} arcsec" in words
         for gain in study.gains.values():
-            assert f"by {with_error(gain.found, 2.0 * gain.error)}" in words
+            assert f"by {with_error(gain.reduction, 2.0 * gain.error)}" in words
 
     def test_what_moves_neither_moment_is_said_to_carry_no_information(self, study):
         problem = study.problem
@@ -244,13 +244,17 @@ class TestStudy:
             along = np.tile(study.design, (3, 1))
             along[:, place] = np.linspace(problem.xl[place], problem.xu[place], 3)
             spans[name] = np.ptp(problem.evaluate(along) / study.objectives, axis=0).max()
-        assert study.free == ("B_in",) == tuple(name for name, one in spans.items() if one < 1e-3)
-        assert "No value of B_in within the box" in optimum_report.limits(study, ())[0]
+        assert (
+            study.uninfluential
+            == ("B_in",)
+            == tuple(name for name, one in spans.items() if one < 1e-3)
+        )
+        assert "B_in has no influence" in optimum_report.limits(study, ())[0]
 
     @pytest.mark.parametrize("free", [("B_in",), ("B_in", "K"), ("K", "J_in", "B_in", "B_fc")])
     def test_what_carries_no_information_is_not_headlined_with_a_number(self, study, free):
         found = replace(study)
-        vars(found)["free"] = free
+        vars(found)["uninfluential"] = free
         words, *_ = optimum_report.sentences(found)
         stated = set(re.findall(r"(\w+) \d\S* \S+ \([\N{MINUS SIGN}+]", words))
         assert stated == {*study.problem.var_names} - {*free}
@@ -267,8 +271,8 @@ class TestStudy:
     def test_gains_are_known_better_than_either_value(self, study):
         before, after = study.initial_check, study.optimum_check
         mean, std = study.gains.values()
-        assert mean.found == pytest.approx(before.mean - after.mean)
-        assert std.found == pytest.approx(before.std - after.std)
+        assert mean.reduction == pytest.approx(before.mean - after.mean)
+        assert std.reduction == pytest.approx(before.std - after.std)
         assert 0.0 < mean.error < before.mean_error + after.mean_error
         assert 0.0 < std.error < before.std_error + after.std_error
 

@@ -35,6 +35,7 @@ ARGUMENTS = {
     "identify": ["records"],
     "plan": ["model.toml", "--limits", "limits.toml"],
     "discrepancy": ["campaign"],
+    "export": ["model.toml", "--to", "urdf"],
 }
 HELD = """
 import sys, time

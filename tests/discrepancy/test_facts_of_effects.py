@@ -71,10 +71,10 @@ def test_a_covered_parameter_is_out_of_tolerance_only_beside_other_effects():
     with registered(replace(OF_SPEED, covers="input_damping")):
         (freed,) = out_of_tolerance(base, ["input_damping"], (), together=True)
         assert out_of_tolerance(base, ["input_damping"], ()) == []
-        assert freed.says == ("own_drag", "input")
+        assert freed.named_effect == ("own_drag", "input")
         assert len(DATA.corrections(freed)) > 0
     (freed,) = out_of_tolerance(base, ["input_damping"], ())
-    assert freed.says == ("parameter", "input_damping")
+    assert freed.named_effect == ("parameter", "input_damping")
 
 
 @pytest.mark.parametrize("family", ["any", "curve_of_torsion"])

@@ -11,16 +11,15 @@ from experiments.runner.campaign import Campaign
 from experiments.runner.registry import Context
 from experiments.studies.contest import swarm_parts
 from experiments.studies.contest.peers_data import committed_scores
-from experiments.studies.contest.peers_rivals import (
+from experiments.studies.contest.peers_tables import (
     FAITHFUL,
+    median_ranks,
     must_reach_table,
     nearest_rival_table,
     subsets_table,
 )
-from experiments.studies.contest.peers_tables import median_ranks
-from experiments.studies.robust.data import ahead, outcome_for
+from experiments.studies.robust.data import METHODS, OPENTURNS, OURS, ahead, outcome_for
 from experiments.studies.robust.functions import FUNCTIONS
-from experiments.studies.robust.job import METHODS, OPENTURNS, OURS
 
 
 def test_runs_of_robust_surrogates_are_those_of_the_stored_outcome(tmp_path):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from places import README, ROOT
 
-from experiments.paper_page import PAGE, in_three_sentences, page
+from experiments.paper_page import PAGE, in_short, page
 from pymoo_hdte.problems import RobustDTE
 
 
@@ -14,9 +14,9 @@ def test_the_page_is_what_the_experiments_say():
 
 
 @pytest.mark.parametrize("text", [README, (ROOT / "paper.md").read_text(encoding="utf-8")])
-def test_readme_and_paper_say_it_in_the_same_three_sentences(text):
+def test_readme_and_paper_say_it_in_the_same_sentences(text):
     words = " ".join(text.split())
-    for sentence in in_three_sentences():
+    for sentence in in_short():
         assert sentence in words
 
 

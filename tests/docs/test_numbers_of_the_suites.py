@@ -7,24 +7,24 @@ import numpy as np
 import pytest
 from PIL import Image
 from places import PAGES, ROOT, WORDS
-from pymoo.problems import get_problem
 
 from experiments.runner.campaign import Campaign
 from experiments.runner.registry import Context
 from experiments.runner.result import MISSED
 from experiments.studies.suites import data as suites
-from experiments.studies.suites.bbob.published import CITED
-from experiments.studies.suites.bbob_tables import reached
+from experiments.studies.suites.bbob_tables import CITED, reached
 from experiments.studies.suites.demands import demands
 from experiments.studies.suites.own_time import own_time_table
 from experiments.studies.suites.parts import part_tests
 from experiments.studies.suites.protocol import BUDGETS
-from experiments.studies.suites.rule import steps
-from experiments.studies.suites.suite_tables import feasible_runs, in_short
+from experiments.studies.suites.suite_tables import (
+    feasible_runs,
+    in_short,
+    ranks_together,
+    signs_together,
+)
 from experiments.studies.suites.suite_tables import ranks as suite_ranks
 from experiments.studies.suites.suite_tables import tests as rival_tests
-from experiments.studies.suites.together import ranks_together, signs_together
-from pymoo_hdte.algorithms import CompactSwarm
 
 
 def place_of_ours(ranks):
@@ -146,15 +146,6 @@ class TestNumbersOfTheSuites:
             "without mutation",
         }
         assert not found["with 50 particles", "bbob", 10_000].helps
-
-    def test_what_the_rule_came_to(self, outcome):
-        found = steps(outcome)
-        left = {step.part for step in found if step.leaves}
-        swarm = CompactSwarm().setup(get_problem("zdt1"), termination=("n_eval", 100))
-        moves = {type(move).__name__ for move in swarm.moves}
-        assert left == {"Attraction", "tolerance", "guests", "Difference"}
-        assert {step.part for step in found} - left == {"learned shares", "Exchange"}
-        assert moves == {"Exchange", "NeighbourDifference", "ModelStep"}
 
     def test_own_time(self):
         rows = {(row[0], row[1]): row[3:] for row in own_time_table().rows}

@@ -71,8 +71,8 @@ def no_doubts(patch):
 
 def one_parameter_at_a_time(patch):
     """Of base parameters out of tolerance only one is freed."""
-    patch.setattr(Search, "_parameters", lambda self: None)
-    patch.setattr(Search, "_free_beside", lambda self, one: None)
+    patch.setattr(Search, "_release_parameters", lambda self: None)
+    patch.setattr(Search, "_release_beside", lambda self, one: None)
 
 
 def rows_are_believed(patch):

@@ -15,7 +15,7 @@ import scipy.io
 
 from pymoo_hdte._io import tables
 from pymoo_hdte._io.budget import LARGEST_TOML, Budget
-from pymoo_hdte._io.text_table import read_text_table
+from pymoo_hdte._io.csv_table import read_text_table
 from pymoo_hdte._io.toml import read_toml
 from pymoo_hdte.checks import InvalidInput
 
@@ -249,7 +249,7 @@ def test_the_time_grows_in_proportion_to_the_length(tmp_path, monkeypatch):
 
 def test_a_quoted_cell_across_blocks_is_one_cell(tmp_path, monkeypatch):
     """Blocks of a few lines, cells of several: every cut between them is tried."""
-    monkeypatch.setattr("pymoo_hdte._io.text_table.BLOCK", 7)
+    monkeypatch.setattr("pymoo_hdte._io.csv_table.BLOCK", 7)
     rows = [(f"a\n{'b' * k}\n", str(k)) for k in range(40)]
     path = tmp_path / "t.csv"
     path.write_text("t,q\n" + "".join(f'"{text}",{number}\n' for text, number in rows))
@@ -257,7 +257,7 @@ def test_a_quoted_cell_across_blocks_is_one_cell(tmp_path, monkeypatch):
 
 
 def test_a_stray_quote_in_a_long_file_is_read_as_it_stands(tmp_path, monkeypatch):
-    monkeypatch.setattr("pymoo_hdte._io.text_table.BLOCK", 1_000)
+    monkeypatch.setattr("pymoo_hdte._io.csv_table.BLOCK", 1_000)
     lines = [f"{row},{row}" for row in range(4_000)]
     lines[3] = '3,3" pipe'
     path = tmp_path / "t.csv"

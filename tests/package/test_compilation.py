@@ -9,8 +9,8 @@ import pytest
 from pymoo.optimize import minimize
 
 from pymoo_hdte.algorithms import ElitistSwarm
-from pymoo_hdte.algorithms.hypervolume import _kept_of_two, _kept_of_two_in_numpy
-from pymoo_hdte.algorithms.spread import _kept, _kept_in_numpy
+from pymoo_hdte.algorithms.hypervolume import _selected_of_two, _selected_of_two_in_numpy
+from pymoo_hdte.algorithms.spread import _selected, _selected_in_numpy
 from pymoo_hdte.problems import RobustDTE
 
 NOWHERE = """
@@ -55,7 +55,7 @@ def test_without_numba_swarms_and_problems_give_the_same():
 def test_both_truncations_by_spread_keep_the_same(n_obj, size, rng):
     # Steps of a tenth give equal distances.
     scaled = np.round(rng.uniform(0.0, 1.0, (60, n_obj)), 1)
-    np.testing.assert_array_equal(_kept_in_numpy(scaled, size), _kept(scaled, size))
+    np.testing.assert_array_equal(_selected_in_numpy(scaled, size), _selected(scaled, size))
 
 
 @pytest.mark.parametrize("size", [1, 2, 7, 40])
@@ -64,6 +64,6 @@ def test_both_truncations_of_two_objectives_keep_the_same(size, rng):
     first = np.sort(np.round(rng.uniform(0.0, 4.0, 60), 1))
     scaled = np.column_stack([first, 4.0 - first])
     number = rng.permutation(60)
-    kept = _kept_of_two(scaled, number, size)
-    np.testing.assert_array_equal(_kept_of_two_in_numpy(scaled, number, size), kept)
+    kept = _selected_of_two(scaled, number, size)
+    np.testing.assert_array_equal(_selected_of_two_in_numpy(scaled, number, size), kept)
     assert np.count_nonzero(kept) == size

@@ -32,7 +32,7 @@ LOWEST_FIRST = (
         "discrepancy._report",
     ),
     *("problems._simulator", "problems._closed_form", "problems"),
-    *("algorithms", "parallel", "decision", "discrepancy", "cli"),
+    *("algorithms", "parallel", "decision", "discrepancy", "export", "cli"),
 )
 """Rooms of the package; a folder stands for the modules in it, not for the folders below it.
 
@@ -43,7 +43,7 @@ LOWEST_EXPERIMENTS_FIRST = (
     *("paper.bench", "paper.static_error", "paper.prototypes", "paper.anytime", "paper"),
     *("paper.calibrating", "paper.inference"),
     *("studies.virtual_rig", "studies.fronts", "studies.contest"),
-    *("studies.suites.formulas", "studies.suites.bbob", "studies.suites", "studies.cards"),
+    *("studies.suites.formulas", "studies.suites", "studies.cards"),
     *("studies.robust", "studies.blind.rig", "studies.blind", "studies.measured"),
     *("studies.reliability", "studies", "paper_page"),
 )

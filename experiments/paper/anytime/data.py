@@ -21,7 +21,7 @@ from experiments.published_values import TABLE_7
 from experiments.runner.campaign import Campaign
 from experiments.runner.committed import read_rows, rounded, table_with_origin
 from experiments.runner.registry import Context
-from pymoo_hdte._io.text_table import csv_text
+from pymoo_hdte._io.csv_table import csv_text
 
 NAME = "anytime"
 OF_TABLE_7 = tuple(TABLE_7)
@@ -158,10 +158,10 @@ def run_scores(campaign: Campaign, extent: Extent) -> Scores:
             seconds[*part.contested, population, algorithm] = float(np.median(times))
         for population, budget in product(extent.populations, extent.budgets):
             chosen = {(j.algorithm, j.seed): r for j, r in runs.items() if _is(j, population)}
-            found = measure(chosen, budget, population, true_front(part.contested.model))
-            for counted, algorithm in dict.fromkeys(key[:2] for key in found):
+            measured = measure(chosen, budget, population, true_front(part.contested.model))
+            for counted, algorithm in dict.fromkeys(key[:2] for key in measured):
                 case = Case(*part.contested, counted, population, budget, algorithm)
-                rows = [found[counted, algorithm, 1 + seed] for seed in range(part.seeds)]
+                rows = [measured[counted, algorithm, 1 + seed] for seed in range(part.seeds)]
                 values[case] = np.vectorize(rounded)(np.array(rows), DIGITS)
     return Scores(values, seconds)
 
@@ -205,14 +205,14 @@ def format_seconds(scores: Scores) -> str:
 
 def read_scores(path: Path, seconds_path: Path) -> Scores:
     """Read what `format_scores` and `format_seconds` wrote."""
-    found: dict[Case, list[list[float]]] = {}
+    values: dict[Case, list[list[float]]] = {}
     for row in read_rows(path):
-        found.setdefault(_case(row), []).append([float(row[name]) for name in MEASURES])
+        values.setdefault(_case(row), []).append([float(row[name]) for name in MEASURES])
     seconds = {
         (*_contested(row), int(row["population"]), row["algorithm"]): float(row["seconds"])
         for row in read_rows(seconds_path)
     }
-    return Scores({case: np.array(rows) for case, rows in found.items()}, seconds)
+    return Scores({case: np.array(rows) for case, rows in values.items()}, seconds)
 
 
 STORED = Stored(read_scores, format_scores, format_seconds)
@@ -235,6 +235,6 @@ def cases(
     Those at which nothing was counted this way are left out.
     """
     for population, budget in product(scores.populations(), scores.budgets()):
-        found = [Case(*contested, counted, population, budget, name) for name in algorithms]
-        if all(case in scores.values for case in found):
-            yield population, budget, found
+        chosen = [Case(*contested, counted, population, budget, name) for name in algorithms]
+        if all(case in scores.values for case in chosen):
+            yield population, budget, chosen

@@ -9,9 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.comparing.indicators import smaller_is_better
-from experiments.comparing.intervals import a12_intervals
 from experiments.comparing.paired import SIGNIFICANT
-from experiments.comparing.statistics import holm, wilcoxon_p
+from experiments.comparing.statistics import a12_intervals, holm, wilcoxon_p
 from experiments.paper.anytime.data import Contested, Scores, cases
 from experiments.paper.anytime.measures import NORMALISED, RAW, RETURNED, TRUE, Scale
 
@@ -61,10 +60,10 @@ def duels(
     """
     where, first, second = [], [], []
     for population, budget, (own, *others) in cases(scores, contested, [ours, *rivals], counted):
-        for other in others:
-            where.append((population, budget, other.algorithm))
+        for rival in others:
+            where.append((population, budget, rival.algorithm))
             first.append(scores.of(own, COMPARED[indicator]))
-            second.append(scores.of(other, COMPARED[indicator]))
+            second.append(scores.of(rival, COMPARED[indicator]))
     a, b = np.array(first), np.array(second)
     sign = -1.0 if smaller_is_better(indicator) else 1.0
     better, low, high = a12_intervals(sign * a, sign * b).T.tolist()

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from pymoo.core.problem import Problem
 
 from experiments.comparing.indicators import front_among
-from experiments.comparing.offers import at_budgets
+from experiments.comparing.peers_pymoo import at_budgets
 from experiments.comparing.runs import (
     ALGORITHMS,
     AS_PRINTED,
@@ -64,10 +64,10 @@ class AnytimeRun:
         together = self.algorithm in UNSCHEDULED
         runs = [self.budgets] if together else [(budget,) for budget in self.budgets]
         started = time.perf_counter()
-        found = [one for budgets in runs for one in self._stages(budgets)]
+        stages = [stage for budgets in runs for stage in self._stages(budgets)]
         seconds = time.perf_counter() - started
         rows = []
-        for budget, (X, F) in zip(self.budgets, found, strict=True):
+        for budget, (X, F) in zip(self.budgets, stages, strict=True):
             kept = final_rows(F)
             exact = robust_problem(self.model).evaluate(X[kept])
             rows.append(np.column_stack([np.full(len(kept), budget), F[kept], exact]))

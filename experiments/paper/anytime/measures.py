@@ -71,14 +71,18 @@ def measure(
     measured = {}
     for (counting, most), (who, run) in product(counted.items(), runs.items()):
         as_seen, as_is = sets_of(run, budget, most)
-        found = {
-            scale: _indicators_of(one, as_is if scale.reference == TRUE else as_seen)
-            for scale, one in against.items()
+        indicators = {
+            scale: _indicators_of(indicators_of, as_is if scale.reference == TRUE else as_seen)
+            for scale, indicators_of in against.items()
         }
         measured[counting, *who] = [
             float(len(as_seen)),
-            *(value for scale in SCALES for value in (found[scale].igd, found[scale].spacing)),
-            *(found[scale].hypervolume for scale in SCALES if scale.unit == NORMALISED),
+            *(
+                value
+                for scale in SCALES
+                for value in (indicators[scale].igd, indicators[scale].spacing)
+            ),
+            *(indicators[scale].hypervolume for scale in SCALES if scale.unit == NORMALISED),
         ]
     return measured
 

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.comparing.intervals import mean_of_known, paired_interval
+from experiments.comparing.statistics import mean_of_known, paired_interval
 from experiments.paper.anytime.data import OF_TABLE_7, Case, Contested, Scores
 from experiments.paper.anytime.measures import EQUAL, RETURNED, SCALES, Scale
 from experiments.published_values import TABLE_7
@@ -56,7 +56,7 @@ class Reading(NamedTuple):
         """Return the interval of the factor from resampled seeds; NaN if a run has no value."""
 
         def factor(*runs: NDArray[np.float64], axis: int) -> NDArray[np.float64]:
-            means = np.stack([one.mean(axis=axis) for one in runs], axis=-1)
+            means = np.stack([path.mean(axis=axis) for path in runs], axis=-1)
             return np.exp(np.sqrt(np.mean(np.log(means / PRINTED.ravel()) ** 2, axis=-1)))
 
         return paired_interval(self.runs.reshape(PRINTED.size, -1), factor)
@@ -64,8 +64,11 @@ class Reading(NamedTuple):
 
 def readings(scores: Scores) -> list[Reading]:
     """Return all readings, the closest first; one with a mean that has no value is left out."""
-    found = [_reading(scores, *entry) for entry in _ways(scores)]
-    return sorted((one for one in found if np.isfinite(one.factor)), key=lambda one: one.factor)
+    judged = [_reading(scores, *entry) for entry in _ways(scores)]
+    return sorted(
+        (finding for finding in judged if np.isfinite(finding.factor)),
+        key=lambda finding: finding.factor,
+    )
 
 
 def _ways(scores: Scores) -> Iterable[tuple[Contested, str, int, int, Scale]]:

@@ -4,36 +4,174 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from itertools import groupby
+from typing import NamedTuple
 
 import numpy as np
 
 from experiments.comparing.indicators import NAMES
 from experiments.comparing.runs import AS_PRINTED
-from experiments.paper.anytime.data import Case, Contested, Scores
-from experiments.paper.anytime.duels import COMPARED, Duel
-from experiments.paper.anytime.leads import leads_sentence, who_finds
+from experiments.paper.anytime.data import OF_TABLE_7, Case, Contested, Scores, cases
+from experiments.paper.anytime.duels import COMPARED, Duel, duels
 from experiments.paper.anytime.measures import EQUAL, RETURNED
 from experiments.paper.anytime.moments import EXACT
 from experiments.paper.anytime.readings import Reading
 from experiments.paper.anytime.tables import (
     OURS,
     RIVALS,
+    SCALE,
     STATED,
+    WHERE,
     Contest,
     Contests,
     drawn,
+    exactly,
     standing,
     stated_place,
 )
-from experiments.runner.result import AT_EVERY_BUDGET, Finding, significant
+from experiments.runner.result import AT_EVERY_BUDGET, Cell, Column, Finding, Table, significant
+
+EVERY_RIVAL = ("MOPSO", "A-MOPSO", "MP-MOPSO", "NSGA-II")
+BUDGETS = (200, 2000)
+"""Range of evaluations counted: before the first, sets of two designs; after, all are alike."""
+
+
+AWAY = 0.05
+"""Normalised IGD above which a run misses the front: the distance at which Table 7's page counts a
+piece of the front as lost."""
+
+
+class Lead(NamedTuple):
+    """In how many cells, populations times budgets, AMP-MOPSO is ahead of a rival and behind it."""
+
+    rival: str
+    ahead: int
+    behind: int
+
+
+class Totals(NamedTuple):
+    """Over all drive models: cells, those ahead of each rival, and those in the printed order."""
+
+    cells: int
+    ahead: dict[str, int]
+    in_order: int
+
+
+def leads(scores: Scores, contested: Contested) -> list[Lead]:
+    """Count the cells below 100 particles in which the mean IGD differs beyond chance.
+
+    Beyond chance is Wilcoxon's test at 5 % after Holm's correction over the cells of a rival.
+    """
+    return [
+        Lead(rival, *(sum(duel.ahead == sign for duel in entries) for sign in (1, -1)))
+        for rival in EVERY_RIVAL
+        for entries in [
+            [
+                duel
+                for duel in duels(scores, contested, OURS, [rival], "igd")
+                if _counts(duel.population, duel.evaluations)
+            ]
+        ]
+    ]
+
+
+def cells_in_order(scores: Scores, contested: Contested) -> tuple[int, int]:
+    """Return in how many cells the mean IGDs come in the printed order, and of how many.
+
+    The paper prints NSGA-II worst, then MOPSO, then AMP-MOPSO.
+    """
+    ordered = [
+        np.all(np.diff([scores.of(case, COMPARED["igd"]).mean() for case in of_cell]) < 0.0)
+        for population, budget, of_cell in cases(scores, contested, OF_TABLE_7)
+        if _counts(population, budget)
+    ]
+    return int(np.sum(ordered)), len(ordered)
+
+
+def runs_that_find(scores: Scores, contested: Contested, algorithm: str) -> tuple[int, int]:
+    """Return how many runs at the stated setting find the true front, and of how many."""
+    case = Case(*contested, RETURNED, *STATED, algorithm)
+    igd = scores.of(case, f"igd_{SCALE.suffix}")
+    return int(np.sum(igd <= AWAY)), len(igd)
+
+
+def who_finds(scores: Scores, contested: Contested) -> str:
+    """Say which algorithms of Table 7 find the front at the stated setting; no full stop."""
+    parts = []
+    for algorithm in OF_TABLE_7:
+        counts, runs = runs_that_find(scores, contested, algorithm)
+        share = "all" if counts == runs else f"{counts or 'none'} of"
+        parts.append(f"{algorithm} in {share} {runs} runs")
+    return f"the front is found by {', '.join(parts[:-1])} and {parts[-1]}"
+
+
+def _counts(population: int, evaluations: int) -> bool:
+    return population < STATED[0] and BUDGETS[0] <= evaluations <= BUDGETS[1]
+
+
+def leads_table(scores: Scores) -> Table:
+    """Say what either law of velocities does to the lead of AMP-MOPSO below 100 particles."""
+    rows: list[tuple[Cell, ...]] = []
+    for contested in exactly(scores):
+        cells, n_cells = cells_in_order(scores, contested)
+        counts = [count for lead in leads(scores, contested) for count in lead[1:]]
+        rows.append((contested.model, contested.velocity, n_cells, *counts, cells))
+    words = ("ahead", "behind")
+    return Table(
+        "leads",
+        f"Below 100 particles, {BUDGETS[0]} to {BUDGETS[1]:,} evaluations: in how many cells "
+        f"{OURS} is ahead by IGD, beyond chance",
+        (
+            *WHERE,
+            Column("cells"),
+            *(Column(word, group=f"of {rival}") for rival in EVERY_RIVAL for word in words),
+            Column("printed order"),
+        ),
+        tuple(rows),
+        note="A cell is a population and a budget. The printed order is AMP-MOPSO before MOPSO "
+        "before NSGA-II in the mean IGD.",
+        findings=tuple(
+            Finding(2 * cells > n_cells, sentence)
+            for contested in exactly(scores)
+            for cells, n_cells in [cells_in_order(scores, contested)]
+            for sentence in [
+                f"On {contested.model} with velocities drawn {drawn(contested)}, the paper's "
+                f"order AMP-MOPSO, MOPSO, NSGA-II holds in {cells} of {n_cells} cells below 100 "
+                "particles."
+            ]
+        ),
+    )
+
+
+def totals_of(scores: Scores, velocity: str) -> Totals:
+    """Add up over the drive models that were run under a law of velocities."""
+    n_cells = in_order = 0
+    ahead = dict.fromkeys(EVERY_RIVAL, 0)
+    for contested in exactly(scores):
+        if contested.velocity == velocity:
+            cells, of_all = cells_in_order(scores, contested)
+            in_order, n_cells = in_order + cells, n_cells + of_all
+            for lead in leads(scores, contested):
+                ahead[lead.rival] += lead.ahead
+    return Totals(n_cells, ahead, in_order)
+
+
+def leads_sentence(scores: Scores) -> str:
+    """Say in how many cells AMP-MOPSO leads as printed, over all drive models; no full stop."""
+    totals = totals_of(scores, AS_PRINTED)
+    counts = ", ".join(f"of {rival} in {count}" for rival, count in totals.ahead.items())
+    return (
+        f"of {totals.cells} cells below 100 particles, {OURS} is ahead {counts}, and the paper's "
+        f"order of the three holds in {totals.in_order}"
+    )
+
 
 SPOKEN_OF = Contested("calibrated", EXACT, AS_PRINTED)
 """What the first sentence of the report speaks of."""
 
 
-def advantage_findings(found: Contests) -> Iterator[Finding]:
+def advantage_findings(contests: Contests) -> Iterator[Finding]:
     """Say where AMP-MOPSO is ahead of both rivals, and how it stands at the stated setting."""
-    for contest, entries in found.items():
+    for contest, entries in contests.items():
         at_stated = _of_stated(entries)
         if contest.indicator == "hypervolume" or not at_stated:
             continue
@@ -74,8 +212,8 @@ def settings_ahead(entries: Sequence[Duel]) -> str:
 
 
 def _listed(populations: Sequence[int]) -> str:
-    *first, last = map(str, populations)
-    return f"{', '.join(first)} or {last} particles" if first else f"{last} particles"
+    *smallest, largest = map(str, populations)
+    return f"{', '.join(smallest)} or {largest} particles" if smallest else f"{largest} particles"
 
 
 def _span(budgets: Sequence[int]) -> str:
@@ -120,33 +258,33 @@ def number_of_designs(scores: Scores, ranked: Sequence[Reading]) -> str:
     )
 
 
-def _lead(scores: Scores, one: Reading, counted: str) -> float:
+def _lead(scores: Scores, reading: Reading, counted: str) -> float:
     """Return how many times AMP-MOPSO's mean IGD NSGA-II's is; NaN if that was not counted."""
     means = []
     for algorithm in ("NSGA-II", OURS):
-        case = Case(*one.contested, counted, one.population, one.evaluations, algorithm)
+        case = Case(*reading.contested, counted, reading.population, reading.evaluations, algorithm)
         if case not in scores.values:
             return np.nan
-        means.append(scores.of(case, f"igd_{one.scale.suffix}").mean())
+        means.append(scores.of(case, f"igd_{reading.scale.suffix}").mean())
     return float(means[0] / means[1])
 
 
-def _setting(one: Reading) -> str:
-    unit = "in arcsec" if one.scale.unit == "arcsec" else one.scale.unit
+def _setting(reading: Reading) -> str:
+    unit = "in arcsec" if reading.scale.unit == "arcsec" else reading.scale.unit
     return (
-        f"{one.population} particles after {one.evaluations:,} evaluations "
-        f"({one.contested.model}, {one.contested.moments} moments, velocities drawn "
-        f"{drawn(one.contested)}, against the {one.scale.reference}, {unit})"
+        f"{reading.population} particles after {reading.evaluations:,} evaluations "
+        f"({reading.contested.model}, {reading.contested.moments} moments, velocities drawn "
+        f"{drawn(reading.contested)}, against the {reading.scale.reference}, {unit})"
     )
 
 
-def opening(scores: Scores, found: Contests, ranked: Sequence[Reading]) -> str:
+def opening(scores: Scores, contests: Contests, ranked: Sequence[Reading]) -> str:
     """Return the first sentences of the report, about the stated setting where it was run."""
-    at_stated = _of_stated(found.get(Contest(SPOKEN_OF, "igd"), []))
+    at_stated = _of_stated(contests.get(Contest(SPOKEN_OF, "igd"), []))
     if not at_stated:
         return f"O{leads_sentence(scores)[1:]}."
     igd, spacing = (
-        settings_ahead(found[Contest(SPOKEN_OF, indicator)]) or "nowhere"
+        settings_ahead(contests[Contest(SPOKEN_OF, indicator)]) or "nowhere"
         for indicator in ("igd", "spacing")
     )
     return (
@@ -156,9 +294,9 @@ def opening(scores: Scores, found: Contests, ranked: Sequence[Reading]) -> str:
     )
 
 
-def first_page(scores: Scores, found: Contests) -> dict[str, str]:
+def first_page(scores: Scores, contests: Contests) -> dict[str, str]:
     """Return what holds of Table 7, and what does not, as a part of the first page."""
-    entries = found.get(Contest(SPOKEN_OF, "igd"), [])
+    entries = contests.get(Contest(SPOKEN_OF, "igd"), [])
     at_stated = _of_stated(entries)
     if not at_stated:
         return {}

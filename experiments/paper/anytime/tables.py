@@ -9,8 +9,8 @@ from typing import NamedTuple
 import numpy as np
 
 from experiments.comparing.indicators import NAMES
-from experiments.comparing.intervals import mean_intervals
 from experiments.comparing.runs import AS_PRINTED
+from experiments.comparing.statistics import mean_intervals
 from experiments.paper.anytime.data import OF_TABLE_7, Case, Contested, Scores
 from experiments.paper.anytime.duels import COMPARED, Duel, duels
 from experiments.paper.anytime.measures import EQUAL, NORMALISED, RETURNED, TRUE, Scale
@@ -210,10 +210,10 @@ def _range(low: float, high: float) -> str | None:
 
 def readings_table(ranked: Sequence[Reading], findings: Sequence[Finding], note: str) -> Table:
     """List the readings that come closest to the printed numbers, and the stated setting."""
-    kept = list(range(min(SHOWN, len(ranked))))
+    shown = list(range(min(SHOWN, len(ranked))))
     stated = stated_place(ranked)
-    if stated is not None and stated not in kept:
-        kept.append(stated)
+    if stated is not None and stated not in shown:
+        shown.append(stated)
     columns = (
         Column("place"),
         *CONTESTED,
@@ -228,7 +228,7 @@ def readings_table(ranked: Sequence[Reading], findings: Sequence[Finding], note:
     )
     paper: tuple[Cell, ...] = ("the paper", *[None] * (len(CONTESTED) + 3), *STATED)
     rows = [(*paper, *PRINTED.T.ravel().tolist(), None, None, None, "kept")]
-    rows += [_reading_row(place, ranked[place]) for place in kept]
+    rows += [_reading_row(place, ranked[place]) for place in shown]
     return Table(
         "readings",
         f"Readings of Table 7 by closeness to its six numbers, {len(ranked)} in all",
@@ -242,22 +242,24 @@ def readings_table(ranked: Sequence[Reading], findings: Sequence[Finding], note:
 
 def stated_place(ranked: Sequence[Reading]) -> int | None:
     """Return the place, from 0, of the closest reading at the stated setting, if it was run."""
-    places = (i for i, one in enumerate(ranked) if (one.population, one.evaluations) == STATED)
+    places = (
+        i for i, reading in enumerate(ranked) if (reading.population, reading.evaluations) == STATED
+    )
     return next(places, None)
 
 
-def _reading_row(place: int, one: Reading) -> tuple[Cell, ...]:
+def _reading_row(place: int, reading: Reading) -> tuple[Cell, ...]:
     return (
         f"{place + 1}",
-        *one.contested,
-        one.scale.reference,
-        one.scale.unit,
-        one.counted,
-        one.population,
-        one.evaluations,
-        *one.means.T.ravel().tolist(),
-        one.factor,
-        _range(*one.factor_interval()),
-        one.shape_factor,
-        "kept" if one.in_order else "not kept",
+        *reading.contested,
+        reading.scale.reference,
+        reading.scale.unit,
+        reading.counted,
+        reading.population,
+        reading.evaluations,
+        *reading.means.T.ravel().tolist(),
+        reading.factor,
+        _range(*reading.factor_interval()),
+        reading.shape_factor,
+        "kept" if reading.in_order else "not kept",
     )

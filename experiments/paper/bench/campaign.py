@@ -112,9 +112,9 @@ def _loading(values: dict[str, float]) -> dict[str, float]:
 def _identified_stds(stds: dict[str, float]) -> dict[str, float]:
     step = stds["K"]
     ends = [TORSION.loading_stiffness(NOMINAL_STIFFNESS + sign * step) for sign in (-1.0, 1.0)]
-    found = {"K": (ends[1] - ends[0]) / 2.0}
+    values = {"K": (ends[1] - ends[0]) / 2.0}
     noises = {"B_in": INPUT_BEARING, "B_fc": COMPLETE_DRIVE, "B_out": OUTPUT_BEARING}
     for name, bench in noises.items():
         error = bench.torque_noise * slope_error_per_noise(name)
-        found[name] = (stds[name] ** 2 + error**2 / N_REPEATS) ** 0.5
-    return found
+        values[name] = (stds[name] ** 2 + error**2 / N_REPEATS) ** 0.5
+    return values

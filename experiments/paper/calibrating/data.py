@@ -8,10 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
-from experiments.paper.calibrating.fitting import Bootstrap, Fit
+from experiments.paper.calibrating.fitting import TRAITS, Bootstrap, Fit
 from experiments.paper.calibrating.ladder import EFFECTS, Candidate, ladder_rungs
 from experiments.paper.calibrating.predictions import PUBLISHED
-from experiments.paper.calibrating.trade_off import TRAITS
 from experiments.runner.campaign import Run
 from experiments.runner.committed import read_rows, table_with_origin
 
@@ -88,11 +87,17 @@ def format_outcomes(outcomes: Sequence[Outcome]) -> str:
     """Return the CSV text of outcomes, with date and versions in a first comment line."""
     parameters = list(Candidate(EFFECTS, "peak_to_peak", "R1").bounds)
     rows = []
-    for one in outcomes:
-        identity = (one.kind, one.direction, one.candidate.name, one.seed, one.budget)
-        numbers = [one.chi_square, *(one.parameters.get(name) for name in parameters)]
-        numbers += [one.predictions[name] for name in PUBLISHED]
-        numbers += [one.traits[name] for name in TRAITS]
+    for outcome in outcomes:
+        identity = (
+            outcome.kind,
+            outcome.direction,
+            outcome.candidate.name,
+            outcome.seed,
+            outcome.budget,
+        )
+        numbers = [outcome.chi_square, *(outcome.parameters.get(name) for name in parameters)]
+        numbers += [outcome.predictions[name] for name in PUBLISHED]
+        numbers += [outcome.traits[name] for name in TRAITS]
         rows.append([*identity, *("" if n is None else f"{n:.7g}" for n in numbers)])
     return table_with_origin([*_IDENTITY, *parameters, *PUBLISHED, *TRAITS], rows)
 

@@ -44,12 +44,14 @@ def run(context: Context) -> Result:
     best = best_rungs(outcomes, "table8")[0]
     first, numbers = of_the_first_page(best), numbers_table(best)
     plain = simplest_table(outcomes)
-    answers = [one for table in (numbers, plain) for one in table.findings if one.answers]
-    told = " ".join(one.sentence for one in answers)
+    answers = [
+        finding for table in (numbers, plain) for finding in table.findings if finding.answers
+    ]
+    sentences = " ".join(finding.sentence for finding in answers)
     return Result(
         title="Calibration: what the printed equations lack",
         command=context.command("calibration"),
-        answer=f"{first[0].upper()}{first[1:]}. {told}",
+        answer=f"{first[0].upper()}{first[1:]}. {sentences}",
         paragraphs=(*stored_outcome(context, "calibration"), SETTING),
         tables=(
             numbers,

@@ -10,12 +10,44 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import differential_evolution, least_squares
+from scipy.stats import sobol_indices, uniform
 
 from experiments.paper.calibrating.ladder import Candidate
 from experiments.paper.calibrating.predictions import FITS, PUBLISHED, UNCERTAINTY, predict
-from experiments.paper.calibrating.trade_off import TRAITS, front_traits
 from experiments.runner.campaign import Run
-from pymoo_hdte.drive import UnstableDrive
+from pymoo_hdte.drive import DriveModel, UnstableDrive
+from pymoo_hdte.problems import RobustDTE
+
+_FRONT_SAMPLE = 20_000
+_SHARE_SAMPLE = 1024
+_VARIABLES = ("K", "J_in", "B_in", "B_fc")
+
+WIDTHS = ("front_mean_width", "front_std_width")
+SHARES = tuple(f"{objective}_share_{name}" for objective in ("mean", "std") for name in _VARIABLES)
+TRAITS = (*WIDTHS, *SHARES)
+
+
+def front_traits(model: DriveModel) -> dict[str, float]:
+    """Return the width of the Pareto front in arcsec, and total Sobol shares over the design box.
+
+    The width is that of the non-dominated ones among random designs; the shares are those of each
+    design variable in the variance of either objective, designs being uniform in the box.
+    """
+    problem = RobustDTE(model)
+    width = problem.xu - problem.xl
+    designs = problem.xl + np.random.default_rng(1).random((_FRONT_SAMPLE, problem.n_var)) * width
+    objectives = problem.evaluate(designs)
+    rising = objectives[np.argsort(objectives[:, 0], kind="stable")]
+    front = rising[rising[:, 1] <= np.minimum.accumulate(rising[:, 1])]
+    indices = sobol_indices(
+        func=lambda cube: problem.evaluate(problem.xl + cube.T * width).T,
+        n=_SHARE_SAMPLE,
+        dists=[uniform()] * problem.n_var,
+        rng=np.random.default_rng(1),
+    )
+    values = [*np.ptp(front, axis=0), *indices.total_order.ravel()]
+    return dict(zip(TRAITS, map(float, values), strict=True))
+
 
 UNSTABLE_RESIDUAL = 1e3
 """Residual given to every number of a model that has no steady state."""
@@ -133,10 +165,10 @@ def _residuals(candidate: Candidate, direction: str, targets: dict[str, float]) 
     def residuals(searched: NDArray[np.float64]) -> NDArray[np.float64]:
         model = candidate.model(candidate.physical(searched))
         try:
-            found = predict(model, candidate.bands, names)
+            predictions = predict(model, candidate.bands, names)
         except UnstableDrive:
             return np.full(len(names), UNSTABLE_RESIDUAL)
-        return np.array([(found[name] - targets[name]) / UNCERTAINTY[name] for name in names])
+        return np.array([(predictions[name] - targets[name]) / UNCERTAINTY[name] for name in names])
 
     return residuals
 
@@ -152,7 +184,7 @@ def _global_search(
         # The logarithm keeps distant members comparable, but they do not dominate the search.
         return float(np.log1p(np.sum(residuals(searched) ** 2)))
 
-    found = differential_evolution(
+    ended = differential_evolution(
         cost,
         list(zip(low, high, strict=True)),
         init=low + rng.random((budget.population, len(low))) * (high - low),
@@ -161,7 +193,7 @@ def _global_search(
         polish=False,
         rng=rng,
     )
-    return found.population[np.argsort(found.population_energies, kind="stable")]
+    return ended.population[np.argsort(ended.population_energies, kind="stable")]
 
 
 def _refine(
@@ -170,7 +202,7 @@ def _refine(
     """Return chi-square and place of the local optimum near ``start``."""
     low, high = np.array(list(candidate.bounds.values())).T
     margin = 1e-9 * (high - low)
-    found = least_squares(
+    ended = least_squares(
         residuals,
         np.clip(start, low + margin, high - margin),
         bounds=(low, high),
@@ -178,7 +210,7 @@ def _refine(
         diff_step=1e-4,
         max_nfev=budget.local_evaluations,
     )
-    return 2.0 * float(found.cost), found.x
+    return 2.0 * float(ended.cost), ended.x
 
 
 def _as_run(rows: Sequence[dict[str, float]], seconds: float) -> Run:

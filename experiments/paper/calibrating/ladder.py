@@ -85,12 +85,12 @@ class Candidate:
     @property
     def bounds(self) -> dict[str, tuple[float, float]]:
         """The open parameters with their ranges, on the scale that is searched."""
-        found = dict(_SHAPE)
+        bounds = dict(_SHAPE)
         for effect in self.effects:
-            found |= _OF_EFFECT[effect]
+            bounds |= _OF_EFFECT[effect]
         return {
             name: (float(np.log(low)), float(np.log(high))) if name in LOGARITHMIC else (low, high)
-            for name, (low, high) in found.items()
+            for name, (low, high) in bounds.items()
         }
 
     def physical(self, searched: Sequence[float] | NDArray[np.float64]) -> dict[str, float]:

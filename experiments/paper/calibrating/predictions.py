@@ -14,7 +14,7 @@ from numpy.polynomial.legendre import leggauss
 from numpy.typing import NDArray
 
 from experiments.paper.calibrating.ladder import NARROW, WIDE
-from experiments.paper.quadrature import Rule, tensor_rule, weighted_moments
+from experiments.paper.scatter import Rule, tensor_rule, weighted_moments
 from experiments.published_values import TABLE_5, TABLE_6, TABLE_8, TABLE_9
 from pymoo_hdte.drive import PARAMETERS, DriveModel, OrderSpectrum
 from pymoo_hdte.problems.drive_response import SURROGATE_BOX, theta_s_scatter
@@ -96,16 +96,16 @@ def surrogate_moments(model: DriveModel, bands: str, order: int) -> dict[str, fl
     Its box is that of `RobustDTE`: theta_s over mean +- 3 std, the others +-35 %.
     """
     surrogate = _fit(model, uncertain_box(model, WIDE), order)
-    found = {}
+    predictions = {}
     for design, values in {"initial": tuple(model.nominal[1:]), **TABLE_9}.items():
         band = BAND["initial" if design == "initial" else "optimum"][bands]
         rules = _scatter_rules(model, np.array([0.0, *values])[_COLUMNS[1:]], band, 2 * order)
-        found[f"mean_{design}"], found[f"std_{design}"] = _moments(surrogate, rules)
+        predictions[f"mean_{design}"], predictions[f"std_{design}"] = _moments(surrogate, rules)
     box = uncertain_box(model, bands)
     nodes, weights = leggauss(order + 1)
     spans = [(box.centre[axis] + box.half_width[axis] * nodes) for axis in _COLUMNS]
-    found["box_std"] = _moments(surrogate, [(span, weights / 2.0) for span in spans])[1]
-    return found
+    predictions["box_std"] = _moments(surrogate, [(span, weights / 2.0) for span in spans])[1]
+    return predictions
 
 
 def prototype_dte(model: DriveModel) -> NDArray[np.float64]:

@@ -61,17 +61,19 @@ class RigidDrive:
         """Return the nine numbers of `TABLE_8_AND_BOX`, arcsec."""
         nominal = preset("published").nominal
         mean, std = float(nominal[0]) / ARCSEC, self.std_arcsec * _truncation()
-        found = {}
+        predictions = {}
         for design in TABLE_8:
             initial = design == "initial"
             stiffness = nominal[STIFFNESS] if initial else TABLE_9[design][STIFFNESS - 1]
             band = BAND["initial" if initial else "optimum"][self.bands]
             moments = self._moments(mean, std, stiffness, band)
-            found[f"mean_{design}"], found[f"std_{design}"] = moments
+            predictions[f"mean_{design}"], predictions[f"std_{design}"] = moments
         # Uniform over the box of Table 5: theta_s over mean +- 3 std, or +-35 % of its mean.
         reach = 3.0 * self.std_arcsec if self.bands == WIDE else SURROGATE_BOX * mean
-        found["box_std"] = self._moments(mean, reach / 3**0.5, nominal[STIFFNESS], SURROGATE_BOX)[1]
-        return {name: found[name] for name in TABLE_8_AND_BOX}
+        predictions["box_std"] = self._moments(
+            mean, reach / 3**0.5, nominal[STIFFNESS], SURROGATE_BOX
+        )[1]
+        return {name: predictions[name] for name in TABLE_8_AND_BOX}
 
     def prototypes(self) -> NDArray[np.float64]:
         """Return the DTE of the five prototypes of Table 6, arcsec."""
@@ -117,13 +119,15 @@ def fit_rigid(bands: str) -> RigidDrive:
         share, std = map(float, values)
         return RigidDrive(share, std, bands)
 
-    found = least_squares(lambda values: _residuals(drive(values)), START, x_scale=START)
-    return drive(found.x)
+    solution = least_squares(lambda values: _residuals(drive(values)), START, x_scale=START)
+    return drive(solution.x)
 
 
 def simplest() -> RigidDrive:
     """Return the better one of the two readings of the bands."""
-    return min((fit_rigid(bands) for bands in (NARROW, WIDE)), key=lambda one: one.chi_square)
+    return min(
+        (fit_rigid(bands) for bands in (NARROW, WIDE)), key=lambda outcome: outcome.chi_square
+    )
 
 
 def _residuals(drive: RigidDrive) -> NDArray[np.float64]:

@@ -15,6 +15,7 @@ from experiments.paper.calibrating.data import (
     information_criteria,
     largest_gap,
 )
+from experiments.paper.calibrating.fitting import WIDTHS
 from experiments.paper.calibrating.ladder import NARROW, WIDE, ladder_rungs
 from experiments.paper.calibrating.predictions import (
     FITS,
@@ -25,7 +26,6 @@ from experiments.paper.calibrating.predictions import (
     surrogate_moments,
 )
 from experiments.paper.calibrating.rigid import N_PARAMETERS, RigidDrive, fit_rigid, simplest
-from experiments.paper.calibrating.trade_off import WIDTHS
 from experiments.runner.result import Cell, Column, Finding, Table, significant
 from pymoo_hdte.drive import preset
 
@@ -44,9 +44,11 @@ EXACT_ORDER = 6
 
 def best_rungs(outcomes: Sequence[Outcome], direction: str) -> list[Outcome]:
     """Return the best fit of every rung in one direction, by rising chi-square."""
-    fits = [one for one in outcomes if one.kind == "fit" and one.direction == direction]
+    fits = [
+        outcome for outcome in outcomes if outcome.kind == "fit" and outcome.direction == direction
+    ]
     best: dict[str, Outcome] = {}
-    for outcome in sorted(fits, key=lambda one: one.chi_square):
+    for outcome in sorted(fits, key=lambda outcome: outcome.chi_square):
         best.setdefault(outcome.candidate.name, outcome)
     return list(best.values())
 
@@ -131,9 +133,9 @@ def of_the_first_page(best: Outcome) -> str:
     )
 
 
-def _bic(one: Outcome) -> float:
-    numbers = len(FITS[one.direction])
-    return information_criteria(one.chi_square, one.n_parameters, numbers)[1]
+def _bic(outcome: Outcome) -> float:
+    numbers = len(FITS[outcome.direction])
+    return information_criteria(outcome.chi_square, outcome.n_parameters, numbers)[1]
 
 
 def _bic_of(drive: RigidDrive) -> float:
@@ -154,10 +156,10 @@ def simplest_table(outcomes: Sequence[Outcome]) -> Table:
         )
         for bands in (WIDE, NARROW)
     ]
-    for one in dict.fromkeys((best.candidate, cheapest.candidate)):
-        (outcome,) = (rung for rung in ladder if rung.candidate == one)
+    for candidate in dict.fromkeys((best.candidate, cheapest.candidate)):
+        (outcome,) = (rung for rung in ladder if rung.candidate == candidate)
         effects, reading, bands = _rung(outcome)
-        values = prototype_dte(one.model(outcome.parameters))
+        values = prototype_dte(candidate.model(outcome.parameters))
         label = f"{effects}; theta_s as {reading}, bands {bands}"
         rows.append(_simplest_row(label, outcome.n_parameters, outcome.chi_square, values))
     measured = (
@@ -246,12 +248,14 @@ def ladder_table(outcomes: Sequence[Outcome], direction: str, title: str) -> Tab
     fitted = best_rungs(outcomes, direction)
     title = f"The ladder, {title}: {len(fitted)} of {len(ladder_rungs())} rungs"
     rows: list[tuple[Cell, ...]] = []
-    for one in fitted:
-        widths = [one.traits[name] for name in WIDTHS]
-        criteria = information_criteria(one.chi_square, one.n_parameters, len(FITS[direction]))
-        gaps_of = one.gap(FITS[direction]), one.gap(unseen)
-        rows.append((*_rung(one), one.n_parameters, one.chi_square, *criteria, *gaps_of,
-                     *widths, _matter(one)))  # fmt: skip
+    for outcome in fitted:
+        widths = [outcome.traits[name] for name in WIDTHS]
+        criteria = information_criteria(
+            outcome.chi_square, outcome.n_parameters, len(FITS[direction])
+        )
+        gaps_of = outcome.gap(FITS[direction]), outcome.gap(unseen)
+        rows.append((*_rung(outcome), outcome.n_parameters, outcome.chi_square, *criteria, *gaps_of,
+                     *widths, _matter(outcome)))  # fmt: skip
     columns = (
         Column("effects"),
         Column("theta_s"),
@@ -272,26 +276,26 @@ def ladder_table(outcomes: Sequence[Outcome], direction: str, title: str) -> Tab
                       f"the design box is at least {MATTERS:g}.")  # fmt: skip
 
 
-def _rung(one: Outcome) -> tuple[str, str, str]:
-    effects = ", ".join(name.replace("_", " ") for name in one.candidate.effects) or "none"
-    return effects, one.candidate.reading.replace("_", " "), one.candidate.bands
+def _rung(outcome: Outcome) -> tuple[str, str, str]:
+    effects = ", ".join(name.replace("_", " ") for name in outcome.candidate.effects) or "none"
+    return effects, outcome.candidate.reading.replace("_", " "), outcome.candidate.bands
 
 
-def _matter(one: Outcome) -> str:
+def _matter(outcome: Outcome) -> str:
     names = [
         name
         for name in VARIABLES
-        if max(one.traits[f"mean_share_{name}"], one.traits[f"std_share_{name}"]) >= MATTERS
+        if max(outcome.traits[f"mean_share_{name}"], outcome.traits[f"std_share_{name}"]) >= MATTERS
     ]
     return ", ".join(names) or "none"
 
 
 def parameter_table(best: Outcome, outcomes: Sequence[Outcome]) -> Table:
     """Return the parameters of the best rung with their bootstrap intervals."""
-    replicates = [one for one in outcomes if one.kind == "bootstrap"]
+    replicates = [outcome for outcome in outcomes if outcome.kind == "bootstrap"]
     rows: list[tuple[Cell, ...]] = []
     for name, value in best.parameters.items():
-        refits = np.array([one.parameters[name] for one in replicates])
+        refits = np.array([outcome.parameters[name] for outcome in replicates])
         low, high = (refits.min(), refits.max()) if len(refits) else (None, None)
         rows.append((name.replace("_", " "), value, low, high))
     wide_mean, wide_std = (best.traits[name] >= LEAST_WIDTH[name] for name in WIDTHS)
@@ -356,14 +360,14 @@ def gaps(rungs: Sequence[Outcome]) -> Figure:
     axis = axes.flat[0]
     places = np.arange(len(rungs))[::-1]
     unseen = held_out("table8")
-    fitted = [max(one.gap(FITS["table8"]), 1e-2) for one in rungs]
-    others = [max(one.gap(unseen), 1e-2) for one in rungs]
+    fitted = [max(rung.gap(FITS["table8"]), 1e-2) for rung in rungs]
+    others = [max(rung.gap(unseen), 1e-2) for rung in rungs]
     axis.hlines(places, fitted, others, color=GREY, linewidth=1)
     axis.plot(fitted, places, "o", color=BLUE, label="fitted")
     axis.plot(others, places, "s", color=ORANGE, label="held out")
     axis.set_xscale("log")
     axis.margins(y=0.02)
-    axis.set_yticks(places, [" | ".join(_rung(one)) for one in rungs], fontsize=7)
+    axis.set_yticks(places, [" | ".join(_rung(rung)) for rung in rungs], fontsize=7)
     axis.set_xlabel("gap to the published numbers [%]")
     axis.legend(frameon=False, fontsize=8)
     return figure

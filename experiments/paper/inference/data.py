@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 from experiments.paper.calibrating.ladder import EFFECTS, NARROW, Candidate
 from experiments.paper.inference.closures import CLOSURES
 from experiments.paper.inference.likelihood import OBSERVED, Evaluation, evaluate
-from experiments.paper.inference.optimum import OPTIMA
-from experiments.paper.inference.posterior import Posterior, Profile
+from experiments.paper.inference.posterior import OPTIMA, Posterior, Profile
 from experiments.paper.inference.rungs import Rung, rung_named
 from experiments.paper.inference.search import BASIN, Search
 from experiments.runner.campaign import Run
@@ -102,19 +101,19 @@ def fits_of(jobs: Sequence[Search], runs: Sequence[Run]) -> list[Fit]:
 def format_fits(fits: Sequence[Fit]) -> str:
     """Return the CSV text of fits, with date and versions in a first comment line."""
     rows = [
-        [one.target, one.rung.name, one.seed, one.effort, one.starts, one.followed, one.reached,
-         f"{one.deviance:.7g}", *_cells(one.parameters)]
-        for one in fits
+        [fit.target, fit.rung.name, fit.seed, fit.effort, fit.starts, fit.followed, fit.reached,
+         f"{fit.deviance:.7g}", *_cells(fit.parameters)]
+        for fit in fits
     ]  # fmt: skip
     return table_with_origin([*_FIT, *PARAMETERS], rows)
 
 
 def read_fits(path: Path) -> list[Fit]:
     """Read what `format_fits` wrote."""
-    found = []
+    fits = []
     for row in read_rows(path):
         rung = rung_named(row["rung"])
-        found.append(
+        fits.append(
             Fit(
                 target=row["target"],
                 rung=rung,
@@ -127,7 +126,7 @@ def read_fits(path: Path) -> list[Fit]:
                 parameters={name: float(row[name]) for name in rung.bounds},
             )
         )
-    return found
+    return fits
 
 
 def format_draws(jobs: Sequence[Posterior], runs: Sequence[Run]) -> str:
@@ -147,7 +146,7 @@ def read_draws(path: Path) -> list[Draws]:
     groups: dict[tuple[str, str], list[dict[str, str]]] = {}
     for row in read_rows(path):
         groups.setdefault((row["target"], row["rung"]), []).append(row)
-    found = []
+    draws = []
     for (target, name), rows in groups.items():
         rung = rung_named(name)
 
@@ -156,8 +155,8 @@ def read_draws(path: Path) -> list[Draws]:
 
         parameters = {key: column(key) for key in rung.bounds}
         optima = {key: column(key) for key in OPTIMA}
-        found.append(Draws(target, rung, column("deviance"), parameters, optima))
-    return found
+        draws.append(Draws(target, rung, column("deviance"), parameters, optima))
+    return draws
 
 
 def format_profiles(jobs: Sequence[Profile], runs: Sequence[Run]) -> str:

@@ -8,7 +8,14 @@ folder.
 
 from __future__ import annotations
 
-from experiments.paper.calibrating.ladder import EFFECTS, NARROW, WIDE, Candidate
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from experiments.comparing.figures import BLACK, BLUE, GREEN, GREY, ORANGE, PINK, grid
+from experiments.paper.calibrating.ladder import EFFECTS, LOGARITHMIC, NARROW, WIDE, Candidate
 from experiments.paper.calibrating.predictions import ORDER
 from experiments.paper.inference.closures import CLOSURES
 from experiments.paper.inference.data import (
@@ -23,9 +30,22 @@ from experiments.paper.inference.data import (
     read_fits,
     read_profiles,
 )
-from experiments.paper.inference.figures import curves, objectives
-from experiments.paper.inference.knowledge import identity_table, optimum_table, parameter_table
-from experiments.paper.inference.likelihood import DEPTH_TOLERANCE, READING, SAMPLES
+from experiments.paper.inference.knowledge import (
+    BOUND,
+    identity_table,
+    optimum_table,
+    parameter_table,
+    title,
+)
+from experiments.paper.inference.likelihood import (
+    BAND,
+    DEPTH_TOLERANCE,
+    OBSERVED,
+    READING,
+    SAMPLES,
+    box_axes,
+)
+from experiments.paper.inference.moments import TensorSurrogate
 from experiments.paper.inference.node_noise import LARGEST
 from experiments.paper.inference.posterior import Posterior, Profile
 from experiments.paper.inference.rungs import Rung, all_rungs, noisy_rungs
@@ -38,12 +58,78 @@ from experiments.paper.inference.tables import (
     opening,
     steps_table,
 )
-from experiments.paper.inference.verdicts import chosen_fits, noisy_fits
+from experiments.paper.inference.verdicts import Named, chosen_fits, noisy_fits
+from experiments.published_values import TABLE_8
 from experiments.runner.committed import committed_file, stored_outcome
 from experiments.runner.registry import Context, require
 from experiments.runner.result import OF_MODELS, Picture, Result
 from experiments.runner.store import write_atomically
 from experiments.runner.texts import paragraphs
+
+COLOURS = (BLUE, ORANGE, GREEN, PINK, GREY)
+_GRID = 17
+BEYOND = 7.0
+"""Of the published optima, shown on either side, arcsec."""
+
+
+def objectives(shown: Sequence[Named], draws: Sequence[Draws]) -> Figure:
+    """Draw optima and fronts of the models, and the optima of the posteriors' draws."""
+    figure, axes = grid(1, 2, width=6.6, height=4.6)
+    axis, right = axes.flat
+    for named, colour in zip(shown, COLOURS, strict=False):
+        predicted = named.fit.evaluation.predicted
+        axis.plot(*_front(named).T, "-", color=colour, linewidth=1)
+        axis.plot(predicted[1:4], predicted[5:8], "o", color=colour, label=named.label)
+    axis.plot(OBSERVED[1:4], OBSERVED[5:8], "x", color=BLACK, markersize=9, label="the paper")
+    # A front that the target has drawn close runs on far beyond all others.
+    axis.set_xlim(OBSERVED[1] - BEYOND, OBSERVED[3] + BEYOND)
+    axis.set_ylim(OBSERVED[7] - 0.3 * BEYOND, OBSERVED[5] + 0.2 * BEYOND)
+    _labels(axis)
+    for drawn, colour in zip(draws, COLOURS, strict=False):
+        values = drawn.optima["mean_balanced"], drawn.optima["std_balanced"]
+        label = f"balanced, {title(drawn.target, drawn.rung)}"
+        right.plot(*values, ".", color=colour, alpha=0.6, label=label)
+    paper = TABLE_8["balanced"]
+    right.plot(paper.mean_arcsec, paper.std_arcsec, "x", color=BLACK, markersize=9,
+               label="balanced, the paper")  # fmt: skip
+    _labels(right)
+    return figure
+
+
+def curves(profiled: Sequence[Profiled]) -> Figure:
+    """Draw the profile of every parameter of every posterior."""
+    names = list(profiled[0].curves)
+    figure, axes = grid(-(-len(names) // 3), 3, width=3.6, height=2.4)
+    for axis, name in zip(axes.flat, names, strict=False):
+        for profile, colour in zip(profiled, COLOURS, strict=False):
+            values, deviance = profile.curves[name].T
+            shown = np.exp(values) if name in LOGARITHMIC else values
+            axis.plot(shown, deviance - deviance.min(), "o-", color=colour, markersize=3,
+                      label=title(profile.target, profile.rung))  # fmt: skip
+        axis.axhline(BOUND, color=GREY, linewidth=1)
+        axis.set_ylim(-0.5, 12.0)
+        axis.set_xlabel(name.replace("_", " "))
+    axes.flat[0].set_ylabel("deviance above the least")
+    # No panel has room for it.
+    handles, labels = axes.flat[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper left", frameon=False, fontsize=8, ncols=2)
+    return figure
+
+
+def _front(named: Named) -> np.ndarray:
+    surrogate = TensorSurrogate.fit(named.fit.rung, named.fit.parameters)
+    moments = surrogate.on_designs(box_axes(surrogate, _GRID), BAND)
+    values = np.column_stack([part.ravel() for part in moments])
+    rising = values[np.lexsort((values[:, 1], values[:, 0]))]
+    lowest = np.minimum.accumulate(rising[:, 1])
+    return rising[np.concatenate([[True], rising[1:, 1] < lowest[:-1]])]
+
+
+def _labels(axis: Axes) -> None:
+    axis.set_xlabel("mean [arcsec]")
+    axis.set_ylabel("standard deviation [arcsec]")
+    axis.legend(frameon=False, fontsize=7)
+
 
 NAME = "inference"
 FITS, DRAWN, PROFILED = (f"{NAME}{part}.csv" for part in ("", "_posterior", "_profiles"))
@@ -68,7 +154,9 @@ SETTING, DEPTH, NOISE = paragraphs(
 WORDS = (
     "R1 and R2 are the readings of the bands of the calibration: R1 has every Monte "
     "Carlo run at ±5 %, R2 that of the initial design at ±35 %. Closures, each one equation beside "
-    "Eq. (9): " + "; ".join(f"{name}: {one.sentence}" for name, one in CLOSURES.items()) + "."
+    "Eq. (9): "
+    + "; ".join(f"{name}: {closure.sentence}" for name, closure in CLOSURES.items())
+    + "."
 )
 
 

@@ -220,8 +220,8 @@ def singular(fit: Fit) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
 
 
 def _fit_of(fits: Sequence[Fit], drawn: Draws) -> Fit:
-    (found,) = (one for one in fits if (one.target, one.rung) == (drawn.target, drawn.rung))
-    return found
+    (matching,) = (fit for fit in fits if (fit.target, fit.rung) == (drawn.target, drawn.rung))
+    return matching
 
 
 def _unwrapped(name: str, values: NDArray[np.float64], centre: float) -> NDArray[np.float64]:

@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
 from experiments.paper.calibrating.predictions import PUBLISHED, TABLE_8_AND_BOX, UNCERTAINTY
-from experiments.paper.inference.draws import sampling_covariance
-from experiments.paper.inference.moments import DESIGNS, TensorSurrogate
+from experiments.paper.inference.moments import DESIGNS, TensorSurrogate, sampling_covariance
 from experiments.paper.inference.node_noise import LARGEST, published_influence
 from experiments.paper.inference.rungs import COLUMNS, Rung
 from experiments.published_values import TABLE_8
@@ -152,8 +151,8 @@ def evaluate(rung: Rung, parameters: dict[str, float], front: bool = True) -> Ev
     covariance = np.diag([*[READING**2] * 8, UNCERTAINTY["box_std"] ** 2])
     covariance[:8, :8] += sampling_covariance(joint, SAMPLES, DRAWS)
     optima = np.column_stack([joint.means, joint.stds])[1:]
-    found = depths(surrogate, optima) if front else np.zeros(3)
-    return Evaluation(predicted, covariance, found, published_influence(surrogate, bands))
+    values = depths(surrogate, optima) if front else np.zeros(3)
+    return Evaluation(predicted, covariance, values, published_influence(surrogate, bands))
 
 
 def box_axes(surrogate: TensorSurrogate, n: int) -> list[NDArray[np.float64]]:
@@ -179,8 +178,8 @@ def depths(
 def residuals_of(rung: Rung, target: str, searched: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return `Evaluation.residuals` at a point of the search space; large ones where it fails."""
     try:
-        found = evaluate(rung, rung.physical(searched), target == "front")
-        values = found.residuals(target)
+        evaluation = evaluate(rung, rung.physical(searched), target == "front")
+        values = evaluation.residuals(target)
     except (ArithmeticError, np.linalg.LinAlgError):
         values = np.full(13 if target == "front" else 10, UNLIKELY)
     return values

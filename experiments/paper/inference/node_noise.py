@@ -26,7 +26,7 @@ from experiments.paper.inference.moments import (
     place,
     uniform_rule,
 )
-from experiments.paper.quadrature import Rule
+from experiments.paper.scatter import Rule
 from experiments.published_values import TABLE_5, TABLE_9
 from pymoo_hdte.drive import PARAMETERS
 from pymoo_hdte.surrogate.tensor import chebyshev_basis, chebyshev_nodes, coefficients_from_nodes
@@ -83,8 +83,8 @@ def cardinal_averages(points: NDArray[np.float64], weights: NDArray[np.float64])
     Of the cardinal functions l_j, shape (.., 4), and of their products l_i l_j, (.., 4, 4).
     """
     values = np.moveaxis(chebyshev_basis(points, SIZE), 0, -1) @ _cardinal()
-    first = np.einsum("q,...qj->...j", weights, values)
-    return first, np.einsum("q,...qi,...qj->...ij", weights, values, values)
+    averages = np.einsum("q,...qj->...j", weights, values)
+    return averages, np.einsum("q,...qi,...qj->...ij", weights, values, values)
 
 
 @cache
@@ -104,8 +104,8 @@ def influence(axes: Sequence[Averages], values: NDArray[np.float64]) -> Influenc
         DTE at the nodes in all variables but B_in, arcsec.
     """
     moving = [axis for place, axis in enumerate(axes) if place != ROLLING]
-    first = [average for average, _ in moving]
-    of_means = _outer(first)
+    averages = [average for average, _ in moving]
+    of_means = _outer(averages)
     flat = of_means.reshape(len(of_means), -1)
     means = flat @ values.ravel()
     products = np.broadcast_to(values, of_means.shape)
@@ -123,7 +123,7 @@ def influence(axes: Sequence[Averages], values: NDArray[np.float64]) -> Influenc
 
 def _outer(factors: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
     """Return the products of d factors, shape (n, 4) each, at all nodes: (n, 4, .., 4)."""
-    return reduce(lambda left, right: np.einsum("n...i,nj->n...ij", left, right), factors)
+    return reduce(lambda share, right: np.einsum("n...i,nj->n...ij", share, right), factors)
 
 
 def _with_rolling(moving: NDArray[np.float64], rolling: NDArray[np.float64]) -> NDArray[np.float64]:

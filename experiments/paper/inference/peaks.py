@@ -53,9 +53,9 @@ def shape_peak_to_peak(orders: Real, phasors: Complex) -> float:
     steady, in_phase, quadrature = _waves(orders, phasors[None, :])
     bend = np.abs(phasors) @ orders**2 * (2.0 * np.pi / POINTS) ** 2 / 8.0
     nothing = np.zeros_like(steady)
-    one = np.ones(1)
+    unit = np.ones(1)
     return float(
-        _spans(steady, in_phase, quadrature, np.array([bend]), nothing, np.zeros(1), one,
+        _spans(steady, in_phase, quadrature, np.array([bend]), nothing, np.zeros(1), unit,
                np.zeros(1, dtype=np.int_))[0]
     )  # fmt: skip
 
@@ -76,27 +76,27 @@ def _grids(drive: Coefficients) -> tuple[Real, Real, Real, Real, Real, Real]:
             drive.output_inertia, drive.output_damping, drive.mean_mesh_torque,
         )
     ]  # fmt: skip
-    for first in (0.0, 1.0, 0.02):
-        lines = np.flatnonzero(np.abs((orders - first) % 2.0) < 1e-6)
-        highest = int(np.rint((orders[lines] - first).max() / 2.0)) if len(lines) else 0
-        kept = first + 2.0 * np.arange(-REACH, highest + REACH + 1, dtype=np.float64)
+    for start in (0.0, 1.0, 0.02):
+        lines = np.flatnonzero(np.abs((orders - start) % 2.0) < 1e-6)
+        highest = int(np.rint((orders[lines] - start).max() / 2.0)) if len(lines) else 0
+        kept = start + 2.0 * np.arange(-REACH, highest + REACH + 1, dtype=np.float64)
         static = np.zeros((len(drive.stiffness), len(kept)), dtype=np.complex128)
         for line in lines:
-            at = int(np.rint((orders[line] - first) / 2.0)) + REACH
+            at = int(np.rint((orders[line] - start) / 2.0)) + REACH
             static[:, at] += drive.error_phasors[:, line]
         answer, load = _family(
             kept * drive.input_speed, static,
             drive.stiffness_depth / 2.0 * np.exp(1j * drive.stiffness_phase), *columns,
         )  # fmt: skip
         rise = rise + np.abs(answer) @ (kept * steps) ** 2 / 8.0
-        if first == 0.02:
+        if start == 0.02:
             _, in_phase, quadrature = _waves(kept, answer)
             continue
         whole.append((kept, answer))
-        if first == 0.0:
+        if start == 0.0:
             loaded = _waves(kept, load)[0]
             loaded_rise = np.abs(load) @ (kept * steps) ** 2 / 8.0
-    steady = sum(_waves(kept, answer)[0] for kept, answer in whole)  # type: ignore[assignment]
+    steady = sum(_waves(order, answer)[0] for order, answer in whole)  # type: ignore[assignment]
     return steady, in_phase, quadrature, rise, loaded, loaded_rise
 
 
@@ -147,15 +147,15 @@ def _family(
                 behind = 1j * w * (output_damping[row] + 1j * w * output_inertia[row])
                 impedance = ahead * behind / (ahead + behind)
             pivot = impedance + stiffness[row] + 1j * w * damping[row]
-            first = -impedance * static[row, m]
+            scaled = -impedance * static[row, m]
             second = torque[row] + 0.0j if w == 0.0 else 0.0j
             if m > 0:
                 below = stiffness[row] * coupling
                 pivot -= below * above[m - 1]
-                first -= below * answer[row, m - 1]
+                scaled -= below * answer[row, m - 1]
                 second -= below * load[row, m - 1]
             above[m] = stiffness[row] * np.conj(coupling) / pivot
-            answer[row, m] = first / pivot
+            answer[row, m] = scaled / pivot
             load[row, m] = second / pivot
         for m in range(size - 2, -1, -1):
             answer[row, m] -= above[m] * answer[row, m + 1]

@@ -53,12 +53,12 @@ class Rung:
     @property
     def bounds(self) -> dict[str, tuple[float, float]]:
         """The open parameters with their ranges, on the scale that is searched."""
-        found = self.candidate.bounds
+        bounds = self.candidate.bounds
         if not self.candidate.effects:
-            found = {name: found[name] for name in found if name not in _printed_shape()}
+            bounds = {name: bounds[name] for name in bounds if name not in _printed_shape()}
         for name in self.closures:
-            found |= CLOSURES[name].bounds
-        return found
+            bounds |= CLOSURES[name].bounds
+        return bounds
 
     @property
     def limits(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -96,13 +96,13 @@ def all_rungs() -> list[Rung]:
     Torsion on none is the simplest model: a rigid drive, and a share of its torsion read as error.
     With closures theta_s is read as semi-amplitude: read as peak-to-peak, the ladder is far off.
     """
-    found = [Rung(candidate) for candidate in ladder_rungs()]
+    rungs = [Rung(candidate) for candidate in ladder_rungs()]
     every = tuple(CLOSURES)
     for bands in (WIDE, NARROW):
-        full, printed = (Candidate(one, "semi_amplitude", bands) for one in (EFFECTS, ()))
-        found += [Rung(full, (name,)) for name in CLOSURES]
-        found += [Rung(printed, RIGID), Rung(printed, every), Rung(full, every)]
-    return found
+        full, printed = (Candidate(effects, "semi_amplitude", bands) for effects in (EFFECTS, ()))
+        rungs += [Rung(full, (name,)) for name in CLOSURES]
+        rungs += [Rung(printed, RIGID), Rung(printed, every), Rung(full, every)]
+    return rungs
 
 
 def noisy_rungs() -> list[Rung]:
@@ -121,8 +121,8 @@ def noisy_rungs() -> list[Rung]:
 def rung_named(name: str) -> Rung:
     """Return the rung of that name."""
     candidate, *closures = name.split("__")
-    (found,) = (one for one in ladder_rungs() if one.name == candidate)
-    return Rung(found, tuple(closures))
+    (matching,) = (rung for rung in ladder_rungs() if rung.name == candidate)
+    return Rung(matching, tuple(closures))
 
 
 def dte_arcsec(
@@ -133,8 +133,8 @@ def dte_arcsec(
     Stability is not asked for, since it takes longer: see `is_stable`.
     """
     model, values = rung.model(parameters), _values(rung, parameters, points)
-    rest = np.column_stack([values.stiffness, values.input_inertia, values.damping])
-    unique, rows = np.unique(rest, axis=0, return_inverse=True)
+    design = np.column_stack([values.stiffness, values.input_inertia, values.damping])
+    unique, rows = np.unique(design, axis=0, return_inverse=True)
     spans = peak_to_peak(_coefficients(model, unique), values.theta_s, rows.ravel())
     return (spans + values.added) / ARCSEC
 
@@ -144,8 +144,8 @@ def is_stable(
 ) -> NDArray[np.bool_]:
     """Return whether the motion at points (n, 4) does not grow, shape (n,)."""
     values = _values(rung, parameters, points)
-    rest = np.column_stack([values.stiffness, values.input_inertia, values.damping])
-    return stable_rows(_coefficients(rung.model(parameters), rest))
+    design = np.column_stack([values.stiffness, values.input_inertia, values.damping])
+    return stable_rows(_coefficients(rung.model(parameters), design))
 
 
 def _values(rung: Rung, parameters: dict[str, float], points: NDArray[np.float64]) -> Values:
@@ -158,22 +158,24 @@ def _values(rung: Rung, parameters: dict[str, float], points: NDArray[np.float64
     return values
 
 
-def _coefficients(model: DriveModel, rest: NDArray[np.float64]) -> Coefficients:
+def _coefficients(model: DriveModel, design: NDArray[np.float64]) -> Coefficients:
     """Return Eq. (9) for theta_s of 1 rad at n values of (K, J_in, B_fc), shape (n, 3).
 
     As `DriveModel.coefficients`, which would take longer to scale the lines than all that follows.
     """
-    designs = np.tile(model.nominal, (len(rest), 1))
-    designs[:, COLUMNS[1:]] = rest
-    found = _printed().coefficients(designs)
+    designs = np.tile(model.nominal, (len(design), 1))
+    designs[:, COLUMNS[1:]] = design
+    coefficients = _printed().coefficients(designs)
     for effect in model.effects:
-        found = effect.apply(found)
+        coefficients = effect.apply(coefficients)
     error = model.kinematic_error
     orders = np.array(error.orders)
     lines = sine_phasor(error.amplitudes, error.phases)
     size = {"peak_to_peak": 1.0, "semi_amplitude": 2.0}[error.reading]
     phasors = lines * size / shape_peak_to_peak(orders, lines)
-    return replace(found, error_orders=orders, error_phasors=np.tile(phasors, (len(rest), 1)))
+    return replace(
+        coefficients, error_orders=orders, error_phasors=np.tile(phasors, (len(design), 1))
+    )
 
 
 @cache
@@ -185,9 +187,9 @@ def _printed() -> DriveModel:
 def _printed_shape() -> dict[str, float]:
     """Return the shape of theta_s in ``published``, by the names of the ladder's parameters."""
     error = _printed().kinematic_error
-    first, second, beat = error.amplitudes
+    amplitudes, second, beat = error.amplitudes
     return {
-        "amplitude_1": first / second,
+        "amplitude_1": amplitudes / second,
         "amplitude_2.02": beat / second,
         "phase_2": error.phases[1] - error.phases[0],
         "phase_2.02": error.phases[2] - error.phases[0],

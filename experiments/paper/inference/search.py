@@ -107,10 +107,10 @@ def multi_start(
     costs = np.array([np.sum(soft(place) ** 2) for place in tried])
     groups = np.arange(len(tried)).reshape(effort.starts, TRIED)
     places = [tried[group[np.argmin(costs[group])]] for group in groups]
-    first, second, last = effort.steps
-    ends = _followed(soft, rung, places, first)[: -(-effort.starts // KEPT)]
+    start, second, end = effort.steps
+    ends = _followed(soft, rung, places, start)[: -(-effort.starts // KEPT)]
     ends = _followed(residuals, rung, ends, second)
-    return [*_followed(residuals, rung, ends[:REFINED], last), *ends[REFINED:]]
+    return [*_followed(residuals, rung, ends[:REFINED], end), *ends[REFINED:]]
 
 
 def _followed(
@@ -144,7 +144,7 @@ def refine(
         return residuals(held)
 
     inside = np.clip(start, low + 1e-9 * width, high - 1e-9 * width)
-    found = least_squares(
+    solution = least_squares(
         of_free,
         inside[free],
         bounds=(low[free], high[free]),
@@ -153,5 +153,5 @@ def refine(
         max_nfev=steps,
     )
     place = held.copy()
-    place[free] = found.x
-    return 2.0 * float(found.cost), place
+    place[free] = solution.x
+    return 2.0 * float(solution.cost), place

@@ -3,21 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import product
 
 import numpy as np
+from numpy.typing import NDArray
 
-from experiments.paper.calibrating.predictions import PUBLISHED, UNCERTAINTY
+from experiments.paper.calibrating.predictions import N_TEST, PUBLISHED, UNCERTAINTY
 from experiments.paper.calibrating.tables import MEASURED_HIGHEST
 from experiments.paper.inference.data import Fit
-from experiments.paper.inference.held_out import (
-    dominating_shares,
-    prototypes,
-    stable,
-    surrogate_rmse,
+from experiments.paper.inference.likelihood import (
+    BAND,
+    FRONT_WIDTHS,
+    OBSERVED,
+    READING,
+    Evaluation,
+    box_axes,
 )
-from experiments.paper.inference.likelihood import FRONT_WIDTHS, OBSERVED, READING, Evaluation
-from experiments.paper.inference.node_noise import LARGEST, growth_of_rmse
-from experiments.paper.inference.rungs import Rung
+from experiments.paper.inference.moments import TensorSurrogate
+from experiments.paper.inference.node_noise import LARGEST, growth_of_rmse, share_of_noise
+from experiments.paper.inference.rungs import COLUMNS, Rung, dte_arcsec, is_stable
 from experiments.paper.inference.verdicts import (
     PRESET,
     STEPS,
@@ -38,8 +42,52 @@ from experiments.paper.inference.verdicts import (
     with_noise,
     without_noise,
 )
-from experiments.published_values import TABLE_5
+from experiments.published_values import TABLE_5, TABLE_6
 from experiments.runner.result import Cell, Column, Finding, Table, significant
+from pymoo_hdte.surrogate import ChebyshevSurrogate, latin_hypercube
+from pymoo_hdte.units import ARCSEC
+
+DESIGNS_PER_AXIS = 25
+"""Of K, J_in and B_fc: of 15,625 designs the share that dominates an optimum is known to 1 %."""
+
+
+def surrogate_rmse(
+    rung: Rung, parameters: dict[str, float], order: int, node_noise: float = 0.0
+) -> float:
+    """Return the RMSE of Table 5, arcsec, as the calibration predicts it.
+
+    Noise of the runs, arcsec, adds that of the nodes and that of the test points in squares.
+    """
+    fitted = TensorSurrogate.fit(rung, parameters, order, rung.candidate.bands)
+    surrogate = ChebyshevSurrogate(fitted.box, fitted.coefficients)
+    points = latin_hypercube(fitted.box, N_TEST, 1)
+    error = surrogate(points) - dte_arcsec(rung, parameters, points)
+    noise = node_noise**2 * (1.0 + share_of_noise(order))
+    return float(np.sqrt(np.mean(error**2) + noise))
+
+
+def prototypes(rung: Rung, parameters: dict[str, float]) -> NDArray[np.float64]:
+    """Return the DTE of the five prototypes of Table 6, arcsec, shape (5,)."""
+    rows = np.array([[row.theta_s_arcsec * ARCSEC, *row.design] for row in TABLE_6.values()])
+    return dte_arcsec(rung, parameters, rows[:, COLUMNS])
+
+
+def dominating_shares(rung: Rung, parameters: dict[str, float]) -> NDArray[np.float64]:
+    """Return the share of the box's designs that dominate each of the three optima, shape (3,)."""
+    surrogate = TensorSurrogate.fit(rung, parameters)
+    joint = surrogate.joint(rung.candidate.bands)
+    optima = np.column_stack([joint.means, joint.stds])[1:]
+    mean, std = surrogate.on_designs(box_axes(surrogate, DESIGNS_PER_AXIS), BAND)
+    objectives = np.stack([mean, std], axis=-1).reshape(-1, 1, 2)
+    return np.asarray(np.mean(np.all(objectives < optima, axis=2), axis=0))
+
+
+def stable(rung: Rung, parameters: dict[str, float]) -> bool:
+    """Return whether the drives at the corners of the surrogate's box and inside have no growth."""
+    box = TensorSurrogate.fit(rung, parameters).box
+    corners = np.array(list(product(*zip(box.lower, box.centre, box.upper, strict=True))))
+    return bool(np.all(is_stable(rung, parameters, corners)))
+
 
 UNIT = 1.0
 """Node noise for which the reversed step is judged, arcsec; Table 5 allows a little more."""
@@ -47,14 +95,14 @@ UNIT = 1.0
 
 def of_the_first_page(fits: Sequence[Fit]) -> str:
     """Say what gives its trade-off and its optima, as part of a longer sentence."""
-    common = [one for one in fits if one.target == "common"]
-    both = len(_models(gives_both(without_noise(fits))))
+    common = [fit for fit in fits if fit.target == "common"]
+    count = len(_models(gives_both(without_noise(fits))))
     noisy = with_noise(fits)
     meeting, simplest = _meeting(noisy), rigid(noisy)
     return (
         f"{len(_meeting(common)) or 'none'} of {len(common)} fitted drive models "
         f"{_give(len(_meeting(common)) or 1)} its numbers and the steps between its optima, and "
-        f"{both or 'none'} its optima as well; with solver noise of at most {LARGEST:.1f} arcsec, "
+        f"{count or 'none'} its optima as well; with solver noise of at most {LARGEST:.1f} arcsec, "
         f"{len(meeting)} of {len(noisy)} give numbers and steps, {len(gives_both(noisy))} of them "
         f"the optima too{_simplest_clause(simplest)}"
     )
@@ -77,22 +125,22 @@ def opening(fits: Sequence[Fit]) -> str:
 
 
 def _without_noise(fits: Sequence[Fit]) -> str:
-    common = [one for one in fits if one.target == "common"]
+    common = [fit for fit in fits if fit.target == "common"]
     searched = len(common)
     meeting = _meeting(common)
-    both = gives_both(fits)
-    if both:
+    fitting = gives_both(fits)
+    if fitting:
         return (
-            f"Of {searched} drive models searched, {len(both)} give the published numbers with the "
-            "steps between the optima, and leave the optima non-dominated: first "
-            f"{describe(both[0].rung)}."
+            f"Of {searched} drive models searched, {len(fitting)} give the published numbers with "
+            "the steps between the optima, and leave the optima non-dominated: first "
+            f"{describe(fitting[0].rung)}."
         )
     if not meeting:
         return (
             f"Without solver noise, none of {searched} drive models gives the paper's trade-off "
             "between mean and standard deviation within the errors of common random numbers."
         )
-    first = min(meeting, key=lambda one: one.bic)
+    first = min(meeting, key=lambda fit: fit.bic)
     return (
         f"Without solver noise, none of {searched} drive models gives both the paper's numbers and "
         f"its optima. {len(meeting)} {_give(len(meeting))} the nine numbers with the steps between "
@@ -135,12 +183,12 @@ def _share(fit: Fit) -> float:
 
 
 def _meeting(fits: Sequence[Fit]) -> list[Fit]:
-    return [one for one in fits if gives_trade_off(one)]
+    return [fit for fit in fits if gives_trade_off(fit)]
 
 
 def _models(fits: Sequence[Fit]) -> set[Rung]:
     """Return the models of fits: one may be fitted to several targets."""
-    return {one.rung for one in fits}
+    return {fit.rung for fit in fits}
 
 
 def _nearest(fits: Sequence[Fit]) -> str:
@@ -163,9 +211,9 @@ def steps_table(fits: Sequence[Fit]) -> Table:
     columns = (
         Column("model"),
         *(
-            Column(moment, "arcsec", 3, f"{first} to {last}".replace("_", " "))
+            Column(moment, "arcsec", 3, f"{start} to {end}".replace("_", " "))
             for moment in ("mean", "std")
-            for first, last in STEPS
+            for start, end in STEPS
         ),
         Column("largest miss of a step", "standard errors", 2),
         Column("chi-square of the nine numbers", "", 3),
@@ -187,43 +235,43 @@ def steps_table(fits: Sequence[Fit]) -> Table:
 
 
 def _steps_row(named: Named) -> tuple[Cell, ...]:
-    found = named.fit.evaluation
+    evaluation = named.fit.evaluation
     shares = dominating_shares(named.fit.rung, named.fit.parameters)
     return (
         f"{named.label} ({describe(named.fit.rung)})",
-        *steps_of(found.predicted),
-        float(np.abs(step_errors(found)).max()),
-        found.chi_square("common"),
-        float(found.depths.max()),
+        *steps_of(evaluation.predicted),
+        float(np.abs(step_errors(evaluation)).max()),
+        evaluation.chi_square("common"),
+        float(evaluation.depths.max()),
         100.0 * float(shares.max()),
     )
 
 
 def _findings(fits: Sequence[Fit]) -> list[Finding]:
-    (independent,) = (one for one in fits if one.target == "independent")
-    common = [one for one in fits if one.target == "common"]
-    meeting = [one for one in common if gives_trade_off(one)]
-    both = gives_both(without_noise(fits))
-    found = independent.evaluation
-    ours, paper = steps_of(found.predicted), steps_of(OBSERVED)
+    (independent,) = (fit for fit in fits if fit.target == "independent")
+    common = [fit for fit in fits if fit.target == "common"]
+    meeting = [fit for fit in common if gives_trade_off(fit)]
+    fitting = gives_both(without_noise(fits))
+    evaluation = independent.evaluation
+    ours, paper = steps_of(evaluation.predicted), steps_of(OBSERVED)
     return [
         Finding(
             gives_trade_off(independent),
             f"Fitted as {PRESET} was, each number with its own sampling error, the model of "
-            f"{PRESET} has a chi-square of {significant(found.chi_square('independent'), 2)}, and "
-            f"of {significant(found.chi_square('common'), 3)} with the covariance; from the "
-            f"balanced to the robust design it changes by {ours[1]:+.3f} and {ours[3]:+.3f} arcsec "
-            f"(paper {paper[1]:+.3f} and {paper[3]:+.3f}).",
+            f"{PRESET} has a chi-square of {significant(evaluation.chi_square('independent'), 2)}, "
+            f"and of {significant(evaluation.chi_square('common'), 3)} with the covariance; from "
+            f"the balanced to the robust design it changes by {ours[1]:+.3f} and {ours[3]:+.3f} "
+            f"arcsec (paper {paper[1]:+.3f} and {paper[3]:+.3f}).",
             fitted=True,
         ),
-        _reversal(found),
+        _reversal(evaluation),
         Finding(
             bool(meeting),
             f"Without node noise, {len(meeting)} of {len(common)} models give all four steps "
             f"within {WITHIN:g} standard errors and the nine numbers with a chi-square that is not "
             "improbable"
             + (
-                f"; the likeliest is {describe(min(meeting, key=lambda one: one.bic).rung)}. By "
+                f"; the likeliest is {describe(min(meeting, key=lambda fit: fit.bic).rung)}. By "
                 f"sampling alone, without the {READING:g} arcsec, it misses a step by "
                 f"{_miss_by_sampling(meeting):.1f} standard errors."
                 if meeting
@@ -232,21 +280,21 @@ def _findings(fits: Sequence[Fit]) -> list[Finding]:
             fitted=True,
         ),
         Finding(
-            bool(both),
-            f"Without node noise, {len(_models(both))} of {len(_models(without_noise(fits)))} "
+            bool(fitting),
+            f"Without node noise, {len(_models(fitting))} of {len(_models(without_noise(fits)))} "
             "models do so and leave the three optima non-dominated; some were fitted to that as "
             f"well, {len(without_noise(fits))} fits in all.",
         ),
     ]
 
 
-def _reversal(found: Evaluation) -> Finding:
+def _reversal(evaluation: Evaluation) -> Finding:
     """Whether the step that the fitted model reverses contradicts the paper, noise included."""
     last = [1, 3]
-    alone = uncertainty_of_steps(found, sampling_alone=True)[last]
-    noisy = uncertainty_of_steps(found, node_noise=UNIT)[last]
-    misses = np.abs(step_errors(found, node_noise=UNIT)[last])
-    needed = float(noise_that_excuses(found)[last].max())
+    alone = uncertainty_of_steps(evaluation, sampling_alone=True)[last]
+    noisy = uncertainty_of_steps(evaluation, node_noise=UNIT)[last]
+    misses = np.abs(step_errors(evaluation, node_noise=UNIT)[last])
+    needed = float(noise_that_excuses(evaluation)[last].max())
     excused = needed <= LARGEST
     return Finding(
         excused,
@@ -262,30 +310,30 @@ def _reversal(found: Evaluation) -> Finding:
 
 
 def _miss_by_sampling(meeting: Sequence[Fit]) -> float:
-    found = min(meeting, key=lambda one: one.bic).evaluation
-    return float(np.abs(step_errors(found, sampling_alone=True)).max())
+    evaluation = min(meeting, key=lambda fit: fit.bic).evaluation
+    return float(np.abs(step_errors(evaluation, sampling_alone=True)).max())
 
 
 def ladder_table(fits: Sequence[Fit]) -> Table:
     """Return all rungs fitted with the covariance, the likeliest first."""
-    common = sorted((one for one in fits if one.target == "common"), key=lambda one: one.bic)
+    common = sorted((fit for fit in fits if fit.target == "common"), key=lambda fit: fit.bic)
     least = common[0].bic
     rows = tuple(
         (
-            ", ".join(name.replace("_", " ") for name in one.rung.candidate.effects) or "none",
-            ", ".join(one.rung.closures) or "none",
-            one.rung.candidate.reading.replace("_", " "),
-            one.rung.candidate.bands,
-            one.n_parameters,
-            one.evaluation.chi_square("common"),
-            one.bic - least,
-            float(np.abs(step_errors(one.evaluation)).max()),
-            float(one.evaluation.depths.max()),
-            one.starts,
-            one.followed,
-            one.reached,
+            ", ".join(name.replace("_", " ") for name in fit.rung.candidate.effects) or "none",
+            ", ".join(fit.rung.closures) or "none",
+            fit.rung.candidate.reading.replace("_", " "),
+            fit.rung.candidate.bands,
+            fit.n_parameters,
+            fit.evaluation.chi_square("common"),
+            fit.bic - least,
+            float(np.abs(step_errors(fit.evaluation)).max()),
+            float(fit.evaluation.depths.max()),
+            fit.starts,
+            fit.followed,
+            fit.reached,
         )
-        for one in common
+        for fit in common
     )
     columns = (
         Column("effects"),
@@ -315,7 +363,7 @@ def ladder_table(fits: Sequence[Fit]) -> Table:
 def noise_table(fits: Sequence[Fit]) -> Table:
     """Return the rungs fitted with node noise of unknown size, the likeliest first."""
     noisy = with_noise(fits)
-    rows = tuple(_noise_row(one, noisy[0].bic) for one in noisy)
+    rows = tuple(_noise_row(fit, noisy[0].bic) for fit in noisy)
     columns = (
         Column("model"),
         Column("parameters"),
@@ -361,14 +409,14 @@ def _noise_row(fit: Fit, least: float) -> tuple[Cell, ...]:
 
 
 def _noise_findings(noisy: Sequence[Fit]) -> list[Finding]:
-    meeting, both = _meeting(noisy), gives_both(noisy)
+    meeting, groups = _meeting(noisy), gives_both(noisy)
     grown, printed = growth_of_rmse(), TABLE_5[4].rmse_arcsec / TABLE_5[3].rmse_arcsec
     return [
         Finding(
             bool(meeting),
             f"With node noise, {len(meeting)} of {len(noisy)} models give the nine numbers and all "
-            f"four steps; {len(both)} of them have the published optima within the spread of what "
-            "would be chosen.",
+            f"four steps; {len(groups)} of them have the published optima within the spread of "
+            "what would be chosen.",
             fitted=True,
         ),
         Finding(

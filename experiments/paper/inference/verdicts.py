@@ -12,15 +12,86 @@ from scipy.stats import chi2
 
 from experiments.paper.inference.data import Fit
 from experiments.paper.inference.likelihood import (
+    BAND,
+    BOX,
     DEPTH_TOLERANCE,
     FITTED,
+    FRONT_WIDTHS,
     OBSERVED,
     READING,
     Evaluation,
 )
-from experiments.paper.inference.noisy_front import NoisyChoice, noisy_choice
+from experiments.paper.inference.moments import TensorSurrogate
+from experiments.paper.inference.node_noise import grid_influence
 from experiments.paper.inference.rungs import RIGID, Rung
 from experiments.paper.inference.search import BASIN
+from experiments.published_values import TABLE_9
+from pymoo_hdte.decision import PREFERENCES, WeightedUtopia
+
+PER_AXIS = 5
+"""Designs on each axis of the box: K, J_in, B_in and B_fc. Noise makes B_in matter, too."""
+DRAWN = 400
+SEED = 3
+RANGE = (2.5, 97.5)
+"""Percentiles of a 95 % range."""
+FEATURES = ("width of the mean", "width of the std", *(f"K {name}" for name in PREFERENCES))
+"""Of a front, arcsec, and of the three designs chosen from it, as a share of the nominal K."""
+
+
+@dataclass(frozen=True)
+class NoisyChoice:
+    """Ranges of `FEATURES` over noise polynomials, (5, 2), and the published values, (5,)."""
+
+    ranges: NDArray[np.float64]
+    published: NDArray[np.float64]
+
+    @property
+    def holds_the_published(self) -> bool:
+        """Whether every published value lies within its range."""
+        low, high = self.ranges.T
+        return bool(np.all((low <= self.published) & (self.published <= high)))
+
+
+def noisy_choice(
+    rung: Rung, parameters: dict[str, float], node_noise: float, n: int = DRAWN
+) -> NoisyChoice:
+    """Return what preferences choose under n noise polynomials of this size in arcsec."""
+    surrogate = TensorSurrogate.fit(rung, parameters)
+    nominal = surrogate.model.nominal[1:]
+    shares = 1.0 + np.linspace(-BOX, BOX, PER_AXIS)
+    grid = np.stack(np.meshgrid(*[shares] * len(nominal), indexing="ij"), axis=-1)
+    designs = grid.reshape(-1, len(nominal))
+    influence = grid_influence(surrogate, nominal * designs, BAND)
+    noise = node_noise * np.random.default_rng(SEED).standard_normal(
+        (n, influence.of_means.shape[1])
+    )
+    objectives = np.stack(
+        [
+            influence.means + noise @ influence.of_means.T,
+            influence.stds + noise @ influence.of_stds.T,
+        ],
+        axis=-1,
+    )
+    features = np.array([_features(values, designs[:, 0]) for values in objectives])
+    # Rounded to four digits, one of the printed values lies outside the box.
+    stiffness = [min(TABLE_9[name][0] / nominal[0], 1.0 + BOX) for name in PREFERENCES]
+    published = np.array([*FRONT_WIDTHS, *stiffness])
+    return NoisyChoice(np.percentile(features, RANGE, axis=0).T, published)
+
+
+def _features(
+    objectives: NDArray[np.float64], stiffness: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return `FEATURES` of designs with objectives (n, 2) and shares of the nominal K, (n,)."""
+    order = np.lexsort((objectives[:, 1], objectives[:, 0]))
+    lowest = np.minimum.accumulate(objectives[order, 1])
+    front = order[np.concatenate([[True], objectives[order[1:], 1] < lowest[:-1]])]
+    chosen = [
+        front[WeightedUtopia(weights).do(objectives[front])] for weights in PREFERENCES.values()
+    ]
+    start, end = objectives[chosen[0]], objectives[chosen[-1]]
+    return np.array([end[0] - start[0], start[1] - end[1], *stiffness[chosen]])
+
 
 STEPS = (
     ("accuracy_first", "balanced"),
@@ -44,14 +115,14 @@ class Named:
 
 def chosen_fits(fits: Sequence[Fit]) -> list[Named]:
     """Return the fits that stand for the outcome: `PRESET`'s kind, and the best of each target."""
-    (independent,) = (one for one in fits if one.target == "independent")
-    plain = [one for one in fits if one.target == "common" and not one.rung.closures]
-    closed = [one for one in fits if one.target == "common" and one.rung.closures]
-    front = [one for one in fits if one.target == "front"]
-    same = next(one for one in plain if one.rung == independent.rung)
+    (independent,) = (fit for fit in fits if fit.target == "independent")
+    plain = [fit for fit in fits if fit.target == "common" and not fit.rung.closures]
+    closed = [fit for fit in fits if fit.target == "common" and fit.rung.closures]
+    front = [fit for fit in fits if fit.target == "front"]
+    same = next(fit for fit in plain if fit.rung == independent.rung)
 
     def best(group: Sequence[Fit]) -> Fit:
-        return min(group, key=lambda one: one.deviance)
+        return min(group, key=lambda fit: fit.deviance)
 
     return [
         Named(f"as {PRESET}: numbers taken as independent", independent),
@@ -73,18 +144,18 @@ def noisy_fits(fits: Sequence[Fit]) -> list[Named]:
 
 def without_noise(fits: Sequence[Fit]) -> list[Fit]:
     """Return the fits in whose likelihood the nodes are free of noise."""
-    return [one for one in fits if one.target != "noise"]
+    return [fit for fit in fits if fit.target != "noise"]
 
 
 def with_noise(fits: Sequence[Fit]) -> list[Fit]:
     """Return the fits with node noise of unknown size, the likeliest by BIC first."""
-    return sorted((one for one in fits if one.target == "noise"), key=lambda one: one.bic)
+    return sorted((fit for fit in fits if fit.target == "noise"), key=lambda fit: fit.bic)
 
 
 def rigid(fits: Sequence[Fit]) -> Fit:
     """Return the likeliest of the fits of a rigid drive with a share of torsion, and no more."""
-    alike = [one for one in fits if not one.rung.candidate.effects and one.rung.closures == RIGID]
-    return min(alike, key=lambda one: one.bic)
+    alike = [fit for fit in fits if not fit.rung.candidate.effects and fit.rung.closures == RIGID]
+    return min(alike, key=lambda fit: fit.bic)
 
 
 def choice_of(fit: Fit) -> NoisyChoice:
@@ -103,41 +174,41 @@ def steps_of(predicted: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def step_errors(
-    found: Evaluation, sampling_alone: bool = False, node_noise: float = 0.0
+    evaluation: Evaluation, sampling_alone: bool = False, node_noise: float = 0.0
 ) -> NDArray[np.float64]:
     """Return by how many standard errors each step misses the printed one, shape (4,).
 
     With ``sampling_alone`` without `READING`, what the text leaves open. ``node_noise`` is that of
     the surrogate's runs, arcsec.
     """
-    error = uncertainty_of_steps(found, sampling_alone, node_noise)
-    return np.asarray((steps_of(found.predicted) - steps_of(OBSERVED)) / error)
+    error = uncertainty_of_steps(evaluation, sampling_alone, node_noise)
+    return np.asarray((steps_of(evaluation.predicted) - steps_of(OBSERVED)) / error)
 
 
 def uncertainty_of_steps(
-    found: Evaluation, sampling_alone: bool = False, node_noise: float = 0.0
+    evaluation: Evaluation, sampling_alone: bool = False, node_noise: float = 0.0
 ) -> NDArray[np.float64]:
     """Return the standard errors of the steps, arcsec, shape (4,), as `step_errors` takes them."""
     contrast = _difference()
-    variance = np.diag(contrast @ found.covariance_with(node_noise) @ contrast.T)
+    variance = np.diag(contrast @ evaluation.covariance_with(node_noise) @ contrast.T)
     # Each step is the difference of two numbers.
     return np.asarray(np.sqrt(variance - (2.0 * READING**2 if sampling_alone else 0.0)))
 
 
-def noise_that_excuses(found: Evaluation) -> NDArray[np.float64]:
+def noise_that_excuses(evaluation: Evaluation) -> NDArray[np.float64]:
     """Return the least node noise with which each step misses by `WITHIN` at most, arcsec, (4,)."""
-    misses = steps_of(found.predicted) - steps_of(OBSERVED)
-    without, unit = (uncertainty_of_steps(found, node_noise=size) ** 2 for size in (0.0, 1.0))
+    misses = steps_of(evaluation.predicted) - steps_of(OBSERVED)
+    without, unit = (uncertainty_of_steps(evaluation, node_noise=size) ** 2 for size in (0.0, 1.0))
     lacking = (misses / WITHIN) ** 2 - without
     return np.asarray(np.sqrt(np.maximum(lacking, 0.0) / (unit - without)))
 
 
 def gives_trade_off(fit: Fit) -> bool:
     """Whether all four steps and the nine numbers are met."""
-    found = fit.evaluation
+    evaluation = fit.evaluation
     target = "noise" if fit.target == "noise" else "common"
-    likely = chi2.sf(found.chi_square(target), len(OBSERVED)) > SIGNIFICANT
-    errors = step_errors(found, node_noise=fit.node_noise)
+    likely = chi2.sf(evaluation.chi_square(target), len(OBSERVED)) > SIGNIFICANT
+    errors = step_errors(evaluation, node_noise=fit.node_noise)
     return bool(likely and np.all(np.abs(errors) <= WITHIN))
 
 
@@ -155,29 +226,29 @@ def undominated(fit: Fit) -> bool:
 def above_a_special_case(fits: Sequence[Fit]) -> list[Fit]:
     """Return the fits whose search ended above a model that theirs contains: it fell short."""
     return [
-        one
-        for one in fits
+        fit
+        for fit in fits
         if any(
-            other.target == one.target
-            and _contains(one.rung, other.rung)
-            and other.deviance + BASIN < one.deviance
-            for other in fits
+            rival.target == fit.target
+            and _contains(fit.rung, rival.rung)
+            and rival.deviance + BASIN < fit.deviance
+            for rival in fits
         )
     ]
 
 
-def _contains(one: Rung, other: Rung) -> bool:
-    wide, special = one.candidate, other.candidate
+def _contains(rung: Rung, rival: Rung) -> bool:
+    wide, special = rung.candidate, rival.candidate
     return (
         (wide.reading, wide.bands) == (special.reading, special.bands)
         and set(wide.effects) >= set(special.effects)
-        and set(one.closures) >= set(other.closures)
+        and set(rung.closures) >= set(rival.closures)
     )
 
 
 def gives_both(fits: Sequence[Fit]) -> list[Fit]:
     """Return the fits that give the trade-off and leave the optima undominated."""
-    return [one for one in fits if gives_trade_off(one) and undominated(one)]
+    return [fit for fit in fits if gives_trade_off(fit) and undominated(fit)]
 
 
 def describe(rung: Rung) -> str:
@@ -191,9 +262,9 @@ def describe(rung: Rung) -> str:
 def _difference() -> NDArray[np.float64]:
     """Return the matrix from the nine numbers to the steps, means first, shape (4, 9)."""
     rows = np.zeros((4, len(FITTED)))
-    for place, (moment, (first, last)) in enumerate(
+    for place, (moment, (start, end)) in enumerate(
         (moment, step) for moment in ("mean", "std") for step in STEPS
     ):
-        rows[place, FITTED.index(f"{moment}_{first}")] = -1.0
-        rows[place, FITTED.index(f"{moment}_{last}")] = 1.0
+        rows[place, FITTED.index(f"{moment}_{start}")] = -1.0
+        rows[place, FITTED.index(f"{moment}_{end}")] = 1.0
     return rows

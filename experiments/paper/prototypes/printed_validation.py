@@ -161,11 +161,11 @@ def nearest_assignment(predictions: Values, *, to: str, ranked: bool) -> Assignm
     for (worst, least), measured in product(permutations(range(_N), 2), _starts(predictions)):
         residual = np.full(_N, MAE)
         residual[worst], residual[least] = MAX_ERROR, bounds().smallest_residual
-        found = _solve(predictions, Assignment(measured, measured - residual), worst, to, ranked)
-        if found is not None:
-            distance = float(np.linalg.norm(getattr(found, to) - predictions))
+        solution = _solve(predictions, Assignment(measured, measured - residual), worst, to, ranked)
+        if solution is not None:
+            distance = float(np.linalg.norm(getattr(solution, to) - predictions))
             if distance < shortest:
-                best, shortest = found, distance
+                best, shortest = solution, distance
     return best
 
 

@@ -96,7 +96,7 @@ class Case:
     @property
     def names(self) -> tuple[str, ...]:
         """Names of the hidden effects."""
-        return tuple(one.name for one in self.drawn)
+        return tuple(effect.name for effect in self.drawn)
 
     @property
     def truth(self) -> str:
@@ -107,7 +107,7 @@ class Case:
     @property
     def forms(self) -> str:
         """Forms of the hidden effects, in words."""
-        return "; ".join(one.form for one in self.drawn)
+        return "; ".join(effect.form for effect in self.drawn)
 
     def generator(self, purpose: str) -> np.random.Generator:
         """Return the generator for one purpose; those of two purposes are independent."""
@@ -118,12 +118,12 @@ class Case:
 def all_cases(root: int = SCORING_SEED) -> list[Case]:
     """Return all cases of a root seed, in the order in which they are run."""
     counts: dict[str, int] = {}
-    found = []
+    cases = []
     for kind in BLOCK * BLOCKS:
         number = counts.get(kind, 0)
         counts[kind] = number + 1
-        found.append(Case(kind, number, root))
-    return found
+        cases.append(Case(kind, number, root))
+    return cases
 
 
 def _several(rng: np.random.Generator, count: int) -> tuple[Drawn, ...]:
@@ -133,7 +133,7 @@ def _several(rng: np.random.Generator, count: int) -> tuple[Drawn, ...]:
         names = rng.choice(list(LISTED), count, replace=False).tolist()
         effects = tuple(draw_effect(name, int(rng.integers(FORMS[name])), rng) for name in names)
         try:
-            equipped(bench.machine, bench.sensors, tuple(one.hidden for one in effects))
+            equipped(bench.machine, bench.sensors, tuple(effect.hidden for effect in effects))
         except Clash:
             continue
         return effects

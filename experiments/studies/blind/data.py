@@ -12,10 +12,10 @@ from pathlib import Path
 from experiments.runner.campaign import Run
 from experiments.runner.committed import read_origin, read_rows, table_with_origin
 from experiments.studies.blind.cases import Case
-from experiments.studies.blind.codes import ERROR, NAMES, PORTS, STATUSES, word, words_of_set
 from experiments.studies.blind.outcome import Outcome
 from experiments.studies.blind.scoring import NUMBERS, PARTS, PLACES, RIVALS
-from pymoo_hdte._io.text_table import csv_text
+from experiments.studies.blind.truth import ERROR, NAMES, PORTS, STATUSES, word, words_of_set
+from pymoo_hdte._io.csv_table import csv_text
 
 _CASE = ("kind", "number", "truth", "forms", "stress")
 _WORDS = ("status", "probability", "chosen", "equivalents", "members", "truth_in_class", *RIVALS)
@@ -49,22 +49,38 @@ def outcome(case: Case, run: Run) -> Outcome:
 def format_outcomes(outcomes: Sequence[Outcome]) -> str:
     """Return the CSV text of outcomes, with seed, date and versions in a first comment line."""
     rows = []
-    for one in outcomes:
-        said = "" if one.probability is None else f"{one.probability:.6g}"
-        words = [one.status, said, " ".join(one.chosen), " ".join(one.equivalents), one.members]
-        answers = [one.answers.get(name, "") for name in RIVALS]
-        numbers = [f"{one.numbers[n]:.6g}" if n in one.numbers else "" for n in NUMBERS]
-        rows.append([*_identity(one.case), *words, int(one.truth_in_class), *answers, *numbers])
-    seeds = sorted({one.case.root for one in outcomes})
+    for case_outcome in outcomes:
+        said = "" if case_outcome.probability is None else f"{case_outcome.probability:.6g}"
+        words = [
+            case_outcome.status,
+            said,
+            " ".join(case_outcome.chosen),
+            " ".join(case_outcome.equivalents),
+            case_outcome.members,
+        ]
+        answers = [case_outcome.answers.get(name, "") for name in RIVALS]
+        numbers = [
+            f"{case_outcome.numbers[n]:.6g}" if n in case_outcome.numbers else "" for n in NUMBERS
+        ]
+        rows.append(
+            [
+                *_identity(case_outcome.case),
+                *words,
+                int(case_outcome.truth_in_class),
+                *answers,
+                *numbers,
+            ]
+        )
+    seeds = sorted({case_outcome.case.root for case_outcome in outcomes})
     return table_with_origin([*_CASE, *_WORDS, *NUMBERS], rows, seed=seeds)
 
 
 def format_seconds(outcomes: Sequence[Outcome]) -> str:
     """Return the CSV text of the seconds of outcomes."""
     rows = []
-    for one in outcomes:
-        seconds = [f"{second:.3g}" for second in one.seconds]
-        rows.append([*_identity(one.case), *seconds, *[""] * (len(PARTS) - len(seconds))])
+    for case_outcome in outcomes:
+        seconds = [f"{second:.3g}" for second in case_outcome.seconds]
+        rows.append([*_identity(case_outcome.case), *seconds, *[""] * (len(PARTS) - len(seconds))])
     return csv_text([*_CASE, *PARTS], rows)
 
 

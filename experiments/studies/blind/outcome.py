@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from experiments.studies.blind.cases import Case
-from experiments.studies.blind.codes import ERROR
 from experiments.studies.blind.scoring import MOST_IN_CLASS
-from experiments.studies.blind.truth import may_be_named, one_name, to_be_named
+from experiments.studies.blind.truth import ERROR, may_be_named, one_name, to_be_named
 from pymoo_hdte.discrepancy._selection.verdict import EXPLAINED
 from pymoo_hdte.discrepancy._verdicts.validation_drive import Gap
 
@@ -178,7 +177,7 @@ class Outcome:
         """
         if self.status == ERROR:
             return 1.0
-        before, error = (self.numbers.get(f"bias_{one}", 0.0) for one in ("before", "error"))
+        before, error = (self.numbers.get(f"bias_{state}", 0.0) for state in ("before", "error"))
         after = self.numbers.get("bias_after", 0.0)
         if max(before, after) <= error:
             return None

@@ -14,7 +14,7 @@ from pathlib import Path
 from experiments.runner.committed import read_rows
 from experiments.runner.result import Cell, Column, Table
 from experiments.studies.blind.outcome import Outcome
-from pymoo_hdte._io.text_table import csv_text
+from pymoo_hdte._io.csv_table import csv_text
 
 RUNS = "blind_runs.csv"
 SINCE = 2305
@@ -40,7 +40,7 @@ class Counts:
 
     def __add__(self, other: Counts) -> Counts:
         pairs = zip(astuple(self), astuple(other), strict=True)
-        return Counts(*(one + two for one, two in pairs))
+        return Counts(*(own + two for own, two in pairs))
 
 
 @dataclass(frozen=True)
@@ -56,22 +56,22 @@ class BlindRun:
 def run_of(outcomes: Sequence[Outcome], first: int, code: str = "") -> BlindRun:
     """Return the run of outcomes, which stand together in the list, from its first number on."""
     single, pair, triple, clean = (
-        [one for one in outcomes if one.case.kind == kind]
+        [outcome for outcome in outcomes if outcome.case.kind == kind]
         for kind in ("single", "pair", "triple", "none")
     )
-    plain = [one for one in outcomes if one.confident]
-    covered = [held for one in outcomes for held in one.covered]
+    plain = [outcome for outcome in outcomes if outcome.confident]
+    covered = [held for outcome in outcomes for held in outcome.covered]
     counts = Counts(
         plain=len(plain),
-        plain_wrong=sum(one.wrong_confident for one in plain),
+        plain_wrong=sum(outcome.wrong_confident for outcome in plain),
         single=len(single),
-        single_right=sum(one.right for one in single),
+        single_right=sum(outcome.right for outcome in single),
         pair=len(pair),
-        pair_both=sum(one.all_named for one in pair),
+        pair_both=sum(outcome.all_named for outcome in pair),
         triple=len(triple),
-        triple_two=sum(one.two_named for one in triple),
+        triple_two=sum(outcome.two_named for outcome in triple),
         clean=len(clean),
-        clean_alarms=sum(one.status != "adequate" for one in clean),
+        clean_alarms=sum(outcome.status != "adequate" for outcome in clean),
         interval=len(covered),
         interval_holds=sum(covered),
     )
@@ -85,7 +85,7 @@ def read_runs(path: Path) -> list[BlindRun]:
             int(row["first"]),
             int(row["last"]),
             row["code"],
-            Counts(*(int(row[one.name]) for one in fields(Counts))),
+            Counts(*(int(row[field.name]) for field in fields(Counts))),
         )
         for row in read_rows(path)
     ]
@@ -93,25 +93,25 @@ def read_runs(path: Path) -> list[BlindRun]:
 
 def format_runs(runs: Sequence[BlindRun]) -> str:
     """Return the CSV text of runs."""
-    columns = ["first", "last", "code", *(one.name for one in fields(Counts))]
-    rows = [(one.first, one.last, one.code, *astuple(one.counts)) for one in runs]
+    columns = ["first", "last", "code", *(field.name for field in fields(Counts))]
+    rows = [(run.first, run.last, run.code, *astuple(run.counts)) for run in runs]
     return csv_text(columns, rows)
 
 
 def total(runs: Sequence[BlindRun]) -> Counts:
     """Return the counts of several runs together."""
-    return sum((one.counts for one in runs[1:]), runs[0].counts)
+    return sum((run.counts for run in runs[1:]), runs[0].counts)
 
 
 def recent(runs: Sequence[BlindRun]) -> list[BlindRun]:
     """Return the runs since case `SINCE`, or the last one if none begins there or later."""
-    return [one for one in runs if one.first >= SINCE] or list(runs[-1:])
+    return [run for run in runs if run.first >= SINCE] or list(runs[-1:])
 
 
 def runs_table(runs: Sequence[BlindRun]) -> Table:
     """Return a row a run, all of them together last."""
     rows: list[tuple[Cell, ...]] = [
-        (f"{one.first} to {one.last}", one.code, *astuple(one.counts)) for one in runs
+        (f"{run.first} to {run.last}", run.code, *astuple(run.counts)) for run in runs
     ]
     rows.append((f"{runs[0].first} to {runs[-1].last}", "all", *astuple(total(runs))))
     groups = {

@@ -17,8 +17,17 @@ from tqdm import tqdm
 from experiments.runner.campaign import Run
 from experiments.studies.blind.campaigns import Hiding, campaign_of, hiding
 from experiments.studies.blind.cases import Case
-from experiments.studies.blind.codes import ERROR, NAMES, PORTS, STATUSES, code, code_of_set
-from experiments.studies.blind.truth import may_be_named, one_name, to_be_named
+from experiments.studies.blind.truth import (
+    ERROR,
+    NAMES,
+    PORTS,
+    STATUSES,
+    code,
+    code_of_set,
+    may_be_named,
+    one_name,
+    to_be_named,
+)
 from pymoo_hdte.discrepancy import Campaign
 from pymoo_hdte.discrepancy._answers.next_test_drive import next_experiment
 from pymoo_hdte.discrepancy._answers.where.location import locate
@@ -155,24 +164,26 @@ def verdict_scores(case: Case, verdict: Verdict) -> Scores:
         scores[place] = code(candidate.name, NAMES)
         scores[f"{place}_port"] = code(candidate.port, PORTS)
         scores[f"{place}_order"] = np.nan if candidate.order is None else candidate.order
-    sets = [_names(one) for one in verdict.equivalent]
+    sets = [_names(hypothesis) for hypothesis in verdict.equivalent]
     scores["equivalents"] = code_of_set(set().union(*sets))
     rivals = verdict.equivalent if verdict.chosen is None else (verdict.chosen, *verdict.equivalent)
-    scores["members"] = float(len({_places(one) for one in rivals})) if rivals else 0.0
+    scores["members"] = (
+        float(len({_places(hypothesis) for hypothesis in rivals})) if rivals else 0.0
+    )
     hidden, allowed = to_be_named(case), may_be_named(case)
     scores["truth_in_class"] = float(
-        bool(hidden) and any(hidden <= _names(one) <= allowed for one in rivals)
+        bool(hidden) and any(hidden <= _names(hypothesis) <= allowed for hypothesis in rivals)
     )
     return scores
 
 
-def _names(one: Hypothesis) -> set[str]:
-    return {one_name(candidate.name, candidate.port) for candidate in one.candidates}
+def _names(hypothesis: Hypothesis) -> set[str]:
+    return {one_name(candidate.name, candidate.port) for candidate in hypothesis.candidates}
 
 
-def _places(one: Hypothesis) -> frozenset[tuple[str, str, float | None]]:
+def _places(hypothesis: Hypothesis) -> frozenset[tuple[str, str, float | None]]:
     """Return names, ports and orders: forms of one effect are one member of a class."""
-    return frozenset((one_name(c.name, c.port), c.port, c.order) for c in one.candidates)
+    return frozenset((one_name(c.name, c.port), c.port, c.order) for c in hypothesis.candidates)
 
 
 def coverage_scores(hidden: Hiding, verdict: Verdict) -> Scores:
@@ -197,9 +208,9 @@ def truly_moved(analysis: DriveFinding, twin: Campaign) -> Flags:
     The twin is the same run without them: it differs by nothing else, not even by its noise, but
     for the rounding of the encoders, a hundredth of that noise's variance.
     """
-    kept = analysis.data.features
+    features = analysis.data.features
     moved: NDArray[np.float64] = cell_chi_square(
-        analysis.data, kept.values - _features(twin, kept).values
+        analysis.data, features.values - _features(twin, features).values
     )
     return moved > cell_degrees_of_freedom(analysis.data)
 
@@ -213,9 +224,9 @@ def location_scores(moved: Flags, flagged: Flags) -> Scores:
     }
 
 
-def twin_fit(twin: Campaign, kept: Features) -> Fit:
+def twin_fit(twin: Campaign, features: Features) -> Fit:
     """Fit the base to a campaign without the effect, with the records and orders of ``kept``."""
-    return fit(training_data(twin, _features(twin, kept)))
+    return fit(training_data(twin, _features(twin, features)))
 
 
 def bias_scores(verdict: Verdict, twin: Fit) -> Scores:
@@ -254,11 +265,11 @@ def gap_scores(proof: Proof) -> Scores:
     return scores
 
 
-def _features(campaign: Campaign, kept: Features) -> Features:
+def _features(campaign: Campaign, features: Features) -> Features:
     """Return the features of a campaign in the records and at the orders of ``kept``."""
-    names = {record.name for record in kept.records}
+    names = {record.name for record in features.records}
     records = [record for record in campaign.train if record.name in names]
-    return measure(campaign, records, kept.orders.tolist())
+    return measure(campaign, records, features.orders.tolist())
 
 
 def _root_mean_square(values: NDArray[np.float64]) -> float:

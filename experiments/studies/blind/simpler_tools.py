@@ -135,10 +135,10 @@ def _load(data: Data) -> Values:
     return data.features.conditions.output_torque
 
 
-def _correlation(one: Values, other: Values) -> float:
-    if np.ptp(one) == 0.0 or np.ptp(other) == 0.0:
+def _correlation(column: Values, other: Values) -> float:
+    if np.ptp(column) == 0.0 or np.ptp(other) == 0.0:
         return 0.0
-    return float(np.corrcoef(one, other)[0, 1])
+    return float(np.corrcoef(column, other)[0, 1])
 
 
 def sparse_regression(analysis: DriveFinding) -> str:
@@ -185,8 +185,8 @@ def sparse_regression(analysis: DriveFinding) -> str:
         return "unlisted"
     shares: dict[str, float] = {}
     for name in dict.fromkeys(term.name for term in library):
-        kept = support & np.array([term.name == name for term in library])
-        shares[name] = explained(laws[:, kept], target, positive[kept])
+        columns = support & np.array([term.name == name for term in library])
+        shares[name] = explained(laws[:, columns], target, positive[columns])
     return max(shares, key=lambda name: shares[name])
 
 
@@ -198,13 +198,13 @@ def chosen_support(train: Regression, test: Regression) -> NDArray[np.bool_]:
     laws = laws[:, known] / norm[known]
     least = np.sqrt(chi2.isf(FALSE_ALARMS / laws.shape[1], 1))
     largest = float(np.max(np.abs(laws.T @ target)))
-    found = [np.zeros(len(norm), dtype=bool)]
+    supports = [np.zeros(len(norm), dtype=bool)]
     if largest > least:
         for threshold in np.geomspace(least, largest, _THRESHOLDS):
             support = np.zeros(len(norm), dtype=bool)
             support[known] = stlsq_support(laws, target, float(threshold))
-            found.append(support)
-    return min(found, key=lambda one: held_out_misfit(train, test, one))
+            supports.append(support)
+    return min(supports, key=lambda one: held_out_misfit(train, test, one))
 
 
 def stlsq_support(laws: Values, target: Values, threshold: float) -> NDArray[np.bool_]:
@@ -212,8 +212,8 @@ def stlsq_support(laws: Values, target: Values, threshold: float) -> NDArray[np.
     with warnings.catch_warnings():
         # The warning of a threshold that no column passes; that is a valid answer here.
         warnings.filterwarnings("ignore", message="Sparsity parameter is too big")
-        found = STLSQ(threshold=threshold).fit(laws, target[:, None])
-    return np.asarray(found.coef_[0] != 0.0)
+        solution = STLSQ(threshold=threshold).fit(laws, target[:, None])
+    return np.asarray(solution.coef_[0] != 0.0)
 
 
 def held_out_misfit(train: Regression, test: Regression, support: NDArray[np.bool_]) -> float:
@@ -226,9 +226,9 @@ def held_out_misfit(train: Regression, test: Regression, support: NDArray[np.boo
     norm = np.linalg.norm(columns, axis=0)
     scale = np.where(norm > 0.0, norm, 1.0)
     solution = np.linalg.lstsq(columns / scale, train.target, rcond=1e-10)[0] / scale
-    left = test.target - np.hstack([test.base, test.library[:, support]]) @ solution
+    residual = test.target - np.hstack([test.base, test.library[:, support]]) @ solution
     count = np.bincount(test.record)
-    reduced = np.bincount(test.record, left**2) / count
+    reduced = np.bincount(test.record, residual**2) / count
     return float(np.average(np.log(reduced), weights=count))
 
 
@@ -277,8 +277,8 @@ def explained(columns: Values, target: Values, positive: NDArray[np.bool_] | Non
     short = basis.T @ target
     if positive is None or not positive.any():
         return float(short @ short)
-    found = lsq_linear(triangle, short, (np.where(positive, 0.0, -np.inf), np.inf))
-    return float(short @ short - 2.0 * found.cost)
+    solution = lsq_linear(triangle, short, (np.where(positive, 0.0, -np.inf), np.inf))
+    return float(short @ short - 2.0 * solution.cost)
 
 
 def _base_values(analysis: DriveFinding) -> Values:

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from experiments.comparing.rates import Estimate, median
+from experiments.comparing.statistics import Estimate, median
 from experiments.runner.result import SCORE_STATES, Cell, Column, Table, scored, significant
-from experiments.studies.blind.codes import STATUSES
 from experiments.studies.blind.outcome import Outcome
 from experiments.studies.blind.rig.forms import LISTED
 from experiments.studies.blind.runs import BlindRun, total
@@ -23,6 +22,7 @@ from experiments.studies.blind.targets import (
     share,
     time_demand,
 )
+from experiments.studies.blind.truth import STATUSES
 
 JUDGED_COLUMNS = (
     Column("demand"),
@@ -74,7 +74,7 @@ def pooled_table(runs: Sequence[BlindRun]) -> Table:
 
 def _short_first(judged: Iterable[Judged]) -> list[Judged]:
     order = (*SCORE_STATES[::-1], NOT_RUN)
-    return sorted(judged, key=lambda one: order.index(one.verdict))
+    return sorted(judged, key=lambda judgement: order.index(judgement.verdict))
 
 
 def times_tables(outcomes: Sequence[Outcome]) -> tuple[Table, Table]:
@@ -87,9 +87,9 @@ def times_tables(outcomes: Sequence[Outcome]) -> tuple[Table, Table]:
     groups = [(KINDS[kind], select(outcomes, kind)) for kind in KINDS if kind != "single"]
     groups += [(_plain(name), select(outcomes, "single", name)) for name in LISTED]
     for words, chosen in groups:
-        seconds = [one.seconds for one in chosen if one.seconds]
-        parts = [median([one[k] for one in seconds]).value for k in range(len(PARTS))]
-        whole = median([sum(one) for one in seconds])
+        seconds = [outcome.seconds for outcome in chosen if outcome.seconds]
+        parts = [median([second[k] for second in seconds]).value for k in range(len(PARTS))]
+        whole = median([sum(second) for second in seconds])
         rows.append((words, whole.n, *parts, whole.value, whole.high))
     columns = (
         Column("hidden"),
@@ -109,12 +109,12 @@ def status_table(outcomes: Sequence[Outcome]) -> Table:
     groups.append((NOTHING_STRESSED, nothing_stressed(outcomes)))
     rows: list[tuple[Cell, ...]] = []
     for words, chosen in groups:
-        counts = [sum(one.status == status for one in chosen) for status in STATUSES]
+        counts = [sum(outcome.status == status for outcome in chosen) for status in STATUSES]
         flags = ("right_answer", "right", "wrong_confident", "wrong_partial")
-        scores = [sum(getattr(one, flag) for one in chosen) for flag in flags]
-        partly = sum(one.status == "partial" and one.true_names for one in chosen)
-        both = sum(one.status == "partial" and one.two_named for one in chosen)
-        rows.append((words, len(chosen), *counts, *scores, partly, both))
+        scores = [sum(getattr(outcome, flag) for outcome in chosen) for flag in flags]
+        partly = sum(outcome.status == "partial" and outcome.true_names for outcome in chosen)
+        pairs = sum(outcome.status == "partial" and outcome.two_named for outcome in chosen)
+        rows.append((words, len(chosen), *counts, *scores, partly, pairs))
     columns = (
         Column("hidden"),
         Column("cases"),
@@ -139,19 +139,19 @@ def effects_table(outcomes: Sequence[Outcome]) -> Table:
     rows: list[tuple[Cell, ...]] = []
     for name in LISTED:
         chosen = select(outcomes, "single", name)
-        right = share([one.right for one in chosen])
-        counts = [sum(one.status == status for one in chosen)
+        right = share([outcome.right for outcome in chosen])
+        counts = [sum(outcome.status == status for outcome in chosen)
                   for status in _OTHERS]  # fmt: skip
-        biases = [median([one.numbers.get(f"bias_{state}") for one in chosen]).value
+        biases = [median([outcome.numbers.get(f"bias_{state}") for outcome in chosen]).value
                   for state in ("before", "after", "error")]  # fmt: skip
-        gaps = [one.gap("leading") for one in chosen]
+        gaps = [outcome.gap("leading") for outcome in chosen]
         rows.append((
             _plain(name), len(chosen), right.value, right.low, right.high,
-            sum(one.wrong_confident for one in chosen), *counts,
-            median([one.f1 for one in chosen]).value, *biases,
-            median([one.bias_ratio for one in chosen]).value,
-            median([one.shrinkage("transmission_error") for one in chosen]).value,
-            median([one.shrinkage("leading") for one in chosen]).value,
+            sum(outcome.wrong_confident for outcome in chosen), *counts,
+            median([outcome.f1 for outcome in chosen]).value, *biases,
+            median([outcome.bias_ratio for outcome in chosen]).value,
+            median([outcome.shrinkage("transmission_error") for outcome in chosen]).value,
+            median([outcome.shrinkage("leading") for outcome in chosen]).value,
             median([g.after / g.noise_floor for g in gaps if g is not None]).value,
         ))  # fmt: skip
     columns = (
@@ -186,8 +186,14 @@ def effects_table(outcomes: Sequence[Outcome]) -> Table:
 
 def _pooled(outcomes: Sequence[Outcome], name: str) -> str:
     """Return the ratio of root mean squares over all cases, after the revision to before it."""
-    numbers = [one.numbers for one in select(outcomes, "single") if f"{name}_before" in one.numbers]
-    squares = [sum(one[f"{name}_{state}"] ** 2 for one in numbers) for state in ("after", "before")]
+    numbers = [
+        outcome.numbers
+        for outcome in select(outcomes, "single")
+        if f"{name}_before" in outcome.numbers
+    ]
+    squares = [
+        sum(values[f"{name}_{state}"] ** 2 for values in numbers) for state in ("after", "before")
+    ]
     return significant((squares[0] / squares[1]) ** 0.5, 2) if numbers else "none"
 
 
@@ -198,15 +204,17 @@ def tools_table(outcomes: Sequence[Outcome]) -> Table:
         chosen = select(outcomes, kind)
         expected = {"none": "adequate", "unlisted": "unlisted"}.get(kind)
         rates: dict[str, Estimate] = {
-            "this workflow, name or class": share([one.right_answer for one in chosen]),
-            "this workflow, first name alone": share([one.right_first for one in chosen]),
+            "this workflow, name or class": share([outcome.right_answer for outcome in chosen]),
+            "this workflow, first name alone": share([outcome.right_first for outcome in chosen]),
         }
         for tool in RIVALS:
-            answers = [one.answers.get(tool, "error") == (expected or one.case.truth)
-                       for one in chosen]  # fmt: skip
+            answers = [outcome.answers.get(tool, "error") == (expected or outcome.case.truth)
+                       for outcome in chosen]  # fmt: skip
             rates[_plain(tool)] = share(answers)
-        for tool, found in rates.items():
-            rows.append((KINDS[kind], tool, found.n, found.value, found.low, found.high))
+        for tool, estimate in rates.items():
+            rows.append(
+                (KINDS[kind], tool, estimate.n, estimate.value, estimate.low, estimate.high)
+            )
         rows.append((KINDS[kind], "chance", None, 1.0 / _ANSWERS, None, None))
     columns = (
         Column("hidden"),
@@ -226,24 +234,25 @@ def tools_table(outcomes: Sequence[Outcome]) -> Table:
 
 def wrong_table(outcomes: Sequence[Outcome]) -> Table:
     """Return every wrong answer that is given with confidence."""
-    wrong = [one for one in outcomes if one.wrong_confident]
+    wrong = [outcome for outcome in outcomes if outcome.wrong_confident]
     title = f"Wrong answers that are given with confidence: {len(wrong)}"
     return _cases_table("wrong", title, wrong, folded=False)
 
 
 def misses_table(outcomes: Sequence[Outcome]) -> Table:
     """Return every case whose verdict is not what it must be."""
-    missed = [one for one in outcomes if not one.right_answer]
+    missed = [outcome for outcome in outcomes if not outcome.right_answer]
     title = f"Cases whose verdict is not what it must be: {len(missed)}"
     return _cases_table("misses", title, missed, folded=True)
 
 
 def _cases_table(name: str, title: str, chosen: Sequence[Outcome], folded: bool) -> Table:
     rows = tuple(
-        (one.case.kind, one.case.number, one.case.truth.replace("+", " + "), one.case.forms,
-         one.case.stress.replace("_", " "), one.status, one.probability, ", ".join(one.chosen),
-         ", ".join(map(_plain, one.equivalents)))
-        for one in chosen
+        (outcome.case.kind, outcome.case.number, outcome.case.truth.replace("+", " + "),
+         outcome.case.forms, outcome.case.stress.replace("_", " "), outcome.status,
+         outcome.probability, ", ".join(outcome.chosen),
+         ", ".join(map(_plain, outcome.equivalents)))
+        for outcome in chosen
     )  # fmt: skip
     columns = (
         Column("kind"),
@@ -267,29 +276,32 @@ def _judged_table(
     note: str,
     wall_times: bool = False,
 ) -> Table:
-    rows = tuple(_judged_row(one) for one in judged)
+    rows = tuple(_judged_row(judgement) for judgement in judged)
     findings = tuple(
-        scored(one.verdict, f"{about} {_sentence(one)}") for one in judged if one.measured.n
+        scored(judgement.verdict, f"{about} {_sentence(judgement)}")
+        for judgement in judged
+        if judgement.measured.n
     )
     return Table(name, title, JUDGED_COLUMNS, rows, note=note, findings=findings,
                  wall_times=wall_times)  # fmt: skip
 
 
-def _judged_row(one: Judged) -> tuple[Cell, ...]:
-    measured = one.measured
-    return (one.what, one.cases, measured.n, _asked(one), measured.value, measured.low,
-            measured.high, one.verdict.lower())  # fmt: skip
+def _judged_row(judgement: Judged) -> tuple[Cell, ...]:
+    measured = judgement.measured
+    return (judgement.what, judgement.cases, measured.n, _asked(judgement), measured.value,
+            measured.low, measured.high, judgement.verdict.lower())  # fmt: skip
 
 
-def _sentence(one: Judged) -> str:
+def _sentence(judgement: Judged) -> str:
+    measured = judgement.measured
     return (
-        f"({one.cases}): {one.what}, {one.measured.in_words} of {one.measured.n}, {_asked(one)} "
-        "required."
+        f"({judgement.cases}): {judgement.what}, {measured.in_words} of {measured.n}, "
+        f"{_asked(judgement)} required."
     )
 
 
-def _asked(one: Judged) -> str:
-    return f"at {'least' if one.at_least else 'most'} {one.required:g}"
+def _asked(judgement: Judged) -> str:
+    return f"at {'least' if judgement.at_least else 'most'} {judgement.required:g}"
 
 
 def _plain(name: str) -> str:

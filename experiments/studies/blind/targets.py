@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
-from experiments.comparing.rates import Estimate, median, rate
+from experiments.comparing.statistics import Estimate, median, rate
+from experiments.runner.result import Cell, Column, Table
 from experiments.studies.blind.outcome import Outcome
 from experiments.studies.blind.runs import Counts
 
@@ -90,8 +92,10 @@ class Judged:
 
 def select(outcomes: Sequence[Outcome], kind: str, name: str | None = None) -> list[Outcome]:
     """Return the outcomes of a kind, and of one truth where it is given."""
-    of_kind = [one for one in outcomes if one.case.kind == kind]
-    return of_kind if name is None else [one for one in of_kind if one.case.truth == name]
+    of_kind = [outcome for outcome in outcomes if outcome.case.kind == kind]
+    return (
+        of_kind if name is None else [outcome for outcome in of_kind if outcome.case.truth == name]
+    )
 
 
 def share(flags: Sequence[bool]) -> Estimate:
@@ -103,24 +107,24 @@ def demands(outcomes: Sequence[Outcome]) -> Iterator[Judged]:
     """Judge everything that must be reached but the time."""
     single, listed = select(outcomes, "single"), KINDS["single"]
     for kind, most in MOST_WRONG.items():
-        wrong = share([one.wrong_confident for one in select(outcomes, kind)])
+        wrong = share([outcome.wrong_confident for outcome in select(outcomes, kind)])
         yield Judged(WRONG, KINDS[kind], most, wrong, at_least=False)
-    yield Judged(RIGHT, listed, LEAST_RIGHT, share([one.right for one in single]))
-    both = share([one.all_named for one in select(outcomes, "pair")])
+    yield Judged(RIGHT, listed, LEAST_RIGHT, share([outcome.right for outcome in single]))
+    both = share([outcome.all_named for outcome in select(outcomes, "pair")])
     yield Judged(BOTH, KINDS["pair"], LEAST_BOTH, both)
-    two = share([one.two_named for one in select(outcomes, "triple")])
+    two = share([outcome.two_named for outcome in select(outcomes, "triple")])
     yield Judged(TWO, KINDS["triple"], LEAST_TWO_OF_THREE, two)
     for words, chosen in (
         (KINDS["none"], select(outcomes, "none")),
         (NOTHING_STRESSED, nothing_stressed(outcomes)),
     ):
-        alarms = share([one.status != "adequate" for one in chosen])
+        alarms = share([outcome.status != "adequate" for outcome in chosen])
         yield Judged(ALARM, words, MOST_ALARMS, alarms, at_least=False)
-    bias = median([one.bias_ratio for one in single])
+    bias = median([outcome.bias_ratio for outcome in single])
     what = "bias left in the base over bias before, median"
     yield Judged(what, listed, MOST_BIAS_LEFT, bias, at_least=False)
-    yield from _covered(share([flag for one in outcomes for flag in one.covered]))
-    f1 = median([one.f1 for one in single])
+    yield from _covered(share([flag for outcome in outcomes for flag in outcome.covered]))
+    f1 = median([outcome.f1 for outcome in single])
     yield Judged("F1 of the flagged cells, median", listed, LEAST_F1, f1)
     for gap in ("transmission_error", "leading"):
         yield from _proof(gap, single)
@@ -148,15 +152,15 @@ def _covered(measured: Estimate) -> Iterator[Judged]:
 def nothing_stressed(outcomes: Sequence[Outcome]) -> list[Outcome]:
     """Return the outcomes in which only what is stated of noise or rows is wrong."""
     return [
-        one
-        for one in select(outcomes, "stressed")
-        if one.nothing_hidden and one.case.stress in ALARM_STRESSES
+        outcome
+        for outcome in select(outcomes, "stressed")
+        if outcome.nothing_hidden and outcome.case.stress in ALARM_STRESSES
     ]
 
 
 def time_demand(outcomes: Sequence[Outcome]) -> Judged:
     """Judge the time of all parts together."""
-    whole = median([sum(one.seconds) if one.seconds else np.inf for one in outcomes])
+    whole = median([sum(outcome.seconds) if outcome.seconds else np.inf for outcome in outcomes])
     return Judged("time of a campaign, median, s", "all kinds", MOST_SECONDS, whole, at_least=False)
 
 
@@ -168,8 +172,65 @@ _GAP_WORDS = {
 
 def _proof(gap: str, single: Sequence[Outcome]) -> Iterator[Judged]:
     where, multiple = f"one listed effect, {_GAP_WORDS[gap]}", FLOOR_MULTIPLE
-    shrunk = median([one.shrinkage(gap) for one in single])
+    shrunk = median([outcome.shrinkage(gap) for outcome in single])
     yield Judged("shrinkage of the held-out gap, median", where, LEAST_SHRINKAGE, shrunk)
-    closed = [one.closed(gap, multiple) for one in single if one.open_before(gap, multiple)]
+    closed = [
+        outcome.closed(gap, multiple) for outcome in single if outcome.open_before(gap, multiple)
+    ]
     what = f"held-out gap within {multiple:g} x the noise floor"
     yield Judged(what, where, LEAST_CLOSED, share(closed))
+
+
+EDGES = (0.0, 0.5, 0.7, 0.8, 0.9, 0.95, 0.99, 1.0)
+"""Of the groups of probabilities; the last holds its upper end."""
+
+
+def reliability(outcomes: Sequence[Outcome]) -> list[tuple[float, Estimate]]:
+    """Return the mean probability said in each group, and the share of what was true."""
+    judged = []
+    for _, _, chosen in _groups(outcomes):
+        if chosen:
+            said = float(np.mean([outcome.probability for outcome in chosen]))
+            judged.append((said, share([outcome.true_statement for outcome in chosen])))
+    return judged
+
+
+def reliability_table(outcomes: Sequence[Outcome]) -> Table:
+    """Return the groups of said probabilities beside what was true."""
+    rows: list[tuple[Cell, ...]] = []
+    for low, high, chosen in _groups(outcomes):
+        said = float(np.mean([outcome.probability for outcome in chosen])) if chosen else None
+        true = share([outcome.true_statement for outcome in chosen])
+        value = true.value if chosen else None
+        rows.append((f"{low:g} to {high:g}", len(chosen), said, value, true.low, true.high))
+    columns = (
+        Column("probability said"),
+        Column("answers"),
+        Column("mean", "", 3, "said"),
+        Column("share", "", 3, "true"),
+        Column("low", "", 3, "true"),
+        Column("high", "", 3, "true"),
+    )
+    silent = sum(outcome.probability is None for outcome in outcomes)
+    note = (
+        "A statement is true if every name in it is hidden, if a class of at most three holds what "
+        "is hidden, if nothing is hidden where the model is called adequate, and if no list holds "
+        "what is hidden where it is called unlisted. Intervals are Clopper and Pearson's. "
+        f"Without probability: {silent} of {len(outcomes)} answers."
+    )
+    return Table("reliability", "What is said with a probability", columns, tuple(rows), note=note)
+
+
+def _groups(outcomes: Sequence[Outcome]) -> list[tuple[float, float, list[Outcome]]]:
+    said = [outcome for outcome in outcomes if outcome.probability is not None]
+    values = np.array([judgement.probability for judgement in said], dtype=float)
+    places = np.searchsorted(np.array(EDGES), values, side="right") - 1
+    places = np.minimum(places, len(EDGES) - 2)
+    return [
+        (
+            low,
+            high,
+            [judgement for judgement, place in zip(said, places, strict=True) if place == number],
+        )
+        for number, (low, high) in enumerate(pairwise(EDGES))
+    ]

@@ -129,11 +129,11 @@ def _load(data: Data, p: dict[str, float]) -> Values:
 
 def _static_error(data: Data, p: dict[str, float]) -> Phasors:
     """Return its phasors (m,)."""
-    found = np.zeros(len(data.features.orders), dtype=complex)
+    phasors = np.zeros(len(data.features.orders), dtype=complex)
     for line, order in enumerate(data.campaign.believed.error_orders):
         phasor = sine_phasor(p[f"error_amplitude_{line}"], p[f"error_phase_{line}"])
-        found[np.isclose(data.features.orders, order)] += phasor
-    return found
+        phasors[np.isclose(data.features.orders, order)] += phasor
+    return phasors
 
 
 def _base_columns(data: Data, values: Values) -> Values:

@@ -54,10 +54,10 @@ def numbers_for(context: Context) -> Numbers:
         present = [name for name in OF_DIRECT if CONTESTANTS[name].available]
         scores = contest_scores(context.campaign, _QUICK, present, BUDGETS[:1], (1, 2))
         return Numbers(scores, _hardness_of(_QUICK, _QUICK_STARTS))
-    found = Numbers(_own_scores(context), _hardness_of(list(CARDS), STARTS))
-    STORED.leave(found.scores, NAME, context)
-    write_atomically(context.out / NAME / HARDNESS, format_hardness(found.hardness).encode())
-    return found._replace(scores=_with_peers(found.scores))
+    computed = Numbers(_own_scores(context), _hardness_of(list(CARDS), STARTS))
+    STORED.leave(computed.scores, NAME, context)
+    write_atomically(context.out / NAME / HARDNESS, format_hardness(computed.hardness).encode())
+    return computed._replace(scores=_with_peers(computed.scores))
 
 
 def committed_numbers() -> Numbers:
@@ -139,18 +139,18 @@ def _hardness_of(problems: Sequence[str], starts: int) -> dict[str, Hardness]:
     }
 
 
-def format_hardness(found: dict[str, Hardness]) -> str:
+def format_hardness(entries: dict[str, Hardness]) -> str:
     """Return the CSV text, with date and versions in a first comment line."""
     rows = (
         [name, *("" if cell is None else f"{cell:.6g}" for cell in entry)]
-        for name, entry in found.items()
+        for name, entry in entries.items()
     )
     return table_with_origin(["problem", *Hardness._fields], rows)
 
 
 def read_hardness(rows: Sequence[dict[str, str]]) -> dict[str, Hardness]:
     """Return what `format_hardness` wrote, from the rows of the table."""
-    found = {}
+    entries = {}
     for row in rows:
         cells = (float(row[name]) if row[name] else None for name in Hardness._fields)
         entry = Hardness(*cast(Any, cells))
@@ -158,5 +158,5 @@ def read_hardness(rows: Sequence[dict[str, str]]) -> dict[str, Hardness]:
             name: None if getattr(entry, name) is None else int(getattr(entry, name))
             for name in ("optima", "pieces")
         }
-        found[row["problem"]] = entry._replace(**cast(Any, counts))
-    return found
+        entries[row["problem"]] = entry._replace(**cast(Any, counts))
+    return entries

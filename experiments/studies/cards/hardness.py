@@ -92,11 +92,11 @@ def modality_of(
     counts, shares = [], []
     for weights in weights_of(problem.n_obj):
         ends = np.sort([search.minimum(weights, cube) for cube in cubes])
-        found = ends[np.isfinite(ends)]
-        if not len(found):
+        optima = ends[np.isfinite(ends)]
+        if not len(optima):
             continue
-        counts.append(1 + int(np.sum(np.diff(found) > _ANOTHER)))
-        shares.append(float(np.mean(ends <= found[0] + _ANOTHER)))
+        counts.append(1 + int(np.sum(np.diff(optima) > _ANOTHER)))
+        shares.append(float(np.mean(ends <= optima[0] + _ANOTHER)))
     return max(counts), min(shares)
 
 
@@ -128,7 +128,7 @@ class _WeightedSum:
                 jac=lambda cube: self._at(cube, "dG") * self.span,
             )
         ][: self.problem.n_ieq_constr]
-        found = minimize(
+        ended = minimize(
             value,
             start,
             jac=True,
@@ -137,7 +137,7 @@ class _WeightedSum:
             method="SLSQP",
             options={"ftol": 1e-9, "maxiter": 200},
         )
-        cube = np.clip(found.x, 0.0, 1.0)
+        cube = np.clip(ended.x, 0.0, 1.0)
         if limits and np.max(self._at(cube, "G")) > _ALLOWED:
             return np.inf
         return value(cube)[0]

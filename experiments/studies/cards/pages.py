@@ -16,36 +16,24 @@ from pymoo.core.problem import Problem
 
 from experiments.comparing.figures import BLUE, GREY, grid
 from experiments.runner.result import Table, significant
+from experiments.runner.texts import filled
 from experiments.studies.cards.data import Numbers, committed_numbers
 from experiments.studies.cards.experiment import LEFT_OUT, SETTING
-from experiments.studies.cards.separation import Separation, separations
 from experiments.studies.cards.tables import (
     HARDNESS_NOTE,
     SEPARATION_NOTE,
+    Separation,
     hardness_table,
     medians_table,
     separation_table,
+    separations,
 )
 from experiments.studies.contest.peers_data import MEASURES
 from experiments.studies.contest.problems import CARDS, problem_of
-from pymoo_hdte._io.text_table import csv_text
-from pymoo_hdte.problems import RobustDTEGrades, RobustDTETolerance
+from pymoo_hdte._io.csv_table import csv_text
+from pymoo_hdte.problems import RobustDTEGrades
 from pymoo_hdte.surrogate import TruncatedNormal
 from pymoo_hdte.units import REVOLUTION_PER_MINUTE
-
-FORMULA = (
-    r"f_1(u) = \mathrm{E}\,[y(\xi)], \qquad f_2(u) = \sqrt{\mathrm{Var}\,[y(\xi)]}, \qquad "
-    r"\xi_j = u_j (1 + t s_j), \qquad s_j \sim U(-1, 1)"
-)
-FURTHER = {
-    RobustDTETolerance: r"f_3(t) = 0.05 / t",
-    RobustDTEGrades: (
-        r"\sum_j \frac{w_j}{g_j} \le c, \qquad "
-        r"\left| \frac{1}{2 \Omega_p} \sqrt{K \left( \frac{1}{J_{out}} + \frac{1}{N^2 J_{in}} "
-        r"\right)} - 1 \right| \ge m"
-    ),
-}
-"""What a class has beside the two moments: a further objective, or constraints."""
 
 _RANDOM_DESIGNS = 2000
 _FEW_DESIGNS = 200
@@ -72,63 +60,38 @@ def stem_of(name: str) -> str:
 
 def index_page(numbers: Numbers) -> str:
     """Return the page that leads to all cards: which problem is hard why, and what it tells."""
-    separating = separation_table(numbers)
-    stems = "\n".join(stem_of(name) for name in numbers.scores.problems)
-    return "\n\n".join(
-        [
-            "# Problem cards",
-            "One page for each robust problem with a stored front: what it is, what makes it hard, "
-            "and how up to twelve algorithms do on it. The numbers are those of `python -m "
-            "experiments cards`, which `--full` computes anew.",
-            f"```{{toctree}}\n:maxdepth: 1\n\n{stems}\n```",
-            "## Which problems separate algorithms",
-            *(finding.sentence for finding in separating.findings),
-            SEPARATION_NOTE,
-            table_text(separating),
-            "## What makes each hard",
-            table_text(hardness_table(numbers)),
-            HARDNESS_NOTE,
-            "## How they were run",
-            SETTING,
-            LEFT_OUT,
-        ]
+    return filled(
+        "cards.md",
+        stems=[stem_of(name) for name in numbers.scores.problems],
+        separating=separation_table(numbers),
+        hardness=hardness_table(numbers),
+        table_text=table_text,
+        separation_note=SEPARATION_NOTE,
+        hardness_note=HARDNESS_NOTE,
+        setting=SETTING,
+        left_out=LEFT_OUT,
     )
 
 
 def page(numbers: Numbers, name: str) -> str:
     """Return the card of one problem."""
-    problem, stem = problem_of(name), stem_of(name)
+    problem = problem_of(name)
     medians = medians_table(numbers.scores, name)
-    parts = [
-        f"# {stem}",
-        f"`{_constructor(name)}`: {problem.n_var} variables, {problem.n_obj} objectives, "
-        f"{problem.n_ieq_constr} constraints.",
-        "## Definition",
-        f"```{{math}}\n{FORMULA}\n```",
-        *(
-            f"```{{math}}\n{text}\n```"
-            for kind, text in FURTHER.items()
-            if isinstance(problem, kind)
-        ),
-        *_limits(problem),
-        _description(problem),
-        "## What scatters",
-        _scatter(problem),
-        "## Variables",
-        _variables(problem),
-        "## Front",
-        f"![True front of {stem}, and random designs]({stem}.png)",
-        f"{len(problem.pareto_front())} points are stored; grey are allowed random designs.",
-        "## What makes it hard",
-        table_text(_of(hardness_table(numbers), name)),
-        "How these numbers are defined stands with [all cards](index).",
-        "## Algorithms",
-        _verdicts(numbers, name),
-        f"{medians.title.partition(': ')[2].capitalize()}, best IGD at the largest budget first; "
-        f"{{download}}`every run <{stem}.csv>`.",
-        table_text(medians),
-    ]
-    return "\n\n".join(parts) + "\n"
+    return filled(
+        "card.md",
+        stem=stem_of(name),
+        constructor=_constructor(name),
+        problem=problem,
+        kind=type(problem).__name__,
+        **_limits(problem),
+        description=_description(problem),
+        scatter=_scatter(problem),
+        variables=_variables(problem),
+        hardness=table_text(_of(hardness_table(numbers), name)),
+        verdicts=_verdicts(numbers, name),
+        measures=medians.title.partition(": ")[2].capitalize(),
+        medians=table_text(medians),
+    )
 
 
 def runs_text(numbers: Numbers, name: str) -> str:
@@ -165,24 +128,28 @@ def _markdown(head: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
 
 
 def _of(table: Table, name: str) -> Table:
-    kept = [row for row in table.rows if row[0] == name]
-    return Table(table.name, table.title, table.columns, tuple(kept))
+    rows = [row for row in table.rows if row[0] == name]
+    return Table(table.name, table.title, table.columns, tuple(rows))
 
 
 def _verdicts(numbers: Numbers, name: str) -> str:
-    found = [one for one in separations(numbers.scores, numbers.hardness) if one.problem == name]
-    return " ".join(map(_verdict, found))
+    separated = [
+        separation
+        for separation in separations(numbers.scores, numbers.hardness)
+        if separation.problem == name
+    ]
+    return " ".join(map(_verdict, separated))
 
 
-def _verdict(one: Separation) -> str:
-    at = f"At {one.evaluations:,} evaluations"
-    reach = f"{one.reached} of {one.algorithms} reach the front."
-    if one.separates is None:
+def _verdict(separation: Separation) -> str:
+    at = f"At {separation.evaluations:,} evaluations"
+    reach = f"{separation.reached} of {separation.algorithms} reach the front."
+    if separation.separates is None:
         return f"{at} too few algorithms ran to say whether it separates them; {reach}"
     return (
-        f"{at} it {'separates' if one.separates else 'does not separate'} algorithms: quartiles "
-        f"of their median IGD differ {significant(one.spread, 2)} times, one algorithm's seeds "
-        f"{significant(one.scatter, 2)} times; {reach}"
+        f"{at} it {'separates' if separation.separates else 'does not separate'} algorithms: "
+        f"quartiles of their median IGD differ {significant(separation.spread, 2)} times, one "
+        f"algorithm's seeds {significant(separation.scatter, 2)} times; {reach}"
     )
 
 
@@ -203,20 +170,16 @@ def _description(problem: Problem) -> str:
     if model is not None:
         parts.append(f"The drive model is `{model.name}`: {model.description}")
     # Docstrings are reStructuredText, of which the footnotes stay behind.
-    body = re.sub(r" \[\d+\]_", "", "\n\n".join(part for part in parts if part))
-    return f"```{{eval-rst}}\n{body}\n```"
+    return re.sub(r" \[\d+\]_", "", "\n\n".join(part for part in parts if part))
 
 
-def _limits(problem: Problem) -> list[str]:
+def _limits(problem: Problem) -> dict[str, str]:
     if not isinstance(problem, RobustDTEGrades):
-        return []
-    speed = problem.process_speed / REVOLUTION_PER_MINUTE
-    shares = ", ".join(f"{share:.3f}" for share in problem.cost_shares)
-    return [
-        f"The shares of the grades in the cost are w = {shares}; c = {problem.cost_limit:g} is its "
-        f"limit, Ω_p = {speed:.0f} r/min the process speed, m = {problem.margin:g} the margin, and "
-        "N the ratio."
-    ]
+        return {}
+    return {
+        "speed": f"{problem.process_speed / REVOLUTION_PER_MINUTE:.0f}",
+        "shares": ", ".join(f"{share:.3f}" for share in problem.cost_shares),
+    }
 
 
 def _scatter(problem: Problem) -> str:

@@ -2,26 +2,98 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
+from scipy.stats import kruskal
 
 from experiments.comparing.indicators import NAMES, smaller_is_better
 from experiments.comparing.paired import SIGNIFICANT
-from experiments.comparing.ranks import medians
-from experiments.comparing.rates import state_of
-from experiments.comparing.statistics import holm
+from experiments.comparing.ranks import costs_of, medians
+from experiments.comparing.statistics import holm, state_of
 from experiments.runner.result import Cell, Column, Finding, Table, scored
 from experiments.runner.texts import paragraphs
 from experiments.studies.cards.data import Numbers
-from experiments.studies.cards.hardness import NEAR, POINTS, STARTS
-from experiments.studies.cards.separation import (
-    FEWEST,
-    LEAST_SPREAD,
-    RANDOM,
-    REACHES,
-    Separation,
-    separations,
-)
-from experiments.studies.contest.peers_data import Scores
+from experiments.studies.cards.hardness import NEAR, POINTS, STARTS, Hardness
+from experiments.studies.contest.peers_data import MEASURES, Scores
+
+RANDOM = "random search"
+REACHES = 2.0
+"""A median IGD of at most so many times the floor reaches the front."""
+LEAST_SPREAD = 2.0
+"""Factor between the upper and the lower quartile of the algorithms' medians that matters to a
+user; the extremes do not count, as one algorithm fails everywhere."""
+FEWEST = 4
+"""Algorithms below which the quartiles of the medians are their extremes, and nothing is said."""
+
+
+class Separation(NamedTuple):
+    """How far the algorithms lie apart on one problem at one budget, by IGD, random search aside.
+
+    Attributes
+    ----------
+    problem : str
+    evaluations : int
+    algorithms : int
+        That ran.
+    p : float
+        Of Kruskal and Wallis's test that all runs are alike.
+    spread : float
+        Factor between the upper and the lower quartile of the algorithms' medians.
+    scatter : float
+        Factor between the worst and the best seed, of the median algorithm that has all finite.
+    reached : int
+        Algorithms whose median IGD is at most `REACHES` times the floor.
+    """
+
+    problem: str
+    evaluations: int
+    algorithms: int
+    p: float
+    spread: float
+    scatter: float
+    reached: int
+
+    @property
+    def separates(self) -> bool | None:
+        """Whether they differ for sure, and by as much as matters; None if too few ran to say."""
+        if self.algorithms < FEWEST:
+            return None
+        return self.p <= SIGNIFICANT and self.spread >= LEAST_SPREAD
+
+
+def separations(scores: Scores, hardness: dict[str, Hardness]) -> list[Separation]:
+    """Return one entry a problem and budget at which at least two algorithms ran."""
+    igd = scores.values[MEASURES.index("igd")]
+    chosen = [place for place, name in enumerate(scores.algorithms) if name != RANDOM]
+    separated = []
+    for row, problem in enumerate(scores.problems):
+        for column, budget in enumerate(scores.budgets):
+            ran = [i for i in chosen if np.all(scores.spent[row, i, column] > 0)]
+            if len(ran) < 2:
+                continue
+            values = igd[row, ran, column][None]
+            separated.append(_separation(problem, budget, values, hardness[problem].floor))
+    return separated
+
+
+def _separation(problem: str, budget: int, values: np.ndarray, floor: float) -> Separation:
+    costs = costs_of(values, True, ("problems", "algorithms", "seeds"))[0]
+    medians = np.median(costs, axis=1)
+    finite = costs[np.isfinite(costs).all(axis=1)]
+    scatter = float(np.median(finite.max(axis=1) / finite.min(axis=1))) if len(finite) else np.nan
+    # A quartile is one of the medians: between a finite one and an infinite one there is none.
+    low, high = np.quantile(medians, (0.25, 0.75), method="nearest")
+    return Separation(
+        problem,
+        budget,
+        len(costs),
+        float(kruskal(*costs).pvalue),
+        float(high / low) if np.isfinite(low) else np.nan,
+        scatter,
+        int(np.sum(medians <= REACHES * floor)),
+    )
+
 
 HARDNESS_NOTE, SEPARATION_NOTE = paragraphs(
     "cards_tables",
@@ -55,13 +127,16 @@ def hardness_table(numbers: Numbers) -> Table:
         tuple(
             (
                 name,
-                one.optima,
-                _percent(one.best_reached),
-                one.pieces,
-                *(_percent(share) for share in (one.feasible, one.near, one.wide)),
-                one.floor,
+                hardness_of.optima,
+                _percent(hardness_of.best_reached),
+                hardness_of.pieces,
+                *(
+                    _percent(share)
+                    for share in (hardness_of.feasible, hardness_of.near, hardness_of.wide)
+                ),
+                hardness_of.floor,
             )
-            for name, one in numbers.hardness.items()
+            for name, hardness_of in numbers.hardness.items()
         ),
         note=HARDNESS_NOTE,
     )
@@ -69,7 +144,7 @@ def hardness_table(numbers: Numbers) -> Table:
 
 def separation_table(numbers: Numbers) -> Table:
     """Return how far the algorithms lie apart, with a sentence on which problems separate them."""
-    found = separations(numbers.scores, numbers.hardness)
+    separated = separations(numbers.scores, numbers.hardness)
     return Table(
         "separation",
         "Which problems separate algorithms",
@@ -83,27 +158,33 @@ def separation_table(numbers: Numbers) -> Table:
             Column("reach the front"),
             Column("separates"),
         ),
-        tuple((*entry, _SAID[entry.separates]) for entry in found),
+        tuple((*entry, _SAID[entry.separates]) for entry in separated),
         note=SEPARATION_NOTE,
-        findings=(summary(found),),
+        findings=(summary(separated),),
     )
 
 
-def summary(found: list[Separation]) -> Finding:
+def summary(separated: list[Separation]) -> Finding:
     """Say which problems separate algorithms at which budgets."""
     counts, parts = [], []
-    for budget in sorted({entry.evaluations for entry in found}):
+    for budget in sorted({entry.evaluations for entry in separated}):
         names = [
-            entry.problem for entry in found if entry.evaluations == budget and entry.separates
+            entry.problem for entry in separated if entry.evaluations == budget and entry.separates
         ]
         counts.append(f"{len(names)} after {budget:,}")
         if names:
             parts.append(f"After {budget:,}: {', '.join(names)}.")
-    largest = max(entry.evaluations for entry in found)
-    last = [one for one in found if one.evaluations == largest and one.separates is not None]
-    corrected = holm([one.p for one in last])
-    separate = [bool(one.separates) for one in last]
-    shown = any(one and p <= SIGNIFICANT for one, p in zip(separate, corrected, strict=True))
+    largest = max(entry.evaluations for entry in separated)
+    last = [
+        finding
+        for finding in separated
+        if finding.evaluations == largest and finding.separates is not None
+    ]
+    corrected = holm([separation.p for separation in last])
+    separate = [bool(separation.separates) for separation in last]
+    shown = any(
+        separation and p <= SIGNIFICANT for separation, p in zip(separate, corrected, strict=True)
+    )
     return scored(
         state_of(any(separate), shown=shown),
         f"Robust problems that separate the algorithms: {', '.join(counts)} evaluations; at least "

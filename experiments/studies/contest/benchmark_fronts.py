@@ -47,9 +47,9 @@ def dtlz_front(number: int) -> NDArray[np.float64]:
     """Return the front of DTLZ1, 2 or 7 with three objectives, shape (n, 3)."""
     if number == 7:
         one_side = np.linspace(0.0, 1.0, 200)
-        first, second = (grid.ravel() for grid in np.meshgrid(one_side, one_side))
-        bumps = sum(f / 2.0 * (1.0 + np.sin(3.0 * np.pi * f)) for f in (first, second))
-        front = np.column_stack([first, second, 2.0 * (3.0 - bumps)])
+        x, second = (grid.ravel() for grid in np.meshgrid(one_side, one_side))
+        bumps = sum(f / 2.0 * (1.0 + np.sin(3.0 * np.pi * f)) for f in (x, second))
+        front = np.column_stack([x, second, 2.0 * (3.0 - bumps)])
         return front[is_nondominated(front)]
     directions = get_reference_directions("das-dennis", 3, n_partitions=_PARTITIONS)
     if number == 1:
@@ -69,14 +69,14 @@ def tnk_front() -> NDArray[np.float64]:
 def osy_front(problem: Problem) -> NDArray[np.float64]:
     """Return the front of OSY from the five parts of its Pareto set, shape (n, 2)."""
     t = np.linspace(0.0, 1.0, 4 * N_POINTS)
-    one, none = np.ones_like(t), np.zeros_like(t)
+    ones, none = np.ones_like(t), np.zeros_like(t)
     x1 = 4.0556 + 0.9444 * t
     parts = [
-        [5 * one, one, 1 + 4 * t, none, 5 * one, none],
-        [5 * one, one, 1 + 4 * t, none, one, none],
-        [x1, (x1 - 2) / 3, one, none, one, none],
-        [none, 2 * one, 1 + 2.7321 * t, none, one, none],
-        [t, 2 - t, one, none, one, none],
+        [5 * ones, ones, 1 + 4 * t, none, 5 * ones, none],
+        [5 * ones, ones, 1 + 4 * t, none, ones, none],
+        [x1, (x1 - 2) / 3, ones, none, ones, none],
+        [none, 2 * ones, 1 + 2.7321 * t, none, ones, none],
+        [t, 2 - t, ones, none, ones, none],
     ]
     designs = np.hstack([np.array(part) for part in parts]).T
     F, G = problem.evaluate(designs, return_values_of=["F", "G"])
@@ -121,8 +121,8 @@ def follow_welded_beam(problem: Problem, levels: NDArray[np.float64]) -> NDArray
     best, points = (problem.xl + problem.xu) / 2.0, []
     for level in levels:
         starts = [best, *(problem.xl + rng.random((5, problem.n_var)) * width)]
-        found = [_least_cost(problem, level, start) for start in starts]
-        cost, best = min(found, key=lambda entry: entry[0])
+        costs = [_least_cost(problem, level, start) for start in starts]
+        cost, best = min(costs, key=lambda entry: entry[0])
         if not np.isfinite(cost):
             raise ArithmeticError(f"no feasible beam of deflection {level}")
         points.append(problem.evaluate(best, return_values_of=["F"]))

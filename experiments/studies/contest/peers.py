@@ -12,29 +12,27 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from experiments.comparing.contestants import CONTESTANTS
+from experiments.comparing.figures import critical_difference_plot, rank_heatmap
 from experiments.comparing.indicators import NAMES
 from experiments.comparing.peers_pymoo import POPULATION
 from experiments.comparing.ranks import nemenyi_difference, problem_ranks
-from experiments.comparing.ranks_figures import critical_difference_plot, rank_heatmap
 from experiments.runner.committed import stored_outcome
 from experiments.runner.registry import Context
 from experiments.runner.result import NEW, Picture, Result
 from experiments.runner.texts import paragraphs
 from experiments.studies.contest.peers_data import FINAL_SIZE, Extent, Scores, scores_for
-from experiments.studies.contest.peers_rivals import (
-    must_reach_table,
-    nearest_rival_table,
-    rivals_table,
-    subsets_table,
-)
 from experiments.studies.contest.peers_tables import (
     OURS,
     in_one_sentence,
     median_ranks,
     median_values,
     medians_tables,
+    must_reach_table,
+    nearest_rival_table,
     ranks_tables,
     reductions_table,
+    rivals_table,
+    subsets_table,
     times_table,
     tuning_table,
 )

@@ -15,19 +15,41 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.comparing.contestants import EVALUATIONS, SPENT
-from experiments.comparing.indicators import Indicators, IndicatorsAgainst
+from experiments.comparing.contestants import EVALUATIONS, SPENT, ContestantRun
+from experiments.comparing.indicators import Indicators, IndicatorsAgainst, front_among
 from experiments.comparing.stored import Stored
 from experiments.runner.campaign import Campaign, Run
 from experiments.runner.committed import read_rows, rounded, table_with_origin
 from experiments.runner.registry import Context
 from experiments.studies.contest.benchmark_fronts import front_of
-from experiments.studies.contest.job import ContestRun
-from experiments.studies.contest.problems import BENCHMARKS, EVERY
+from experiments.studies.contest.problems import BENCHMARKS, EVERY, problem_of
 from experiments.studies.contest.reduced_swarms import EVERYONE
-from pymoo_hdte._io.text_table import csv_text
+from pymoo_hdte._io.csv_table import csv_text
 from pymoo_hdte.algorithms.crowding import least_crowded
 from pymoo_hdte.algorithms.spread import most_spread
+
+
+@dataclass(frozen=True)
+class ContestRun(ContestantRun):
+    """A run on a problem of the contest, which keeps the sets that are offered."""
+
+    def execute(self) -> Run:
+        """Run, and return the front of what is offered.
+
+        Columns are the budget, the evaluations spent and the objectives, rows by budget and rising
+        objectives. A budget at which nothing feasible is offered has one row without objectives.
+        """
+        problem = problem_of(self.problem)
+        offers, seconds = self.offers(EVERYONE[self.algorithm], problem)
+        rows = []
+        for budget, offer in offers:
+            front = front_among(offer.F)
+            if not len(front):
+                front = np.full((1, problem.n_obj), np.nan)
+            rows.append(np.column_stack([np.tile([budget, offer.spent], (len(front), 1)), front]))
+        columns = (EVALUATIONS, SPENT, *(f"f{1 + i}" for i in range(problem.n_obj)))
+        return Run(columns, np.concatenate(rows), seconds)
+
 
 _KEY = ("problem", "algorithm", "evaluations", "seed")
 

@@ -80,10 +80,10 @@ class ConstantInertiaSwarm(ElitistSwarm):
     def _infill(self) -> Population:
         before = self._points(self.pop).X
         still = np.zeros(before.shape[1])
-        last = np.array([one.data.get("step", still) for one in self.pop])  # type: ignore[union-attr]
+        steps = np.array([particle.data.get("step", still) for particle in self.pop])  # type: ignore[union-attr]
         particles = super()._infill()
         moved = np.array([particle.X for particle in particles])
-        carried = np.where(moved != before, self._weight() * last, 0.0)
+        carried = np.where(moved != before, self._weight() * steps, 0.0)
         X = np.clip(moved + carried, *self.problem.bounds())
         particles.set("X", X)
         particles.set("step", X - before)

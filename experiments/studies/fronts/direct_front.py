@@ -38,22 +38,22 @@ def run(context: Context) -> Result:
     """Search from two seeds, compare, ask a finer quadrature, and write the front of both."""
     problem = RobustDTEDirect()
     searches = [_search(problem, seed) for seed in tqdm(SEEDS, desc="direct_front", unit="search")]
-    found = _together(searches)
-    width = np.ptp(found.front, axis=0)
+    designs = _together(searches)
+    width = np.ptp(designs.front, axis=0)
     differ = _disagreement(searches[0].front, searches[1].front, width)
-    rows = np.linspace(0, len(found.front) - 1, _LOOKED_AT).round().astype(int)
-    finer = problem.moments.with_nodes(FINER_NODES)(found.designs[rows])
-    coarse = float(np.max(np.abs(finer - found.front[rows]) / width))
+    rows = np.linspace(0, len(designs.front) - 1, _LOOKED_AT).round().astype(int)
+    finer = problem.moments.with_nodes(FINER_NODES)(designs.designs[rows])
+    coarse = float(np.max(np.abs(finer - designs.front[rows]) / width))
     surrogate = RobustDTE()
     elsewhere = surrogate.pareto_set()[:: len(surrogate.pareto_front()) // _LOOKED_AT]
     really = problem.evaluate(elsewhere)
-    behind = float(np.median(_behind(really, found.front, width)))
+    behind = float(np.median(_behind(really, designs.front, width)))
     columns = (*problem.obj_names, *problem.var_names)
-    text = format_reference(found, problem.settings, columns)
+    text = format_reference(designs, problem.settings, columns)
     name = f"front_{problem.variant}.csv"
     write_atomically(context.out / "direct_front" / name, text.encode())
     stored = problem.pareto_front()
-    off = np.inf if stored is None else _disagreement(stored, found.front, width)
+    off = np.inf if stored is None else _disagreement(stored, designs.front, width)
     findings = (
         Finding(
             differ + coarse <= ALLOWED,
@@ -87,7 +87,7 @@ def run(context: Context) -> Result:
             Column("two searches differ by", "of the width", 2),
             Column("finer quadrature differs by", "of the width", 2),
         ),
-        ((problem.variant, len(found.front), *width.tolist(), differ, coarse),),
+        ((problem.variant, len(designs.front), *width.tolist(), differ, coarse),),
         findings=findings,
     )
     caption = "Front of the drive model, and that of the order-3 surrogate as the model has it."
@@ -100,12 +100,12 @@ def run(context: Context) -> Result:
             f"nothing beyond {_SEARCHED_TO:g} of its width.",
         ),
         tables=(table,),
-        pictures=(Picture(problem.variant, caption, _picture(found.front, really)),),
+        pictures=(Picture(problem.variant, caption, _picture(designs.front, really)),),
     )
 
 
 def _search(problem: RobustDTEDirect, seed: int) -> ReferenceFront:
-    found = interpolated_front(
+    solutions = interpolated_front(
         problem.moments,
         problem.xl,
         problem.xu,
@@ -115,21 +115,21 @@ def _search(problem: RobustDTEDirect, seed: int) -> ReferenceFront:
         most=_MOST,
         points=_POINTS,
     )
-    return ReferenceFront(found.front, found.designs)
+    return ReferenceFront(solutions.front, solutions.designs)
 
 
 def _together(searches: list[ReferenceFront]) -> ReferenceFront:
     """Return what no design of any search dominates, by rising mean."""
-    front = np.vstack([one.front for one in searches])
-    designs = np.vstack([one.designs for one in searches])
-    kept = NonDominatedSorting().do(front, only_non_dominated_front=True)
-    kept = kept[np.argsort(front[kept, 0], kind="stable")]
-    return ReferenceFront(front[kept], designs[kept])
+    front = np.vstack([search.front for search in searches])
+    designs = np.vstack([search.designs for search in searches])
+    rows = NonDominatedSorting().do(front, only_non_dominated_front=True)
+    rows = rows[np.argsort(front[rows, 0], kind="stable")]
+    return ReferenceFront(front[rows], designs[rows])
 
 
-def _disagreement(front: Values, other: Values, width: Values) -> float:
+def _disagreement(front: Values, rival: Values, width: Values) -> float:
     """Return by how much a point of either front, at worst, is dominated by one of the other."""
-    gain = (front[:, None] - other) / width
+    gain = (front[:, None] - rival) / width
     return float(max(0.0, gain.min(axis=2).max(), (-gain).min(axis=2).max()))
 
 

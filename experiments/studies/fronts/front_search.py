@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -71,9 +72,9 @@ class FrontSearch:
         # SLSQP asks for value and slope of objective and constraint at the same point in turn.
         key = cube.tobytes()
         if key != self._last[0]:
-            asked = ["F", "dF", "G", "dG"] if self._limits else ["F", "dF"]
+            names = ["F", "dF", "G", "dG"] if self._limits else ["F", "dF"]
             values, slopes, *limits = self._problem.evaluate(
-                self.designs(cube), return_values_of=asked
+                self.designs(cube), return_values_of=names
             )
             scaled = [values / self._scale, slopes * self._width / self._scale[:, None]]
             if limits:
@@ -118,14 +119,14 @@ class FrontSearch:
             return float(values[1]), slopes[1]
 
         def merit(cube: NDArray[np.float64]) -> float:
-            first, last = self._evaluate(cube)[0]
-            above = max(first - level / self._scale[0], 0.0)
-            return float(last + 1e3 * (above + self._excess(cube)))
+            lowest, highest = self._evaluate(cube)[0]
+            above = max(lowest - level / self._scale[0], 0.0)
+            return float(highest + 1e3 * (above + self._excess(cube)))
 
         rough = [self._minimise(second, start, _ROUGH, *limits) for start in starts]
         rough.sort(key=merit)
-        kept = rough[: max(1, len(rough) // 2)]
-        ended = [self._minimise(second, x, _FINE, *limits) for x in kept]
+        better = rough[: max(1, len(rough) // 2)]
+        ended = [self._minimise(second, x, _FINE, *limits) for x in better]
         best = min(ended, key=merit)
         flat = [end for end in _ends(best) if abs(merit(end) - merit(best)) < _FLAT]
         ended += [self._minimise(second, x, _FINE, *limits) for x in flat]
@@ -158,7 +159,7 @@ class FrontSearch:
         chosen: list[NDArray[np.float64]] = []
         for index in order[: 60 * _STARTS]:
             cube = self._cubes[index]
-            if all(np.max(np.abs(cube - other)) > 0.15 for other in chosen):
+            if all(np.max(np.abs(cube - rival)) > 0.15 for rival in chosen):
                 chosen.append(cube)
             if len(chosen) == _STARTS:
                 break
@@ -177,3 +178,136 @@ def _ends(cube: NDArray[np.float64]) -> list[NDArray[np.float64]]:
             moved[variable] = end
             copies.append(moved)
     return copies
+
+
+_LEVELS = 100
+_IMPROVEMENT = 1e-9
+_GAP = 0.02
+"""Neighbours farther apart than this, in normalised objectives, belong to different pieces."""
+_SPACING = 0.005
+"""Neighbours closer than this need no solution between them before the pieces are filled."""
+_GAP_END = 1e-7
+"""To this share of the front's width the ends of a gap are located."""
+
+
+def find_true_front(
+    problem: Problem, n_points: int, rng: np.random.Generator
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return front (n, 2) and designs (n, n_var), sorted by the first objective.
+
+    One row if a single design is best in both objectives, else at least ``n_points`` rows, even in
+    arc length of the normalised objectives along each piece.
+    """
+    search = FrontSearch(problem, rng)
+    start, end = search.lowest(0), search.lowest(1)
+    span = end.objectives - start.objectives
+    if np.all(np.abs(span) <= 1e-6 * np.abs(start.objectives)):
+        return start.objectives[None, :], search.designs(start.cube)[None, :]
+    coarse = _sweep(search, start, end)
+    knots = _refine(search, falling(coarse), span)
+    filled = _fill(search, knots, span, n_points)
+    front = np.array([solution.objectives for solution in filled])
+    return front, search.designs(np.array([solution.cube for solution in filled]))
+
+
+def _sweep(search: FrontSearch, start: Solution, end: Solution) -> list[Solution]:
+    levels = np.linspace(start.objectives[0], end.objectives[0], _LEVELS)
+    best = [start]
+    for level in levels[1:]:
+        solution = search.below(level, [best[-1].cube, *search.starts(level)])
+        carried = best[-1]
+        better = solution is not None and solution.objectives[1] < carried.objectives[1]
+        best.append(solution if solution is not None and better else carried)
+    if end.objectives[1] < best[-1].objectives[1]:
+        best[-1] = end
+    improved = True
+    while improved:
+        improved = False
+        neighbours = [(i, i + 1) for i in range(len(best) - 2, -1, -1)]
+        neighbours += [(i + 1, i) for i in range(len(best) - 1)]
+        for target, source in neighbours:
+            solution = search.below(levels[target], [best[source].cube])
+            gain = best[target].objectives[1] - (solution.objectives[1] if solution else np.inf)
+            if solution is not None and gain > _IMPROVEMENT * abs(best[target].objectives[1]):
+                best[target], improved = solution, True
+    return best
+
+
+def falling(solutions: list[Solution]) -> list[Solution]:
+    """Sort by the first objective and leave out what does not lower the second."""
+    kept: list[Solution] = []
+    for solution in sorted(solutions, key=lambda item: tuple(item.objectives)):
+        if not kept or solution.objectives[1] < kept[-1].objectives[1]:
+            kept.append(solution)
+    return kept
+
+
+def _distance(point: Solution, rival: Solution, span: NDArray[np.float64]) -> float:
+    return float(np.hypot(*((rival.objectives - point.objectives) / span)))
+
+
+def _refine(
+    search: FrontSearch, knots: list[Solution], span: NDArray[np.float64]
+) -> list[Solution]:
+    """Halve the levels between distant neighbours until they are close or a gap is located.
+
+    At a gap the solution stops changing below some level, where its branch ends, and another branch
+    undercuts it above: halving then closes in on that level, and both ends are knots.
+    """
+    points = list(knots)
+    open_pairs = [(low, low.objectives[0], high) for low, high in pairwise(knots)]
+    while open_pairs:
+        low, level, high = open_pairs.pop()
+        upper = high.objectives[0]
+        near = _distance(low, high, span) <= _SPACING
+        if near or upper - level <= _GAP_END * span[0]:
+            continue
+        middle = (level + upper) / 2.0
+        starts = [low.cube, high.cube]
+        if upper - level > _SPACING * span[0]:
+            starts += search.starts(middle)
+        between = search.below(middle, starts)
+        if between is None or between.objectives[1] >= low.objectives[1] * (1.0 - 1e-12):
+            open_pairs.append((low, middle, high))
+            continue
+        points.append(between)
+        open_pairs += [(low, level, between), (between, middle, high)]
+    return falling(points)
+
+
+def _fill(
+    search: FrontSearch, knots: list[Solution], span: NDArray[np.float64], n_points: int
+) -> list[Solution]:
+    """Solve again at levels that are even in arc length along each piece."""
+    steps = [_distance(lower, upper, span) for lower, upper in pairwise(knots)]
+    total = sum(step for step in steps if step <= _GAP)
+    filled: list[Solution] = []
+    start = 0
+    for stop in range(1, len(knots) + 1):
+        if stop < len(knots) and steps[stop - 1] <= _GAP:
+            continue
+        arc = np.concatenate([[0.0], np.cumsum(steps[start : stop - 1])])
+        wanted = np.linspace(0.0, arc[-1], int(np.ceil(n_points * arc[-1] / total)) + 1)
+        filled += _along(search, knots[start:stop], arc, wanted)
+        start = stop
+    return falling(filled)
+
+
+def _along(
+    search: FrontSearch,
+    piece: list[Solution],
+    arc: NDArray[np.float64],
+    wanted: NDArray[np.float64],
+) -> list[Solution]:
+    solutions = [piece[0], piece[-1]]
+    for position in wanted[1:-1]:
+        right = min(int(np.searchsorted(arc, position)), len(piece) - 1)
+        left = right - 1
+        share = (position - arc[left]) / (arc[right] - arc[left])
+        ends = piece[left], piece[right]
+        level = (1.0 - share) * ends[0].objectives[0] + share * ends[1].objectives[0]
+        between = (1.0 - share) * ends[0].cube + share * ends[1].cube
+        solution = search.below(level, [between, ends[0].cube, ends[1].cube])
+        if solution is not None:
+            solutions.append(solution)
+    return solutions

@@ -22,17 +22,17 @@ from experiments.comparing.quality import GAP, TrueFront
 from experiments.runner.registry import Context
 from experiments.runner.result import Column, Finding, Picture, Result, Table
 from experiments.runner.store import write_atomically
-from experiments.studies.fronts.agreement import disagreement
-from experiments.studies.fronts.front_search import Solution
-from experiments.studies.fronts.level_search import LevelSearch, without_local_optima
+from experiments.studies.fronts.front_search import Solution, falling, find_true_front
 from experiments.studies.fronts.tolerance_front import (
     POINTS,
     TOLERANCES,
+    LevelSearch,
+    disagreement,
     find_tolerance_front,
     front_designs,
     tolerance_disagreement,
+    without_local_optima,
 )
-from experiments.studies.fronts.true_front import falling, find_true_front
 from pymoo_hdte.problems import (
     RobustDTE,
     RobustDTEGrades,
@@ -62,19 +62,19 @@ def run(context: Context) -> Result:
     rows, findings, pictures = [], [], []
     for name, build in tqdm(members.items(), desc="reference_front", unit="front"):
         problem = build()
-        found, second = (_search(problem, seed) for seed in SEEDS)
-        front = found.front
+        fronts, second = (_search(problem, seed) for seed in SEEDS)
+        front = fronts.front
         columns = (*problem.obj_names, *problem.var_names)
-        text = format_reference(found, problem.settings, columns)
+        text = format_reference(fronts, problem.settings, columns)
         target = context.out / "reference_front" / f"front_{name}.csv"
         write_atomically(target, text.encode())
         differ = 0.0
         pieces: int | None = 1
         if len(front) > 1:
-            differ = _disagreement(problem, found, second)
+            differ = _disagreement(problem, fronts, second)
             pieces = len(TrueFront(front).pieces) if problem.n_obj == 2 else None
             caption = f"True front of the surrogate of {name}."
-            pictures.append(Picture(name, caption, _picture(found)))
+            pictures.append(Picture(name, caption, _picture(fronts)))
         undercut = _undercut(problem, front)
         stored = _distance_to_stored(problem, front)
         span = np.ptp(front, axis=0)[:2]
@@ -118,8 +118,8 @@ def _search(problem: OnSurrogate, seed: int) -> ReferenceFront:
         return find_tolerance_front(problem, rng)
     if problem.n_ieq_constr:
         return with_gaps_halved(problem, front_designs(problem, CONSTRAINED_POINTS, rng), rng)
-    found = ReferenceFront(*find_true_front(problem, N_POINTS, rng))
-    return without_local_optima(problem, found, rng)
+    front = ReferenceFront(*find_true_front(problem, N_POINTS, rng))
+    return without_local_optima(problem, front, rng)
 
 
 def with_gaps_halved(
@@ -132,28 +132,30 @@ def with_gaps_halved(
     search = LevelSearch(problem, rng)
     cubes = (designs - problem.xl) / (problem.xu - problem.xl)
     front = problem.evaluate(designs, return_values_of=["F"])
-    found = [Solution(*row) for row in zip(cubes, front, strict=True)]
+    solutions = [Solution(*row) for row in zip(cubes, front, strict=True)]
     width = np.ptp(front, axis=0)
     for _ in range(_HALVINGS):
         between = []
-        for low, high in pairwise(found):
+        for low, high in pairwise(solutions):
             ends = low.objectives, high.objectives
             if np.linalg.norm((ends[1] - ends[0]) / width) > GAP:
                 level = (ends[0][0] + ends[1][0]) / 2.0
                 between.append(search.best(level, [low.cube, high.cube]))
-        found = falling([*found, *(one for one in between if one is not None)])
-    kept = search.designs(np.array([solution.cube for solution in found]))
+        solutions = falling(
+            [*solutions, *(solution for solution in between if solution is not None)]
+        )
+    kept = search.designs(np.array([solution.cube for solution in solutions]))
     return ReferenceFront(problem.evaluate(kept, return_values_of=["F"]), kept)
 
 
 def _disagreement(
     problem: OnSurrogate,
-    found: ReferenceFront,
+    computed: ReferenceFront,
     second: ReferenceFront,
 ) -> float:
     if isinstance(problem, RobustDTETolerance):
-        return tolerance_disagreement(problem, found, second)
-    return disagreement(problem, found, second, np.ptp(found.front, axis=0))
+        return tolerance_disagreement(problem, computed, second)
+    return disagreement(problem, computed, second, np.ptp(computed.front, axis=0))
 
 
 def _undercut(problem: Problem, front: NDArray[np.float64]) -> float:
@@ -197,15 +199,15 @@ def _findings(name: str, differ: float, undercut: float, stored: float | None) -
     ]
 
 
-def _picture(found: ReferenceFront) -> Figure:
+def _picture(computed: ReferenceFront) -> Figure:
     """Draw std over mean, coloured by tolerance where it is free."""
     figure, axes = grid(1, 1, width=5.0, height=3.6)
     axis = axes.flat[0]
-    mean, std = found.front[:, :2].T
-    if found.front.shape[1] == 2:
+    mean, std = computed.front[:, :2].T
+    if computed.front.shape[1] == 2:
         axis.plot(mean, std, ".", color=BLUE, markersize=2)
     else:
-        tolerance = 100.0 * found.designs[:, -1]
+        tolerance = 100.0 * computed.designs[:, -1]
         points = axis.scatter(mean, std, c=tolerance, s=2, cmap="viridis")
         figure.colorbar(points, ax=axis, label="tolerance [%]")
     axis.set_xlabel("mean DTE [arcsec]")

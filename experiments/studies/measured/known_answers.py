@@ -90,7 +90,7 @@ def judged(rig: KnownRig, status: str, names: Collection[str]) -> str:
     if not rig.effects:
         return UNKNOWN
     main = bool(rig.effects[0] & set(names))
-    every = all(one & set(names) for one in rig.effects)
+    every = all(effect & set(names) for effect in rig.effects)
     known = frozenset().union(*rig.effects, rig.also)
     if main:
         return RIGHT if every and known >= set(names) and status in PLAIN else PARTLY

@@ -44,25 +44,25 @@ class Terms:
     Attributes
     ----------
     columns : ndarray, shape (n, k)
-    force, one : ndarray, shape (n,)
+    force, constant : ndarray, shape (n,)
         Of the inputs, and of a constant.
     """
 
     columns: Values
     force: Values
-    one: Values
+    constant: Values
 
     @property
     def power(self) -> float:
         """Variance of the force about its mean over all records."""
-        samples = self.one @ self.one
-        about = self.force - self.one * (self.one @ self.force) / samples
+        samples = self.constant @ self.constant
+        about = self.force - self.constant * (self.constant @ self.force) / samples
         return float(about @ about / samples)
 
     def explained(self, values: Values) -> float:
         """Return R2 of the force for values (k,) of the terms."""
-        left = self.force - self.columns @ values
-        return float(1.0 - left @ left / (self.one @ self.one) / self.power)
+        residual = self.force - self.columns @ values
+        return float(1.0 - residual @ residual / (self.constant @ self.constant) / self.power)
 
 
 TERMS: dict[str, Callable[[Values, Values, Values], Values]] = {
@@ -118,12 +118,12 @@ class Answer:
 
 def answers(finding: MechanismFinding) -> list[Answer]:
     """Return the answers of all tools on a mechanism of one coordinate and one input."""
-    found = []
+    given = []
     for tool in (least_squares, sparse_regression, narmax):
         began = time.process_time()
         answer = tool(finding)
-        found.append(Answer(*answer, time.process_time() - began))
-    return found
+        given.append(Answer(*answer, time.process_time() - began))
+    return given
 
 
 Said = tuple[str, str, frozenset[str] | None, float | None, float | None]
@@ -150,7 +150,7 @@ def sparse_regression(finding: MechanismFinding) -> Said:
     from pysindy.optimizers import STLSQ
 
     turning = any(finding.mechanism.turns(port) for port in finding.mechanism.ports)
-    names = [one for one in TERMS if turning or one not in ("sin q", "cos q")]
+    names = [term for term in TERMS if turning or term not in ("sin q", "cos q")]
     parts = (0.0, 1.0 - _VALIDATED), (1.0 - _VALIDATED, 1.0), (0.0, 1.0)
     first, last, whole = (terms_of(finding, "train", names, part) for part in parts)
 
@@ -163,13 +163,13 @@ def sparse_regression(finding: MechanismFinding) -> Said:
             model.fit(given.columns / scale, given.force[:, None] / size)
         return np.asarray(model.coef_[0] * size / scale)
 
-    explained = [last.explained(fitted(one, first)) for one in _THRESHOLDS]
+    explained = [last.explained(fitted(threshold, first)) for threshold in _THRESHOLDS]
     least = 1.0 - _AS_GOOD * (1.0 - max(explained))
     near = zip(_THRESHOLDS.tolist(), explained, strict=True)
-    values = fitted(max(one for one, share in near if share >= least), whole)
-    kept = [name for name, value in zip(names, values, strict=True) if value != 0.0]
+    values = fitted(max(threshold for threshold, share in near if share >= least), whole)
+    selected = [name for name, value in zip(names, values, strict=True) if value != 0.0]
     believed = {"linear_stiffness"} if _sprung(finding) else set()
-    named = frozenset(MEANS[one] for one in kept if one in MEANS) - believed
+    named = frozenset(MEANS[name] for name in selected if name in MEANS) - believed
     of_force = terms_of(finding, "held_out", names).explained(values)
     return "pysindy", _in_words(names, values), named, of_force, None
 
@@ -186,14 +186,15 @@ def narmax(finding: MechanismFinding) -> Said:
     from sysidentpy.model_structure_selection import FROLS
     from sysidentpy.parameter_estimation import LeastSquares
 
-    simulated = {one.record: one for one in finding.simulated}
+    simulated = {record.record: record for record in finding.simulated}
     if not simulated:
         return "FROLS", "nothing held out", None, None, None
     stride = next(iter(simulated.values())).rows[0].step
     (train, *_), held = (
-        [one for one in finding.records if one.role == role] for role in ("train", "held_out")
+        [record for record in finding.records if record.role == role]
+        for role in ("train", "held_out")
     )
-    scales = [float(np.std(one)) for one in _signals(finding, train)]
+    scales = [float(np.std(signal)) for signal in _signals(finding, train)]
     model = FROLS(
         order_selection=True,
         n_info_values=_TERMS,
@@ -206,8 +207,8 @@ def narmax(finding: MechanismFinding) -> Said:
         warnings.filterwarnings("ignore")
         last = min(len(train.time), _MOST_ROWS * stride)
         force, angle = (
-            (one[:last:stride] / scale)[:, None]
-            for one, scale in zip(_signals(finding, train), scales, strict=True)
+            (signal[:last:stride] / scale)[:, None]
+            for signal, scale in zip(_signals(finding, train), scales, strict=True)
         )
         model.fit(X=force, y=angle)
         measured, predicted = [], []
@@ -215,7 +216,8 @@ def narmax(finding: MechanismFinding) -> Said:
             signals = _signals(finding, record)
             for rows in simulated[record.name].rows:
                 x, y = (
-                    (one[rows] / scale)[:, None] for one, scale in zip(signals, scales, strict=True)
+                    (signal[rows] / scale)[:, None]
+                    for signal, scale in zip(signals, scales, strict=True)
                 )
                 measured.append(y[_LAGS:, 0])
                 predicted.append(model.predict(X=x, y=y)[_LAGS:, 0])
@@ -233,8 +235,8 @@ def _signals(finding: MechanismFinding, record: Record) -> tuple[Values, Values]
     (coordinate,) = finding.mechanism.coordinates
     force = np.sum(
         [
-            one.acts[coordinate] * one.gain.value * record.channels[one.name]
-            for one in finding.mechanism.inputs
+            drive.acts[coordinate] * drive.gain.value * record.channels[drive.name]
+            for drive in finding.mechanism.inputs
         ],
         axis=0,
     )
@@ -255,7 +257,7 @@ def terms_of(
     part : (float, float)
         First and last share of each record.
     """
-    found = []
+    values = []
     for record in finding.records:
         if record.role != role:
             continue
@@ -267,16 +269,16 @@ def terms_of(
         columns = [TERMS[name](*state) for name in names]
         signals = np.column_stack([*columns, force[rows], np.ones(last - first)])
         bins = int(2.0 * (last - first) * record.step * finding.cutoff) + 1
-        found.append(dct(signals, type=2, norm="ortho", axis=0)[:bins])
-    together = np.concatenate(found)
+        values.append(dct(signals, type=2, norm="ortho", axis=0)[:bins])
+    together = np.concatenate(values)
     return Terms(together[:, :-2], together[:, -2], together[:, -1])
 
 
 def _determination(measured: Values, predicted: Values) -> float:
     """Return R2; minus infinity where a model diverges."""
     with np.errstate(all="ignore"):
-        left = float(np.mean((measured - predicted) ** 2))
-    return 1.0 - left / float(np.var(measured)) if np.isfinite(left) else -np.inf
+        residual = float(np.mean((measured - predicted) ** 2))
+    return 1.0 - residual / float(np.var(measured)) if np.isfinite(residual) else -np.inf
 
 
 def _in_words(names: Sequence[str], values: Values) -> str:

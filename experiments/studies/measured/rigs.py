@@ -1,36 +1,23 @@
-"""Shared parts of the studies of published measurements: data, verdict and tables."""
+"""Measured rigs: their files and folders, and what the workflow finds in their records."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from experiments.runner.committed import DATA
-from experiments.runner.result import Column, Picture, Result, Table
-from pymoo_hdte._reports.html import percent
-from pymoo_hdte.discrepancy._answers.next_test_mechanism import next_test
 from pymoo_hdte.discrepancy._evidence.force_balances.joint_halves import joint_of, rigid_half
 from pymoo_hdte.discrepancy._records.rig_files import MeasuredMechanism, read_rig
-from pymoo_hdte.discrepancy._report.mechanism import extent_sentence, proof_sentence
-from pymoo_hdte.discrepancy._report.mechanism_document import limits, offered, remainder
-from pymoo_hdte.discrepancy._report.mechanism_figures import misfit_over_motion, overlay
 from pymoo_hdte.discrepancy._report.mechanism_values import effects, quantities
-from pymoo_hdte.discrepancy._report.tables import STATUSES
 from pymoo_hdte.discrepancy._verdicts.joint import JointFinding, examine_joint
 from pymoo_hdte.discrepancy._verdicts.mechanism import examine_mechanism
 from pymoo_hdte.discrepancy._verdicts.mechanism_finding import MechanismFinding
 from pymoo_hdte.discrepancy._verdicts.validation_mechanism import MeasuredGap, prove_measured
-from pymoo_hdte.effects.sentence_blanks import in_words
 
 MEASURED = Path(__file__).resolve().parents[4] / "shared" / "measured"
 """Folder of the measurements, which are not part of the project."""
 RIGS = DATA
-_BANDS = 12
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,8 +54,8 @@ def study(name: str, folder: str) -> Study | None:
     if joint is None:
         finding = examine_mechanism(rig.mechanism, *believed)
         return Study(rig, finding, prove_measured(finding))
-    both = examine_joint(joint, *believed)
-    return Study(torques_of(rig), both.torque, prove_measured(both.torque), both)
+    halves = examine_joint(joint, *believed)
+    return Study(torques_of(rig), halves.torque, prove_measured(halves.torque), halves)
 
 
 def torques_of(rig: MeasuredMechanism) -> MeasuredMechanism:
@@ -80,159 +67,10 @@ def torques_of(rig: MeasuredMechanism) -> MeasuredMechanism:
     return replace(rig, mechanism=half.mechanism, records=half.records, effects=half.known)
 
 
-def absent(title: str, folder: str, command: str, source: str) -> Result:
-    """Return a result that says which measurements are missing, and where they come from."""
-    return Result(
-        title=title,
-        command=command,
-        answer="Skipped, because the measurements, which are not part of this software, are "
-        "missing.",
-        paragraphs=(
-            f"They are published: {source}. Put the files into {MEASURED / folder} and run the "
-            "command again.",
-        ),
-    )
-
-
-def verdict_paragraphs(one: Study) -> tuple[str, ...]:
-    """Return the verdict in words: what is missing, what is left, what cannot be said."""
-    named = " Then: ".join(c.sentence for c in one.finding.accepted.candidates)
-    second = " ".join(
-        f"Beside it {other['name'].replace('_', ' ')} would take {percent(other['removes'])} of "
-        "what is left."
-        for other in offered(one.finding)
-    )
-    return (
-        f"Verdict: {STATUSES[one.finding.verdict.status]}. {named}",
-        f"{remainder(one.finding)['sentence']} {second}".strip(),
-        *limits(one.finding),
-        proof_sentence(one.finding, one.gaps),
-        f"Next test: {next_test(one.finding).description}",
-    )
-
-
-def fitted_values(one: Study) -> dict[str, Any]:
+def fitted_values(machine: Study) -> dict[str, Any]:
     """Return values with intervals by parameter, those of effects with the effect's name."""
-    found = dict(quantities(one.finding))
-    for effect in effects(one.finding):
+    values = dict(quantities(machine.finding))
+    for effect in effects(machine.finding):
         for name, value in effect["parameters"].items():
-            found[f"{effect['name'].replace('_', ' ')}: {name.replace('_', ' ')}"] = value
-    return found
-
-
-def values_table(one: Study, known: Mapping[str, float], heading: str, source: str) -> Table:
-    """Return the fitted values with their intervals beside values that are known otherwise.
-
-    Parameters
-    ----------
-    one : Study
-    known : mapping of str to float
-        The other values by parameter.
-    heading : str
-        What the other values are, over their column.
-    source : str
-        Where they come from.
-    """
-    rows = []
-    for name, value in fitted_values(one).items():
-        lower, upper = value["interval95"]
-        other = known.get(name)
-        off = None if other is None else 100.0 * (value["value"] / other - 1.0)
-        covers = "" if other is None else "yes" if lower <= other <= upper else "no"
-        rows.append((name, value["value"], lower, upper, other, off, covers))
-    return Table(
-        "values",
-        "Parameters of the revised model",
-        (
-            Column("parameter"),
-            Column("ours", "SI", 4),
-            Column("lower", "SI", 4, "95 % interval"),
-            Column("upper", "SI", 4, "95 % interval"),
-            Column(heading, "SI", 5),
-            Column("difference", "%", 2),
-            Column("interval covers"),
-        ),
-        tuple(rows),
-        note=f"{heading.capitalize()}: {source}",
-    )
-
-
-def gaps_table(one: Study) -> Table:
-    """Return the gaps on held-out records."""
-    return Table(
-        "held_out",
-        "Root mean square errors on held-out records",
-        (
-            Column("record"),
-            Column("quantity"),
-            Column("by"),
-            Column("before", "SI", 3),
-            Column("after", "SI", 3),
-            Column("sensors", "SI", 2),
-            Column("R2 before", digits=5),
-            Column("R2 after", digits=5),
-        ),
-        tuple(
-            (
-                *(gap.record, gap.quantity, gap.kind, gap.before, gap.after, gap.noise_floor),
-                *(gap.determination or (None, None)),
-            )
-            for gap in one.gaps
-        ),
-        note="Before: the fitted model without the effects. A simulation has the measured inputs. "
-        f"{extent_sentence(one.gaps)}",
-    )
-
-
-def evidence_table(one: Study) -> Table:
-    """Return the explanations that were tried, the best first."""
-    verdict = one.finding.verdict
-    hypotheses = [verdict.chosen, *verdict.alternatives]
-    found = [hypothesis for hypothesis in hypotheses if hypothesis is not None]
-    return Table(
-        "evidence",
-        "Explanations that were tried",
-        (Column("effects"), Column("share of the misfit removed", "%", 4), Column("BIC", "", 5)),
-        tuple(
-            (in_words(hypothesis.label), 100.0 * hypothesis.explained, hypothesis.bic)
-            for hypothesis in found
-        ),
-        folded=True,
-    )
-
-
-def pictures(one: Study) -> tuple[Picture, ...]:
-    """Return what is left over the motion, and the held-out record that was missed most."""
-    drawn = [gap for gap in one.gaps if gap.kind == "simulation" and np.isfinite(gap.after)]
-    found = [
-        Picture(
-            "misfit",
-            "What the model leaves of each balance over speed and position: dots before, crosses "
-            "after the correction.",
-            misfit_over_motion(one.finding),
-        )
-    ]
-    if drawn:
-        worst = max(drawn, key=lambda gap: gap.before)
-        caption = f"Held-out record {worst.record}, simulated."
-        found.append(Picture("overlay", caption, overlay(one.finding, worst)))
-    return tuple(found)
-
-
-def coloured_rest(one: Study, generator: np.random.Generator) -> list[NDArray[np.float64]]:
-    """Return, by record, a disturbance of the colour of what the study's model leaves.
-
-    Shape (n_balances, n) at the records' rate of samples: Gaussian, with the power of the real rest
-    in bands of frequency, so that nothing of its course or of its lines is left.
-    """
-    found = []
-    coefficients = one.finding.data.coefficients(one.finding.accepted.residuals)
-    for left, balance in zip(coefficients, one.finding.data.spectra, strict=True):
-        edges = np.unique(np.geomspace(1, left.shape[1], _BANDS).astype(int))
-        sizes = np.zeros(left.shape)
-        for low, high in zip([0, *edges[:-1]], edges, strict=True):
-            sizes[:, low:high] = np.sqrt(np.mean(left[:, low:high] ** 2, axis=1, keepdims=True))
-        drawn = sizes * generator.standard_normal(left.shape)
-        rows = [np.interp(balance.record.time, balance.time, balance.in_time(row)) for row in drawn]
-        found.append(np.array(rows))
-    return found
+            values[f"{effect['name'].replace('_', ' ')}: {name.replace('_', ' ')}"] = value
+    return values

@@ -24,9 +24,8 @@ from experiments.runner.result import Cell, Column, Result, Table
 from experiments.runner.store import TIMES, write_atomically
 from experiments.runner.texts import paragraphs
 from experiments.studies.measured.rigs import MEASURED
-from pymoo_hdte._io.text_table import csv_text
+from pymoo_hdte._io.csv_table import csv_text
 from pymoo_hdte.discrepancy import DriveAnalysis, analyse, read_campaign
-from pymoo_hdte.discrepancy._report.tables import STATUSES as SHOWN
 from pymoo_hdte.discrepancy._report.words import in_a_sentence
 from pymoo_hdte.discrepancy._selection.candidate import Candidate
 from pymoo_hdte.effects.sentence_blanks import in_words
@@ -65,17 +64,17 @@ def run(context: Context) -> Result:
         sentence = f"Skipped: there are no campaigns in {RIGS}."
         return Result("Verdicts on sealed rigs", context.command(NAME), sentence)
     if context.full:
-        found, seconds = _analysed(context)
+        rows, seconds = _analysed(context)
     else:
-        found, seconds = (_committed(name) for name in (f"{NAME}.csv", f"{NAME}_seconds.csv"))
+        rows, seconds = (_committed(name) for name in (f"{NAME}.csv", f"{NAME}_seconds.csv"))
     return Result(
         title="Verdicts on sealed rigs",
         command=context.command(NAME),
-        answer=_counted([row[1] for row in found]),
+        answer=_counted([row[1] for row in rows]),
         paragraphs=(*stored_outcome(context, NAME), SETTING),
         tables=(
             Table(
-                "verdicts", "What is said to be missing", COLUMNS, _cells(_told(found)), note=NOTE
+                "verdicts", "What is said to be missing", COLUMNS, _cells(_told(rows)), note=NOTE
             ),
             Table("seconds", "CPU time", SECONDS, _cells(seconds), wall_times=True),
         ),
@@ -85,8 +84,8 @@ def run(context: Context) -> Result:
 def _counted(statuses: Sequence[str]) -> str:
     """Say how many rigs end with each status."""
     counts = Counter(statuses).most_common()
-    told = ", ".join(f"{SHOWN[one]} in {n}" for one, n in counts)
-    return f"Verdicts on {len(statuses)} rigs: {told}."
+    counted = ", ".join(f"{status} in {n}" for status, n in counts)
+    return f"Verdicts on {len(statuses)} rigs: {counted}."
 
 
 def verdict_row(name: str, analysis: DriveAnalysis) -> list[str]:
@@ -94,34 +93,37 @@ def verdict_row(name: str, analysis: DriveAnalysis) -> list[str]:
     verdict, proof = analysis.verdict, analysis.prove()
     accepted = verdict.accepted
     effects = "" if accepted is verdict.base else _labels(accepted.candidates)
-    rivals = " or ".join(_labels(one.candidates) for one in verdict.equivalent)
-    fits = [one.chi_square / verdict.degrees_of_freedom for one in (verdict.base, accepted)]
+    rivals = " or ".join(_labels(hypothesis.candidates) for hypothesis in verdict.equivalent)
+    fits = [
+        hypothesis.chi_square / verdict.degrees_of_freedom
+        for hypothesis in (verdict.base, accepted)
+    ]
     words = [name, verdict.status, effects, rivals, "; ".join(map(in_a_sentence, verdict.reasons))]
     gaps = [float("nan")] * 5
     if proof is not None:
         error = proof.channels["transmission_error"]
         gaps = [proof.overall.before, proof.overall.after]
         gaps += [error.before, error.after, error.noise_floor]
-    return [*words, *(f"{one:.5g}" for one in (*fits, *gaps))]
+    return [*words, *(f"{number:.5g}" for number in (*fits, *gaps))]
 
 
 def _labels(candidates: Sequence[Candidate]) -> str:
-    return " + ".join(one.label for one in candidates)
+    return " + ".join(candidate.label for candidate in candidates)
 
 
 def _analysed(context: Context) -> tuple[Rows, Rows]:
-    found, seconds = [], []
+    rows, seconds = [], []
     for folder in tqdm(sorted(RIGS.glob("rig-*")), desc="sealed rigs", leave=False):
         started = time.process_time()
         analysis = analyse(read_campaign(folder))
         judged = time.process_time()
-        found.append(verdict_row(folder.name, analysis))
+        rows.append(verdict_row(folder.name, analysis))
         ended = time.process_time()
         seconds.append([folder.name, f"{judged - started:.3g}", f"{ended - judged:.3g}"])
-    texts = table_with_origin(_headings(COLUMNS), found), csv_text(_headings(SECONDS), seconds)
+    texts = table_with_origin(_headings(COLUMNS), rows), csv_text(_headings(SECONDS), seconds)
     write_atomically(context.out / NAME / f"{NAME}.csv", texts[0].encode())
     write_atomically(context.out / TIMES / NAME / f"{NAME}_seconds.csv", texts[1].encode())
-    return found, seconds
+    return rows, seconds
 
 
 def _headings(columns: Sequence[Column]) -> list[str]:
@@ -138,7 +140,7 @@ def _told(rows: Rows) -> Rows:
     return [
         [
             row[0],
-            SHOWN[row[1]],
+            row[1],
             *(in_words(text).replace("_", " ") for text in row[2:_WORDS]),
             *row[_WORDS:],
         ]

@@ -18,7 +18,7 @@ from experiments.runner.campaign import Run
 from experiments.runner.committed import read_rows, table_with_origin
 from experiments.studies.reliability.fuzz import ACCEPTED, REFUSED
 from experiments.studies.reliability.limits import LimitJob, MemoryJob
-from pymoo_hdte._io.text_table import csv_text
+from pymoo_hdte._io.csv_table import csv_text
 
 FUZZ, KILL, LIMIT = "fuzz", "kill", "limit"
 LEVEL = 0.95
@@ -142,7 +142,7 @@ def read_peaks(path: Path) -> list[Peak]:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Tell what failed in a file of tallies; 0 if nothing did."""
     (path,) = sys.argv[1:] if arguments is None else arguments
-    failed = [one for one in read_tallies(Path(path)) if one.failed]
+    failed = [tally for tally in read_tallies(Path(path)) if tally.failed]
     for one in failed:
         print(f"{one.part}, {one.kind}: {one.failed} of {one.trials} failed: {one.failing}")
     return int(bool(failed))

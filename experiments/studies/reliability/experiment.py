@@ -7,16 +7,25 @@ interrupted, and leaves the same files in the results folder; with ``--quick`` a
 
 from __future__ import annotations
 
+import json
+import subprocess
+import sys
+import tempfile
+import time
 from collections.abc import Mapping
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass
+from pathlib import Path
+from threading import Timer
 
-from experiments.runner.campaign import Campaign
+import numpy as np
+
+from experiments.runner.campaign import Campaign, Run
 from experiments.runner.committed import committed_file, stored_outcome
 from experiments.runner.registry import Context
 from experiments.runner.result import Column, Finding, Result, Table, significant
 from experiments.runner.store import TIMES, write_atomically
 from experiments.runner.texts import paragraphs
-from experiments.studies.reliability.dask_runs import DaskKillJob
 from experiments.studies.reliability.data import (
     FUZZ,
     KILL,
@@ -34,7 +43,17 @@ from experiments.studies.reliability.data import (
 )
 from experiments.studies.reliability.fuzz import FuzzJob
 from experiments.studies.reliability.inputs import KINDS, THROUGH_COMMANDS
-from experiments.studies.reliability.kill import KillJob
+from experiments.studies.reliability.kill import (
+    COUNTS,
+    EXPERIMENT,
+    PATIENCE,
+    ROOT,
+    SEED,
+    KillJob,
+    judge,
+    reference,
+    run_until,
+)
 from experiments.studies.reliability.limits import LIMITS, LimitJob, MemoryJob
 
 TALLIES, PEAKS = "reliability.csv", "reliability_memory.csv"
@@ -74,7 +93,7 @@ FULL = Extent(
     limits=tuple(LIMITS),
     experiments=(
         *(("table7",), ("table8",), ("sensitivity",), ("crosscheck",), ("calibration",)),
-        *(("blind",), ("emps",), ("kinova",)),
+        ("blind",),
     ),
 )
 QUICK = Extent(
@@ -99,9 +118,9 @@ def run(context: Context) -> Result:
         command=context.command("reliability"),
         paragraphs=(*stored_outcome(context, "reliability"), SETTING, KILLING),
         tables=(
-            _inputs_table([one for one in tallies if one.part == FUZZ]),
-            _kills_table([one for one in tallies if one.part == KILL]),
-            _limits_table([one for one in tallies if one.part == LIMIT]),
+            _inputs_table([tally for tally in tallies if tally.part == FUZZ]),
+            _kills_table([tally for tally in tallies if tally.part == KILL]),
+            _limits_table([tally for tally in tallies if tally.part == LIMIT]),
             _memory_table(peaks),
         ),
     )
@@ -153,7 +172,7 @@ def _below(total: Tally) -> str:
 
 def _inputs_table(tallies: list[Tally]) -> Table:
     inputs, refused, accepted, failed = (
-        sum(getattr(one, name) for one in tallies)
+        sum(getattr(tally, name) for tally in tallies)
         for name in ("trials", "refused", "accepted", "failed")
     )
     total = Tally(FUZZ, "all", inputs, refused, accepted, failed)
@@ -166,10 +185,10 @@ def _inputs_table(tallies: list[Tally]) -> Table:
         ),
         tuple(
             (
-                *(one.kind, one.trials, one.refused, one.accepted, one.failed),
-                *(100.0 * one.bound, one.failing or None),
+                *(tally.kind, tally.trials, tally.refused, tally.accepted, tally.failed),
+                *(100.0 * tally.bound, tally.failing or None),
             )
-            for one in (*tallies, total)
+            for tally in (*tallies, total)
         ),
         note=UPPER,
         findings=(
@@ -185,7 +204,7 @@ def _inputs_table(tallies: list[Tally]) -> Table:
 
 
 def _kills_table(tallies: list[Tally]) -> Table:
-    kills, failed = sum(one.trials for one in tallies), sum(one.failed for one in tallies)
+    kills, failed = sum(tally.trials for tally in tallies), sum(tally.failed for tally in tallies)
     total = Tally(KILL, "all", kills, 0, 0, failed)
     return Table(
         "kills",
@@ -195,8 +214,15 @@ def _kills_table(tallies: list[Tally]) -> Table:
             *(Column("failed"), Column("rate of failures below", "%", 2), Column("what failed")),
         ),
         tuple(
-            (one.kind, one.trials, one.accepted, one.failed, 100.0 * one.bound, one.failing or None)
-            for one in tallies
+            (
+                tally.kind,
+                tally.trials,
+                tally.accepted,
+                tally.failed,
+                100.0 * tally.bound,
+                tally.failing or None,
+            )
+            for tally in tallies
         ),
         note=UPPER,
         findings=(
@@ -213,13 +239,13 @@ def _kills_table(tallies: list[Tally]) -> Table:
 
 
 def _limits_table(tallies: list[Tally]) -> Table:
-    trials, failed = sum(one.trials for one in tallies), sum(one.failed for one in tallies)
+    trials, failed = sum(tally.trials for tally in tallies), sum(tally.failed for tally in tallies)
     total = Tally(LIMIT, "all", trials, 0, 0, failed)
     return Table(
         "limits",
         "Full disks, folders without permission, and two runs in one folder",
         (Column("limit"), Column("trials"), Column("failed")),
-        tuple((one.kind, one.trials or "not possible here", one.failed) for one in tallies),
+        tuple((tally.kind, tally.trials or "not possible here", tally.failed) for tally in tallies),
         note="Disks of 0 to 512 kB in memory, which only the superuser may mount. A run on a full "
         "disk must end in a message, leave whole files only, and come to the bytes of an "
         "undisturbed run once there is space; where one must not write, it is refused before "
@@ -236,12 +262,12 @@ def _limits_table(tallies: list[Tally]) -> Table:
 
 
 def _memory_table(peaks: list[Peak]) -> Table:
-    largest = max(peaks, key=lambda one: one.memory)
+    largest = max(peaks, key=lambda tally: tally.memory)
     return Table(
         "memory",
         "Peak of resident memory in one process",
         (Column("experiment"), Column("memory", "MB", 3), Column("processor time", "s", 3)),
-        tuple((one.experiment, one.memory / 1e6, one.seconds) for one in peaks),
+        tuple((need.experiment, need.memory / 1e6, need.seconds) for need in peaks),
         note="Jobs of a campaign are independent, so its length adds nothing but their results; "
         "every worker process needs as much again.",
         findings=(
@@ -254,3 +280,88 @@ def _memory_table(peaks: list[Peak]) -> Table:
         ),
         wall_times=True,
     )
+
+
+WORKERS = 2
+
+
+@dataclass(frozen=True)
+class DaskKillJob:
+    """Kills on one cluster: of a command, then of a worker while the command runs again."""
+
+    block: int
+    kills: int
+
+    @property
+    def key(self) -> str:
+        """All fields in one name."""
+        return f"dask_kill_{self.block}_{self.kills}_seed{SEED}"
+
+    def execute(self) -> Run:
+        """Count as `KillJob`; a run that loses a worker has to come to its end all the same."""
+        rng = np.random.default_rng([SEED, 1, self.block])
+        begin, counts = time.perf_counter(), dict.fromkeys(COUNTS, 0)
+        with tempfile.TemporaryDirectory(prefix="kill-") as top, ExitStack() as stack:
+            cluster = _Cluster(Path(top), stack)
+            for number in range(self.kills // 2):
+                folder = Path(top) / str(number)
+                moments = rng.uniform(0.0, reference().seconds, size=2)
+                judge(folder, _run(cluster, folder, moments[0]), counts)
+                timer = Timer(moments[1], cluster.kill_a_worker)
+                timer.start()
+                judge(folder, _run(cluster, folder, PATIENCE), counts)
+                timer.join()
+                counts["kills"] += 1
+        values = np.array([list(counts.values())], dtype=float)
+        return Run(COUNTS, values, time.perf_counter() - begin)
+
+
+def _run(cluster: _Cluster, folder: Path, moment: float) -> int | None:
+    options = ("--dask", cluster.address, "--out", str(folder))
+    return run_until(["experiments", *EXPERIMENT, *options], moment)
+
+
+class _Cluster:
+    """A scheduler and workers, all of them processes of their own, on free ports."""
+
+    def __init__(self, top: Path, stack: ExitStack) -> None:
+        self._top, self._stack = top, stack
+        connection = top / "scheduler.json"
+        self._start(
+            *("scheduler", "--host", "127.0.0.1", "--port", "0"),
+            *("--dashboard-address", "127.0.0.1:0", "--scheduler-file", str(connection)),
+        )
+        self.address = _address(connection)
+        self.workers = [self.worker() for _ in range(WORKERS)]
+
+    def worker(self) -> subprocess.Popen[bytes]:
+        """Return a new worker."""
+        return self._start(
+            *("worker", self.address, "--nthreads", "1", "--no-nanny", "--no-dashboard"),
+            *("--local-directory", str(self._top / "scratch")),
+        )
+
+    def kill_a_worker(self) -> None:
+        """Kill the older of the workers, and start another."""
+        self.workers[0].kill()
+        self.workers = [*self.workers[1:], self.worker()]
+
+    def _start(self, *arguments: str) -> subprocess.Popen[bytes]:
+        process = self._stack.enter_context(
+            subprocess.Popen(
+                [sys.executable, "-m", "dask", *arguments], cwd=ROOT,
+                stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+            )
+        )  # fmt: skip
+        self._stack.callback(process.kill)
+        return process
+
+
+def _address(connection: Path) -> str:
+    end = time.monotonic() + PATIENCE
+    while time.monotonic() < end:
+        # The file is not there yet, or half-written.
+        with suppress(OSError, ValueError):
+            return json.loads(connection.read_text())["address"]
+        time.sleep(0.05)
+    raise TimeoutError("no Dask scheduler")

@@ -81,8 +81,8 @@ def outcome(kind: str, number: int) -> tuple[int, str]:
     with tempfile.TemporaryDirectory(prefix="fuzz-") as top:
         folder = Path(top) / "input"
         put(files, folder)
-        found, words = _read(kind, folder)
-    return found, f"{'; '.join(changes)}: {words}"
+        outcome_of, words = _read(kind, folder)
+    return outcome_of, f"{'; '.join(changes)}: {words}"
 
 
 def _read(kind: str, folder: Path) -> tuple[int, str]:
@@ -124,7 +124,7 @@ def outcomes_of_process(command: list[str], count: int, seconds: float) -> list[
                 return outcomes if len(outcomes) == count else [*outcomes, CRASHED]
             text += part
             # A line that is half here is counted when its end comes; libraries print lines too.
-            outcomes = [int(found) for found in re.findall(OUTCOME_LINE, text)]
+            outcomes = [int(outcome_of) for outcome_of in re.findall(OUTCOME_LINE, text)]
             limit = seconds
 
 
@@ -154,5 +154,5 @@ if __name__ == "__main__":
     if len(sys.argv) == 4:
         _serve(sys.argv[1], int(sys.argv[2]), int(sys.argv[3]))
     else:
-        found, words = outcome(sys.argv[1], int(sys.argv[2]))
-        print(f"{OUTCOMES[found]}: {words}")
+        result, words = outcome(sys.argv[1], int(sys.argv[2]))
+        print(f"{OUTCOMES[result]}: {words}")

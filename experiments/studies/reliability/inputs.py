@@ -2,20 +2,26 @@
 
 from __future__ import annotations
 
+import io
 import json
 from collections.abc import Callable
+from contextlib import redirect_stderr
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from experiments.studies.reliability import commands, originals
-from experiments.studies.reliability.commands import Wrong
+from experiments.studies.reliability import originals
 from experiments.studies.reliability.mutations import Files
+from pymoo_hdte._reports.folder import ReportFolder
+from pymoo_hdte.checks import InvalidInput
+from pymoo_hdte.cli import command_line as cli
+from pymoo_hdte.cli import identification_report, optimum_report, simulation_report
 from pymoo_hdte.discrepancy import read_campaign, write_campaign
 from pymoo_hdte.discrepancy._records.rig_files import read_rig
 from pymoo_hdte.discrepancy._records.rig_model import model_text
+from pymoo_hdte.discrepancy._report import folder as report_folder
 from pymoo_hdte.drive import UnstableDrive, hs_20_100, load_datasheet, load_model
 from pymoo_hdte.identification import (
     error_statistics,
@@ -27,6 +33,61 @@ from pymoo_hdte.identification.damping import bearing_damping
 from pymoo_hdte.identification.torsion import stiffness
 from pymoo_hdte.problems.operating_conditions import load_conditions, shares
 from pymoo_hdte.surrogate import ChebyshevSurrogate
+
+
+class Wrong(Exception):
+    """Invalid input was accepted, or files were left behind."""
+
+
+def discrepancy(folder: Path) -> None:
+    """Judge the campaign or rig in a folder; errors as `_run`."""
+    _run(["discrepancy", str(folder)], folder, report_folder.FOLDER)
+
+
+def simulate(folder: Path) -> None:
+    """Simulate the drive in a folder; errors as `_run`."""
+    _run(["simulate", *_drive(folder)], folder, simulation_report.FOLDER)
+
+
+def optimise(folder: Path) -> None:
+    """Optimise the drive in a folder over its duty cycle, shortly; errors as `_run`."""
+    shortly = ["--cycle", str(folder / "cycle.csv"), "--designs", "40"]
+    _run(["optimise", *_drive(folder), *shortly], folder, optimum_report.FOLDER)
+
+
+def identify(folder: Path) -> None:
+    """Identify what the records in a folder tell; errors as `_run`."""
+    sheet = ["--datasheet", str(folder / "sheet.toml")]
+    _run(["identify", str(folder), *sheet], folder, identification_report.FOLDER)
+
+
+COMMANDS: tuple[Callable[[Path], None], ...] = (discrepancy, simulate, optimise, identify)
+
+
+def _drive(folder: Path) -> list[str]:
+    return [str(folder / "sheet.toml"), "--model", str(folder / "model.toml")]
+
+
+def _run(arguments: list[str], folder: Path, report: ReportFolder) -> None:
+    """Run a command; raise `InvalidInput` where it refuses, `Wrong` where it does so wrongly."""
+    out, errors = folder.parent / "out", io.StringIO()
+    with redirect_stderr(errors):
+        code = cli.main([*arguments, "--out", str(out), "--quiet"])
+    written = {path.name for path in out.iterdir()} if out.is_dir() else set()
+    beside = {path.name for path in folder.parent.iterdir()} - {folder.name, out.name}
+    if beside:
+        raise Wrong(f"left beside the report: {beside}")
+    if code == cli.MISTAKE:
+        if written or out.exists():
+            raise Wrong(f"written in spite of code 2: {written}")
+        lines = errors.getvalue().splitlines()
+        if not lines or not all(line.startswith("pymoo-hdte: error: ") for line in lines):
+            raise Wrong(f"not a line for each complaint: {lines!r}"[:200])
+        # The first stands for all: what is refused is told in one line here.
+        raise InvalidInput(arguments[0], None, lines[0])
+    if code != 0 or not set(report.always) <= written <= set(report.files):
+        raise Wrong(f"code {code} and {written}")
+    json.loads((out / report.document).read_text(encoding="utf-8"))
 
 
 @dataclass(frozen=True)
@@ -60,7 +121,7 @@ def _read_campaign(folder: Path) -> None:
     campaign = read_campaign(folder)
     write_campaign(campaign, folder.parent / "again")
     again = read_campaign(folder.parent / "again")
-    if [one.name for one in again.running] != [one.name for one in campaign.running]:
+    if [record.name for record in again.running] != [record.name for record in campaign.running]:
         raise Wrong("a campaign that is read back as another")
 
 
@@ -106,9 +167,9 @@ def _read_no_load(folder: Path) -> None:
 
 
 def _read_errors(folder: Path) -> None:
-    found = error_statistics(*read_error_measurements(folder / "errors.csv"))
-    _finite("a mean", found.values)
-    found.advice()
+    statistics = error_statistics(*read_error_measurements(folder / "errors.csv"))
+    _finite("a mean", statistics.values)
+    statistics.advice()
 
 
 def _read_surrogate(folder: Path) -> None:
@@ -133,12 +194,12 @@ KINDS = {
         Kind("no-load runs", originals.no_load_files, _read_no_load),
         Kind("error measurements", originals.error_files, _read_errors),
         Kind("surrogate", originals.surrogate_files, _read_surrogate),
-        Kind("campaign, whole command", originals.campaign_files, commands.discrepancy, 300.0),
-        Kind("rig, whole command", originals.rig_files, commands.discrepancy, 300.0),
-        Kind("simulate, whole command", originals.drive_files, commands.simulate, 300.0),
-        Kind("optimise, whole command", originals.study_files, commands.optimise, 300.0),
-        Kind("identify, whole command", originals.bench_files, commands.identify, 300.0),
+        Kind("campaign, whole command", originals.campaign_files, discrepancy, 300.0),
+        Kind("rig, whole command", originals.rig_files, discrepancy, 300.0),
+        Kind("simulate, whole command", originals.drive_files, simulate, 300.0),
+        Kind("optimise, whole command", originals.study_files, optimise, 300.0),
+        Kind("identify, whole command", originals.bench_files, identify, 300.0),
     )
 }
-THROUGH_COMMANDS = tuple(name for name, kind in KINDS.items() if kind.read in commands.COMMANDS)
+THROUGH_COMMANDS = tuple(name for name, kind in KINDS.items() if kind.read in COMMANDS)
 """Kinds that go through the whole command line."""

@@ -81,10 +81,10 @@ def full_disk_of_experiments() -> Iterator[bool]:
                 return
             _resize(disk, f"{size}k")
             command = _experiment(*EXPERIMENT, "--workers", "1", "--out", str(disk / "out"))
-            first = _run(command)
-            clear = first.returncode in (1, 2) and _one_error(first.stderr)
-            left = list(visible(disk))
-            untorn = all(whole(path) for path in left) and not _hidden(disk)
+            crowded = _run(command)
+            clear = crowded.returncode in (1, 2) and _one_error(crowded.stderr)
+            paths = list(visible(disk))
+            untorn = all(whole(path) for path in paths) and not _hidden(disk)
             _resize(disk, PLENTY)
             again = _run(command)
             same = again.returncode == 0 and steady(disk / "out") == reference().files
@@ -125,8 +125,8 @@ def two_at_once() -> Iterator[bool]:
     for _ in range(3):
         with tempfile.TemporaryDirectory(prefix="twice-") as top:
             command = _experiment(*EXPERIMENT, "--workers", "1", "--out", top)
-            both = [_started(command) for _ in range(2)]
-            codes = [process.wait(PATIENCE) for process in both]
+            processes = [_started(command) for _ in range(2)]
+            codes = [process.wait(PATIENCE) for process in processes]
             yield codes == [0, 0] and steady(Path(top)) == reference().files
 
 
@@ -135,8 +135,8 @@ def two_reports_at_once() -> Iterator[bool]:
     with _oscillator() as folder:
         for _ in range(3):
             with tempfile.TemporaryDirectory(prefix="twice-") as top:
-                both = [_started(_report(folder, Path(top) / "out")) for _ in range(2)]
-                codes = sorted(process.wait(PATIENCE) for process in both)
+                processes = [_started(_report(folder, Path(top) / "out")) for _ in range(2)]
+                codes = sorted(process.wait(PATIENCE) for process in processes)
                 names = [path.name for path in Path(top).iterdir()]
                 whole_report = all(whole(path) for path in visible(Path(top) / "out"))
                 yield codes in ([0, 0], [0, 2]) and names == ["out"] and whole_report

@@ -43,12 +43,12 @@ def _replaced(
     pattern: re.Pattern[str], text: str, rng: np.random.Generator, change: Callable[[str], str]
 ) -> str:
     """Change one match, or now and then up to twenty."""
-    found = list(pattern.finditer(text))
-    if not found:
+    matches = list(pattern.finditer(text))
+    if not matches:
         return text
     count = 1 if rng.random() < 0.8 else int(rng.integers(2, 21))
-    for at in sorted({*rng.integers(len(found), size=count).tolist()}, reverse=True):
-        start, end = found[at].span()
+    for at in sorted({*rng.integers(len(matches), size=count).tolist()}, reverse=True):
+        start, end = matches[at].span()
         text = text[:start] + change(text[start:end]) + text[end:]
     return text
 
@@ -129,8 +129,8 @@ def lines_doubled(text: str, rng: np.random.Generator) -> str:
 def lines_swapped(text: str, rng: np.random.Generator) -> str:
     """Swap two lines."""
     lines = text.split("\n")
-    one, other = rng.integers(len(lines), size=2)
-    lines[one], lines[other] = lines[other], lines[one]
+    place, second = rng.integers(len(lines), size=2)
+    lines[place], lines[second] = lines[second], lines[place]
     return "\n".join(lines)
 
 
@@ -186,14 +186,14 @@ def column_replaced(text: str, rng: np.random.Generator) -> str:
 
 
 def _rearranged(cells: list[str], rng: np.random.Generator) -> list[str]:
-    one, other = rng.integers(len(cells), size=2)
+    place, second = rng.integers(len(cells), size=2)
     match rng.integers(3):
         case 0:
-            del cells[one]
+            del cells[place]
         case 1:
-            cells.insert(other, cells[one])
+            cells.insert(second, cells[place])
         case _:
-            cells[one], cells[other] = cells[other], cells[one]
+            cells[place], cells[second] = cells[second], cells[place]
     return cells
 
 

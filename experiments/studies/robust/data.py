@@ -2,17 +2,96 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+
+import numpy as np
 
 from experiments.runner.campaign import Run
 from experiments.runner.committed import committed_file, read_rows, table_with_origin
 from experiments.runner.registry import Context, require
 from experiments.runner.store import write_atomically
 from experiments.studies.robust.functions import FUNCTIONS
-from experiments.studies.robust.job import ACCURACY, BUDGET, METHODS, OURS, STEP, Curve, Grown
-from experiments.studies.robust.rivals import CHAOSPY_WAYS, Step, runs_needed
+from experiments.studies.robust.ours import Growth
+from experiments.studies.robust.rivals import (
+    CHAOSPY_WAYS,
+    Step,
+    chaospy_traces,
+    openturns_trace,
+    runs_needed,
+    until_it_stays,
+)
+from experiments.studies.robust.task import Task
+
+OURS = "pymoo_hdte"
+OPENTURNS = "OpenTURNS"
+CHAOSPY = "chaospy"
+METHODS = (OURS, CHAOSPY, OPENTURNS)
+ACCURACY = 0.01
+BUDGET = 1000
+STEP = ("runs", "error_at_designs", "error_overall")
+CURVE = ("way", *STEP)
+
+
+@dataclass(frozen=True)
+class Grown:
+    """One growth of ours: where it stops by itself, what its band covers, and its errors."""
+
+    function: str
+    seed: int
+    whole_curve: bool
+    budget: int = BUDGET
+
+    @property
+    def key(self) -> str:
+        """All settings in one name."""
+        curve = "_curve" * self.whole_curve
+        return f"{self.function}_{OURS}_{self.budget}_{self.seed}{curve}".replace(" ", "_")
+
+    def execute(self) -> Run:
+        """Return the columns of `STEP` of every fit, and beside each the numbers of the stop.
+
+        Without the curve there is one row, and its `STEP` is NaN.
+        """
+        task, started = Task(self.function), time.perf_counter()
+        growth = Growth(task, ACCURACY, self.budget, self.seed, self.whole_curve)
+        stop = growth.band()
+        steps = np.array(growth.steps, dtype=float) if growth.steps else np.full((1, 3), np.nan)
+        rows = np.column_stack([steps, np.tile([*stop.values()], (len(steps), 1))])
+        columns = (*STEP, *(f"stop_{name}" for name in stop))
+        return Run(columns, rows, time.perf_counter() - started)
+
+
+@dataclass(frozen=True)
+class Curve:
+    """Errors of another library over its runs, each way of it up to where it needs no more."""
+
+    function: str
+    method: str
+    budget: int = BUDGET
+
+    @property
+    def key(self) -> str:
+        """All settings in one name."""
+        return f"{self.function}_{self.method}_{self.budget}".replace(" ", "_")
+
+    def execute(self) -> Run:
+        """Return the columns of `CURVE`, ways counted from 0."""
+        task, started = Task(self.function), time.perf_counter()
+        if self.method == OPENTURNS:
+            ways = {OPENTURNS: openturns_trace(task, self.budget)}
+        else:
+            ways = chaospy_traces(task, self.budget)
+        rows = [
+            (way, *step)
+            for way, steps in enumerate(ways.values())
+            for step in until_it_stays(steps, ACCURACY)
+        ]
+        seconds = time.perf_counter() - started
+        return Run(CURVE, np.array(rows, dtype=float).reshape(-1, len(CURVE)), seconds)
+
 
 NAME = "robust"
 STOPS = f"{NAME}_stops"
@@ -51,8 +130,8 @@ class Outcome:
 
     def functions(self) -> list[str]:
         """Names of the functions, in the order of `FUNCTIONS`."""
-        found = {function for function, _, _ in self.curves}
-        return [one.name for one in FUNCTIONS if one.name in found]
+        names = {function for function, _, _ in self.curves}
+        return [function.name for function in FUNCTIONS if function.name in names]
 
     def needed(self, function: str, method: str, column: int = 1) -> int | None:
         """Return the least runs that a method needs by its best way, None if above the budget."""
@@ -61,7 +140,7 @@ class Outcome:
             for (name, who, _), steps in self.curves.items()
             if (name, who) == (function, method)
         ]
-        return min((one for one in counts if one is not None), default=None)
+        return min((count for count in counts if count is not None), default=None)
 
     def tried(self, function: str, method: str) -> int:
         """Return the most runs that a method was given on a function; 0 if it was not run."""
@@ -80,7 +159,7 @@ def outcome_for(context: Context) -> Outcome:
         return read_outcome(*(committed_file(f"{name}.csv", NAME) for name in (NAME, STOPS)))
     require("openturns", "uq")
     require("sklearn", "uq")
-    names = [one.name for one in FUNCTIONS] if context.full else QUICK_FUNCTIONS
+    names = [function.name for function in FUNCTIONS] if context.full else QUICK_FUNCTIONS
     budget, seeds = (BUDGET, SEEDS) if context.full else (QUICK_BUDGET, SEEDS[:1])
     # The curve is that of the first seed.
     ours = [Grown(name, seed, seed == seeds[0], budget) for name in names for seed in seeds]
@@ -92,10 +171,12 @@ def outcome_for(context: Context) -> Outcome:
         for method in METHODS
         if method != OURS
     ]
-    found = gathered(grown, dict(zip(rivals, context.campaign.run(rivals, "rivals"), strict=True)))
-    for name, text in ((NAME, curves_text(found)), (STOPS, stops_text(found))):
+    outcome = gathered(
+        grown, dict(zip(rivals, context.campaign.run(rivals, "rivals"), strict=True))
+    )
+    for name, text in ((NAME, curves_text(outcome)), (STOPS, stops_text(outcome))):
         write_atomically(context.out / NAME / f"{name}.csv", text.encode())
-    return found
+    return outcome
 
 
 def gathered(grown: dict[Grown, Run], rivals: dict[Curve, Run]) -> Outcome:
@@ -105,7 +186,7 @@ def gathered(grown: dict[Grown, Run], rivals: dict[Curve, Run]) -> Outcome:
     for growth, run in grown.items():
         if growth.whole_curve:
             steps = run.values[:, : len(STEP)].tolist()
-            curves[growth.function, OURS, OURS] = [(int(n), one, all_) for n, one, all_ in steps]
+            curves[growth.function, OURS, OURS] = [(int(n), step, all_) for n, step, all_ in steps]
         numbers = run.values[0, len(STEP) :].tolist()
         stops[growth.function, growth.seed] = dict(zip(STOP_NUMBERS, numbers, strict=True))
     for job, run in rivals.items():
@@ -161,4 +242,4 @@ def ahead(outcome: Outcome, function: str) -> bool:
         for method in METHODS
         if method != OURS
     ]
-    return ours is not None and all(ours < one for one in rivals)
+    return ours is not None and all(ours < runs_of for runs_of in rivals)

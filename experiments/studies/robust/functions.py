@@ -122,8 +122,8 @@ G_WEIGHTS = (1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 500.0)
 def g_function(**x: Array) -> Array:
     """Return the product of (|4 x_i - 2| + a_i) / (1 + a_i)."""
     factors = [
-        (np.abs(4.0 * one - 2.0) + a) / (1.0 + a)
-        for one, a in zip(x.values(), G_WEIGHTS, strict=True)
+        (np.abs(4.0 * value - 2.0) + a) / (1.0 + a)
+        for value, a in zip(x.values(), G_WEIGHTS, strict=True)
     ]
     return np.prod(factors, axis=0)
 
@@ -277,4 +277,4 @@ FUNCTIONS = (
         ("stiffness", "damping"),
     ),
 )
-BY_NAME = {one.name: one for one in FUNCTIONS}
+BY_NAME = {function.name: function for function in FUNCTIONS}

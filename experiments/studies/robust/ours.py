@@ -89,8 +89,8 @@ class Growth:
 
     def _stays(self, runs: int) -> bool:
         above = [n for n, error, _ in self.steps if not error < self._accuracy]
-        first = next((n for n, _, _ in self.steps if n > max(above, default=0)), self._budget)
-        return runs >= STAYS * first
+        reached = next((n for n, _, _ in self.steps if n > max(above, default=0)), self._budget)
+        return runs >= STAYS * reached
 
     def band(self) -> dict[str, float]:
         """Return how the band of the fit with which it stops compares with its true errors.
@@ -99,9 +99,9 @@ class Growth:
         """
         task, fit = self._task, self.stop
         problem = SimulatorProblem(task.inputs, fit, ("y",), (Mean(), Std()), (), fit.n_runs)
-        found = problem.evaluate(task.X)
+        moments = problem.evaluate(task.X)
         true = np.column_stack(task.true_moments)
-        error, band = np.abs(found - true), problem.band(task.X)
+        error, band = np.abs(moments - true), problem.band(task.X)
         # The true moments are sampled.
         own_error = 5e-4 * true[:, 1:]
         covered = np.mean(error <= band + own_error, axis=0)

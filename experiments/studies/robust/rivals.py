@@ -100,13 +100,13 @@ def openturns_trace(task: Task, most: int) -> Iterator[Step]:
     ot.ResourceMap.SetAsString("LeastSquaresMetaModelSelection-DecompositionMethod", "Cholesky")
     points, values = sample(task, most)
     laws = [
-        ot.Normal(one.mean, one.std)
-        if isinstance(one, Normal)
-        else ot.Uniform(one.lower, one.upper)
-        for one in task.germ
+        ot.Normal(law.mean, law.std)
+        if isinstance(law, Normal)
+        else ot.Uniform(law.lower, law.upper)
+        for law in task.germ
     ]
     law = ot.JointDistribution(laws)
-    families = [ot.StandardDistributionPolynomialFactory(one) for one in laws]
+    families = [ot.StandardDistributionPolynomialFactory(law) for law in laws]
     select = ot.LeastSquaresMetaModelSelectionFactory(ot.LARS(), ot.CorrectedLeaveOneOut())
     for runs in budgets(most):
         factor = 2.0 if runs < LONG_PATHS else ERROR_FACTOR
@@ -127,10 +127,10 @@ def openturns_trace(task: Task, most: int) -> Iterator[Step]:
                     ot.LeastSquaresStrategy(select),
                 )
                 chaos.run()
-                found = chaos.getResult()
-                error = float(np.min(np.array(found.getErrorHistory())))
+                result = chaos.getResult()
+                error = float(np.min(np.array(result.getErrorHistory())))
                 if error < least:
-                    best, least = found.getMetaModel(), error
+                    best, least = result.getMetaModel(), error
         if best is None:
             continue
         judged = task.judged[0].reshape(-1, len(laws))
@@ -163,25 +163,25 @@ def chaospy_traces(task: Task, most: int) -> dict[str, Iterator[Step]]:
 def _law(task: Task) -> Any:
     return chaospy.J(
         *(
-            chaospy.Normal(one.mean, one.std)
-            if isinstance(one, Normal)
-            else chaospy.Uniform(one.lower, one.upper)
-            for one in task.germ
+            chaospy.Normal(law.mean, law.std)
+            if isinstance(law, Normal)
+            else chaospy.Uniform(law.lower, law.upper)
+            for law in task.germ
         )
     )
 
 
 def _errors(task: Task, expansion: Any) -> tuple[float, float]:
     points, true = task.judged
-    found = expansion(*points.reshape(-1, len(task.names)).T)
-    return task.errors(np.broadcast_to(found, (true.size,)).reshape(true.shape))
+    values = expansion(*points.reshape(-1, len(task.names)).T)
+    return task.errors(np.broadcast_to(values, (true.size,)).reshape(true.shape))
 
 
 def _projected(
     task: Task, most: int, of_uniform: str, of_normal: str, growth: bool
 ) -> Iterator[Step]:
     law = _law(task)
-    rules = [of_normal if isinstance(one, Normal) else of_uniform for one in task.germ]
+    rules = [of_normal if isinstance(law, Normal) else of_uniform for law in task.germ]
     for order in range(1, HIGHEST_DEGREE + 1):
         nodes, weights = chaospy.generate_quadrature(
             order, law, rule=rules, sparse=True, growth=growth

@@ -40,7 +40,7 @@ class Task:
         self.names = tuple(self.function.laws)
         assert self.names[: len(self.function.designed)] == self.function.designed
         rng = np.random.default_rng(7)
-        bounds = np.array([(one.lower, one.upper) for one in self.designs.values()])
+        bounds = np.array([(design.lower, design.upper) for design in self.designs.values()])
         lower, upper = bounds.T
         self.X = rng.uniform(lower, upper, (DESIGNS, len(bounds)))
 
@@ -51,15 +51,15 @@ class Task:
     @cached_property
     def designs(self) -> dict[str, Design]:
         """The designed inputs."""
-        found = {}
+        designs = {}
         for name in self.function.designed:
             low, high = self._ends(name)
             margin = MIDDLE * (high - low)
             deviation: Any = margin
             if self.function.normal_deviation:
                 deviation = scipy.stats.norm(0.0, self.function.normal_deviation * (high - low))
-            found[name] = Design(low + margin, high - margin, deviation=deviation)
-        return found
+            designs[name] = Design(low + margin, high - margin, deviation=deviation)
+        return designs
 
     @cached_property
     def noise(self) -> dict[str, Any]:
@@ -122,7 +122,7 @@ class Task:
         values = np.array([self(block) for block in points])
         return values.mean(axis=1), values.std(axis=1)
 
-    def errors(self, found: Array) -> tuple[float, float]:
+    def errors(self, estimates: Array) -> tuple[float, float]:
         """Return the errors of the standard deviation of a surrogate as shares of the true one.
 
         Parameters
@@ -138,8 +138,8 @@ class Task:
             Of the deviation over designs and scatter together.
         """
         _, true = self.judged
-        ratios = np.abs(found.std(axis=1) / true.std(axis=1) - 1.0)
-        return float(np.quantile(ratios, 0.95)), float(abs(found.std() / true.std() - 1.0))
+        ratios = np.abs(estimates.std(axis=1) / true.std(axis=1) - 1.0)
+        return float(np.quantile(ratios, 0.95)), float(abs(estimates.std() / true.std() - 1.0))
 
     def _ends(self, name: str) -> tuple[float, float]:
         law = self.function.laws[name]

@@ -3,17 +3,59 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from experiments.comparing.rivals import RivalTest, holm_against
+from experiments.runner.committed import read_rows
 from experiments.runner.result import Cell, Column, Table
-from experiments.studies.suites.bbob.published import curves
 from experiments.studies.suites.data import Outcome
 from experiments.studies.suites.peers import BBOB_PEERS, ON_BBOB, OURS
 from experiments.studies.suites.protocol import BESIDE_PEERS, BUDGETS, DIMENSIONS
+
+ANCHORS = Path(__file__).resolve().parents[5] / "shared" / "anchors" / "bbob_biobj.csv"
+BEST = "HMO-CMA-ES"
+CITED = {
+    **{(10, 500): 0.214, (10, 2000): 0.295, (10, 10_000): 0.372, (10, 25_000): 0.414},
+    **{(20, 500): 0.183, (20, 2000): 0.250, (20, 10_000): 0.334, (20, 25_000): 0.377},
+}
+"""Shares of HMO-CMA-ES (Loshchilov, Glasmachers 2016) by dimension and evaluations."""
+SHOWN = {
+    BEST: "HMO-CMA-ES",
+    "best 2016": "best 2016",
+    "RM-MEDA": "RM-MEDA",
+    "SMS-EMOA-SA": "SMS-EMOA-",
+    "NSGA-II (MATLAB)": "NSGA-II-MATLAB",
+    "random in [-5, 5]": "RANDOMSEARCH-5",
+}
+"""Curves that are drawn, with the beginnings of their names in the archive."""
+_PREFIX = "share_at_"
+
+
+def curves(dimension: int, path: Path = ANCHORS) -> dict[str, dict[int, float]]:
+    """Return published shares by name and number of evaluations; without the file what is cited."""
+    if not path.is_file():
+        cited = {n: share for (d, n), share in CITED.items() if d == dimension}
+        return {BEST: cited}
+    found: dict[str, dict[int, float]] = {}
+    rows = [row for row in read_rows(path) if int(row["dimension"]) == dimension]
+    for shown, beginning in SHOWN.items():
+        for row in rows:
+            if row["algorithm"].startswith(beginning) and _of_the_right_year(row):
+                found[shown] = {
+                    int(name.removeprefix(_PREFIX)): float(value)
+                    for name, value in row.items()
+                    if name.startswith(_PREFIX) and value
+                }
+    return found
+
+
+def _of_the_right_year(row: dict[str, str]) -> bool:
+    """Leave out what stands there twice: the best of 2016 again in 2017."""
+    return row["year"] == ("2017" if row["algorithm"] == "SMS-EMOA-" else "2016")
 
 
 def reached_shares(outcome: Outcome, dimension: int, evaluations: int) -> list[float]:
@@ -32,8 +74,8 @@ def reached_shares(outcome: Outcome, dimension: int, evaluations: int) -> list[f
 
 def reached(outcome: Outcome, dimension: int, evaluations: int) -> float | None:
     """Return the mean of `reached_shares`; None if it was not run."""
-    found = reached_shares(outcome, dimension, evaluations)
-    return float(np.mean(found)) if found else None
+    shares = reached_shares(outcome, dimension, evaluations)
+    return float(np.mean(shares)) if shares else None
 
 
 class Duel(NamedTuple):
@@ -57,19 +99,19 @@ def duels(
 
     Ours and a rival that move alike whatever their budget may have been told more.
     """
-    found = []
+    duels_of = []
     for rival in rivals:
         pairs = _pairs(outcome, control, rival, evaluations)
         if rival != control and len(pairs):
-            found.append((rival, pairs))
+            duels_of.append((rival, pairs))
     # Each rival has problems of its own: its differences are padded with problems without any.
-    most = max((len(pairs) for _, pairs in found), default=0)
-    values = np.zeros((most, 1 + len(found)))
-    for column, (_, pairs) in enumerate(found, start=1):
+    most = max((len(pairs) for _, pairs in duels_of), default=0)
+    values = np.zeros((most, 1 + len(duels_of)))
+    for column, (_, pairs) in enumerate(duels_of, start=1):
         values[: len(pairs), column] = pairs[:, 1] - pairs[:, 0]
-    if not found:
+    if not duels_of:
         return []
-    names = [control, *(rival for rival, _ in found)]
+    names = [control, *(rival for rival, _ in duels_of)]
     tests = holm_against(control, names, values, smaller_is_better=False)
     return [
         Duel(
@@ -80,7 +122,7 @@ def duels(
             float(pairs[:, 1].mean()),
             test,
         )
-        for (rival, pairs), test in zip(found, tests, strict=True)
+        for (rival, pairs), test in zip(duels_of, tests, strict=True)
     ]
 
 
@@ -108,9 +150,9 @@ def shares_table(outcome: Outcome) -> Table:
         for algorithm, budget in told_most(outcome, dimension):
             shares = outcome.shares(dimension, algorithm, budget)
             where = f"here{_extent(outcome, dimension, algorithm, budget)}"
-            rows.append((algorithm, dimension, where, *(shares.get(one) for one in BUDGETS)))
+            rows.append((algorithm, dimension, where, *(shares.get(budget) for budget in BUDGETS)))
         for name, curve in curves(dimension).items():
-            rows.append((name, dimension, "published", *(curve.get(one) for one in BUDGETS)))
+            rows.append((name, dimension, "published", *(curve.get(budget) for budget in BUDGETS)))
     return Table(
         "shares",
         "bbob-biobj, held out: share of COCO's 58 targets reached, every evaluation counted",
@@ -127,7 +169,7 @@ def shares_table(outcome: Outcome) -> Table:
 def told_most(outcome: Outcome, dimension: int) -> list[tuple[str, int]]:
     """Return which peers ran in a dimension, each with its largest budget."""
     ran = {(run.algorithm, run.told) for run in outcome.bbob if run.dimension == dimension}
-    largest = {name: max(told for one, told in ran if one == name) for name, _ in ran}
+    largest = {name: max(told for run, told in ran if run == name) for name, _ in ran}
     return [(name, largest[name]) for name in BBOB_PEERS if name in largest]
 
 

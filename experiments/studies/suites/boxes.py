@@ -23,16 +23,16 @@ EVALUATIONS, SEED = 20_000, 101
 def main() -> None:
     """Write the table."""
     rows = []
-    for one in PROBLEMS.values():
-        if one.front is None:
-            problem = one.make()
+    for member in PROBLEMS.values():
+        if member.front is None:
+            problem = member.make()
             algorithms = CompactSwarm(), NSGA2(pop_size=100)
             runs = [minimize(problem, a, ("n_eval", EVALUATIONS), seed=SEED) for a in algorithms]
-            found = [np.atleast_2d(run.F) for run in runs if run.F is not None]
-            front = front_among(np.concatenate(found))
+            fronts = [np.atleast_2d(run.F) for run in runs if run.F is not None]
+            front = front_among(np.concatenate(fronts))
             ends = zip(front.min(axis=0), front.max(axis=0), strict=True)
             rows += [
-                [one.name, 1 + number, f"{low:.6g}", f"{high:.6g}"]
+                [member.name, 1 + number, f"{low:.6g}", f"{high:.6g}"]
                 for number, (low, high) in enumerate(ends)
             ]
     facts = {"command": "python -m experiments.studies.suites.boxes", "evaluations": EVALUATIONS}

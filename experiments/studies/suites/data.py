@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Collection, Iterable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +14,7 @@ from experiments.runner.campaign import Run
 from experiments.runner.committed import committed_file, read_rows, rounded, table_with_origin
 from experiments.runner.registry import Context, require
 from experiments.runner.store import write_atomically
-from experiments.studies.suites.bbob.coco import EXTRA
+from experiments.studies.suites.coco import EXTRA
 from experiments.studies.suites.jobs import MEASURES, BbobRun, SuiteRun
 from experiments.studies.suites.peers import OURS, PEERS, takes
 from experiments.studies.suites.problems import PROBLEMS, SUITES, problem_of
@@ -24,7 +24,7 @@ NAME = "suites"
 BBOB = f"{NAME}_bbob"
 DIGITS = 6
 COMMAND = "python -m experiments suites --quick"
-"""What an outcome is made by, unless `gather` made it; told in its first line."""
+"""What an outcome is made by, unless `renew` made it; told in its first line."""
 SUITE_COLUMNS = ("problem", "algorithm", "evaluations", "seed", "spent", *MEASURES)
 BBOB_COLUMNS = (
     "dimension",
@@ -65,9 +65,9 @@ class Outcome:
             if isinstance(job, BbobRun):
                 self.bbob[job] = {int(mark): rounded(share, DIGITS) for mark, share in run.values}
                 continue
-            for budget, *rest in run.values.tolist():
+            for budget, *numbers in run.values.tolist():
                 key = job.problem, job.algorithm, int(budget), job.seed
-                self.suites[key] = tuple(rounded(number, DIGITS) for number in rest)
+                self.suites[key] = tuple(rounded(number, DIGITS) for number in numbers)
 
     def has(self, job: SuiteRun | BbobRun) -> bool:
         """Say whether a job's run is there, at all its budgets."""
@@ -76,22 +76,14 @@ class Outcome:
         keys = ((job.problem, job.algorithm, budget, job.seed) for budget in job.budgets)
         return all(key in self.suites for key in keys)
 
-    def numbers(self, job: SuiteRun | BbobRun) -> NDArray[np.float64]:
-        """Return all numbers of a job's run, which is there."""
+    def take(self, job: SuiteRun | BbobRun, other: Outcome) -> None:
+        """Take over what another outcome has of a job."""
         if isinstance(job, BbobRun):
-            return np.array([*self.bbob[job].items()], dtype=float)
-        keys = ((job.problem, job.algorithm, budget, job.seed) for budget in job.budgets)
-        return np.array([self.suites[key] for key in keys], dtype=float)
-
-    def take(self, job: SuiteRun | BbobRun, other: Outcome, algorithm: str | None = None) -> None:
-        """Take over what another outcome has of a job, or of an algorithm that gives the same."""
-        like = algorithm or job.algorithm
-        if isinstance(job, BbobRun):
-            self.bbob[job] = other.bbob[replace(job, algorithm=like)]
+            self.bbob[job] = other.bbob[job]
             return
         for budget in job.budgets:
-            row = other.suites[job.problem, like, budget, job.seed]
-            self.suites[job.problem, job.algorithm, budget, job.seed] = row
+            key = job.problem, job.algorithm, budget, job.seed
+            self.suites[key] = other.suites[key]
 
     def without(self, algorithms: Collection[str]) -> Outcome:
         """Return the outcome without the runs of some algorithms."""
@@ -123,18 +115,26 @@ class Outcome:
         One that could take a problem, but was not run on it, is left out: it would rank last there.
         """
         problems = self.problems(suite, budget)
-        ran = {(one, name) for one in problems for name in PEERS if self.runs(one, name, budget, 0)}
+        ran = {
+            (problem, name)
+            for problem in problems
+            for name in PEERS
+            if self.runs(problem, name, budget, 0)
+        }
         return [
             name
             for name in PEERS
-            if any((one, name) in ran for one in problems)
-            and all((one, name) in ran or not takes(name, problem_of(one)) for one in problems)
+            if any((problem, name) in ran for problem in problems)
+            and all(
+                (problem, name) in ran or not takes(name, problem_of(problem))
+                for problem in problems
+            )
         ]
 
     def problems(self, suite: str, budget: int, control: str = OURS) -> list[str]:
         """Return the problems of a suite on which ours, or another, was judged at a budget."""
         ran = {key[0] for key in self.suites if key[1:3] == (control, budget)}
-        return [one.name for one in SUITES[suite] if one.name in ran]
+        return [problem.name for problem in SUITES[suite] if problem.name in ran]
 
     def medians(
         self,

@@ -7,11 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from experiments.comparing.rates import mean, rate, state_of
 from experiments.comparing.rivals import RivalTest, better_than_each
+from experiments.comparing.statistics import mean, rate, state_of
 from experiments.runner.result import SCORE_STATES, Cell, Column, Table, scored, significant
-from experiments.studies.suites.bbob.published import BEST, CITED
-from experiments.studies.suites.bbob_tables import reached, reached_shares
+from experiments.studies.suites.bbob_tables import BEST, CITED, reached, reached_shares
 from experiments.studies.suites.data import Outcome
 from experiments.studies.suites.peers import OURS
 from experiments.studies.suites.protocol import (
@@ -29,9 +28,10 @@ from experiments.studies.suites.suite_tables import (
     indicators,
     named,
     ranks,
+    ranks_together,
+    signs_together,
     tests,
 )
-from experiments.studies.suites.together import ranks_together, signs_together
 
 
 class Demand(NamedTuple):
@@ -59,8 +59,10 @@ def demands(outcome: Outcome) -> list[Demand]:
 
 def demands_table(outcome: Outcome) -> Table:
     """Show the demands."""
-    found = demands(outcome)
-    rows: list[tuple[Cell, ...]] = [(*one[:-1], (one.state or "not run").lower()) for one in found]
+    judged = demands(outcome)
+    rows: list[tuple[Cell, ...]] = [
+        (*finding[:-1], (finding.state or "not run").lower()) for finding in judged
+    ]
     return Table(
         "must_reach",
         "What was demanded, and what came out",
@@ -74,9 +76,12 @@ def demands_table(outcome: Outcome) -> Table:
         "what was asked, each with one run. Own time per generation of at most half of NSGA-II's "
         "was demanded too and is missed: see the table of own time.",
         findings=tuple(
-            scored(one.state, f"{one.asked}, after {one.evaluations:,} evaluations: {_out(one)}.")
-            for one in found
-            if one.state is not None
+            scored(
+                finding.state,
+                f"{finding.asked}, after {finding.evaluations:,} evaluations: {_out(finding)}.",
+            )
+            for finding in judged
+            if finding.state is not None
         ),
     )
 
@@ -87,96 +92,98 @@ def _out(demand: Demand) -> str:
 
 def counted(outcome: Outcome) -> str:
     """Count the demands by what came out."""
-    states = [one.state for one in demands(outcome)]
-    counts = ", ".join(f"{states.count(one)} {one.lower()}" for one in SCORE_STATES)
-    return f"Of {sum(one is not None for one in states)} demands that were run: {counts}."
+    states = [demand.state for demand in demands(outcome)]
+    counts = ", ".join(f"{states.count(state)} {state.lower()}" for state in SCORE_STATES)
+    return f"Of {sum(state is not None for state in states)} demands that were run: {counts}."
 
 
 def _shares(outcome: Outcome) -> Iterable[Demand]:
-    for (dimension, evaluations), asked in SHARES.items():
+    for (dimension, evaluations), required in SHARES.items():
         share = mean(reached_shares(outcome, dimension, evaluations))
         yield Demand(
-            f"bbob-biobj, {dimension} dimensions: share of targets {asked:.2f}",
+            f"bbob-biobj, {dimension} dimensions: share of targets {required:.2f}",
             evaluations,
             f"{share.value:.4f} ({share.low:.3f} to {share.high:.3f})" if share.n else "not run",
             f"{BEST} {CITED[dimension, evaluations]:.3f}",
-            share.state(asked) if share.n else None,
+            share.state(required) if share.n else None,
         )
 
 
 def _first_of_all(outcome: Outcome) -> Iterable[Demand]:
     for evaluations in BUDGETS:
-        found = ranks_together(outcome, evaluations)
+        by_rank = ranks_together(outcome, evaluations)
         beaten = signs_together(outcome, evaluations)
         where = "all held-out suites together"
-        yield _first(found, beaten, evaluations, f"{where}: lowest average rank, hypervolume")
+        yield _first(by_rank, beaten, evaluations, f"{where}: lowest average rank, hypervolume")
         yield _better_than_each(beaten, evaluations, where, "hypervolume")
     for suite in HELD_OUT:
         where = named(outcome, suite)
         for evaluations in BUDGETS:
             ran = evaluations in outcome.budgets(suite)
             for measure, name in NAMES.items():
-                found = ranks(outcome, suite, evaluations, measure) if ran else {}
+                by_rank = ranks(outcome, suite, evaluations, measure) if ran else {}
                 beaten = tests(outcome, suite, evaluations, measure) if ran else []
-                yield _first(found, beaten, evaluations, f"{where}: lowest average rank, {name}")
+                yield _first(by_rank, beaten, evaluations, f"{where}: lowest average rank, {name}")
                 problems = len(outcome.problems(suite, evaluations))
                 too_few = "" if can_show(problems, len(beaten)) else "; too few problems to show it"
                 yield _better_than_each(beaten, evaluations, where, name, too_few)
 
 
-def _first(found: dict[str, float], tests: list[RivalTest], evaluations: int, asked: str) -> Demand:
+def _first(
+    by_rank: dict[str, float], tests: list[RivalTest], evaluations: int, demand: str
+) -> Demand:
     """Ask for the lowest of average ranks by algorithm, which are empty if it was not run."""
-    if not found:
-        return Demand(asked, evaluations, "not run", "", None)
-    ours = found[OURS]
-    others = {name: rank for name, rank in found.items() if name != OURS}
+    if not by_rank:
+        return Demand(demand, evaluations, "not run", "", None)
+    ours = by_rank[OURS]
+    others = {name: rank for name, rank in by_rank.items() if name != OURS}
     best = min(others, key=lambda name: others[name])
     place = 1 + sum(rank < ours for rank in others.values())
     shared = ", shared" if ours in others.values() else ""
-    measured = f"place {place} of {len(found)}{shared}, rank {ours:.2f}"
+    measured = f"place {place} of {len(by_rank)}{shared}, rank {ours:.2f}"
     state = state_of(place == 1 and not shared, shown=all(test.beaten for test in tests))
-    return Demand(asked, evaluations, measured, f"{best} {others[best]:.2f}", state)
+    return Demand(demand, evaluations, measured, f"{best} {others[best]:.2f}", state)
 
 
 def _better_than_each(
     tests: list[RivalTest], evaluations: int, where: str, name: str, further: str = ""
 ) -> Demand:
-    asked = f"{where}: better than each beyond chance (Holm), {name}"
+    demand = f"{where}: better than each beyond chance (Holm), {name}"
     if not tests:
-        return Demand(asked, evaluations, "not run", "", None)
+        return Demand(demand, evaluations, "not run", "", None)
     measured = f"{sum(test.beaten for test in tests)} of {len(tests)}{further}"
-    return Demand(asked, evaluations, measured, "", better_than_each(tests))
+    return Demand(demand, evaluations, measured, "", better_than_each(tests))
 
 
 def _on_engineering(outcome: Outcome) -> Iterable[Demand]:
-    asked = f"RE: no worse than {RIVAL_ON_RE}, hypervolume"
+    demand = f"RE: no worse than {RIVAL_ON_RE}, hypervolume"
     for budget in outcome.budgets("RE") or BUDGETS[2:3]:
         if RIVAL_ON_RE not in outcome.algorithms("RE", budget):
-            yield Demand(asked, budget, "not run", "", None)
+            yield Demand(demand, budget, "not run", "", None)
             continue
-        found = tests(outcome, "RE", budget, "hypervolume")
-        test = next(one for one in found if one.rival == RIVAL_ON_RE)
+        results = tests(outcome, "RE", budget, "hypervolume")
+        test = next(finding for finding in results if finding.rival == RIVAL_ON_RE)
         measured = f"{test.better} better, {test.worse} worse, p = {significant(test.p, 2)}"
         state = rate(test.better, test.better + test.worse).state(0.5)
-        yield Demand(asked, budget, measured, "", state)
+        yield Demand(demand, budget, measured, "", state)
 
 
 def _constrained(outcome: Outcome) -> Iterable[Demand]:
     for suite in CONSTRAINED:
         for budget in outcome.budgets(suite) or BUDGETS[2:3]:
             for rival in FEASIBLE_RIVALS:
-                asked = f"{suite}: feasible in as many runs as {rival}"
+                demand = f"{suite}: feasible in as many runs as {rival}"
                 if rival not in outcome.algorithms(suite, budget):
-                    yield Demand(asked, budget, "not run", "", None)
+                    yield Demand(demand, budget, "not run", "", None)
                     continue
                 runs = feasible_beside(outcome, suite, budget, rival)
                 measured = f"{runs.ours} of {runs.runs}"
-                yield Demand(asked, budget, measured, f"{rival} {runs.theirs}", runs.state)
+                yield Demand(demand, budget, measured, f"{rival} {runs.theirs}", runs.state)
             measure = indicators(suite)[0]
             ran = budget in outcome.budgets(suite)
-            found = ranks(outcome, suite, budget, measure) if ran else {}
+            by_rank = ranks(outcome, suite, budget, measure) if ran else {}
             against = tests(outcome, suite, budget, measure) if ran else []
-            yield _first(found, against, budget, f"{suite}: first by hypervolume")
+            yield _first(by_rank, against, budget, f"{suite}: first by hypervolume")
 
 
 def in_one_sentence(outcome: Outcome) -> str:
@@ -200,10 +207,10 @@ def in_one_sentence(outcome: Outcome) -> str:
         for budget in budgets:
             by_measure = []
             for measure, name in NAMES.items():
-                found = ranks(outcome, suite, budget, measure)
-                place = 1 + int(np.sum([rank < found[OURS] for rank in found.values()]))
-                others = [rank for rival, rank in found.items() if rival != OURS]
-                shared = " (shared)" if found[OURS] in others else ""
+                by_rank = ranks(outcome, suite, budget, measure)
+                place = 1 + int(np.sum([rank < by_rank[OURS] for rank in by_rank.values()]))
+                others = [rank for rival, rank in by_rank.items() if rival != OURS]
+                shared = " (shared)" if by_rank[OURS] in others else ""
                 by_measure.append(f"{place}{shared} by {name}")
             places.append(f"{' and '.join(by_measure)} after {budget:,}")
         if places:

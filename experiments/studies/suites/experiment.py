@@ -7,32 +7,37 @@ was asked for (days). Both need the extra ``suites``, and go on where they were 
 
 from __future__ import annotations
 
+from importlib.util import find_spec
+
+import numpy as np
+
+from experiments.runner.campaign import Campaign
 from experiments.runner.committed import stored_outcome
 from experiments.runner.registry import Context
-from experiments.runner.result import NEW, Picture, Result
+from experiments.runner.result import NEW, Cell, Column, Finding, Picture, Result, Table
 from experiments.runner.texts import paragraphs
 from experiments.studies.suites import protocol
-from experiments.studies.suites.anew import anew_table
-from experiments.studies.suites.bbob.published import BEST, CITED
-from experiments.studies.suites.bbob_tables import duels_table, reached, shares_table
+from experiments.studies.suites.bbob_tables import BEST, CITED, duels_table, reached, shares_table
 from experiments.studies.suites.data import NAME, Outcome, outcome_for
 from experiments.studies.suites.demands import counted, demands_table, in_one_sentence
 from experiments.studies.suites.figures import how_to_choose, runtime_profiles
 from experiments.studies.suites.formulas import engineering, imop, lz09, zcat
-from experiments.studies.suites.gather import kept_table
+from experiments.studies.suites.jobs import MEASURES, BbobRun, SuiteRun
 from experiments.studies.suites.own_time import own_time_table
 from experiments.studies.suites.parts import parts_table
 from experiments.studies.suites.peers import OURS
 from experiments.studies.suites.problems import DIFFICULTY, SUITES
 from experiments.studies.suites.protocol import DIMENSIONS, HELD_OUT
-from experiments.studies.suites.rule import steps_table
+from experiments.studies.suites.reduced import WHOLE
+from experiments.studies.suites.renew import kept_table
 from experiments.studies.suites.suite_tables import (
+    NAMES,
     in_short,
     medians_tables,
     ranks_tables,
     rivals_table,
+    together_table,
 )
-from experiments.studies.suites.together import together_table
 
 SETTING, SETS, PEERS_NOTE = paragraphs("suites", ours=OURS, difficulty=DIFFICULTY)
 
@@ -51,9 +56,8 @@ def run(context: Context) -> Result:
             demands_table(outcome),
             together_table(outcome),
             shares_table(outcome),
-            *(one for one in (duels_table(outcome),) if one.rows),
+            *(table for table in (duels_table(outcome),) if table.rows),
             parts_table(outcome),
-            steps_table(outcome),
             own_time_table(),
             *ranks_tables(outcome),
             rivals_table(outcome),
@@ -82,7 +86,9 @@ def run(context: Context) -> Result:
 
 def _source(text: str | None) -> str:
     """Return the paragraph of a module that names its source."""
-    (paragraph,) = (one for one in (text or "").split("\n\n") if one.startswith("Source:"))
+    (paragraph,) = (
+        paragraph for paragraph in (text or "").split("\n\n") if paragraph.startswith("Source:")
+    )
     return " ".join(paragraph.split())
 
 
@@ -112,4 +118,58 @@ def _extent(outcome: Outcome) -> tuple[str, ...]:
         f"Of 15 seeds and four budgets asked for, this holds: {runs}; bbob-biobj one run an "
         "instance. The table of the parts says what is there and what was not run.",
         *((f"Not run: {', '.join(missing)}.",) if missing else ()),
+    )
+
+
+SUITE_RUNS = (
+    SuiteRun("IMOP1", OURS, 1, (500,)),
+    SuiteRun("ZCAT1_3", OURS, 1, (500,)),
+    SuiteRun("IMOP4", OURS, 1, (500,)),
+    SuiteRun("IMOP3", "ElitistSwarm", 1, (500,)),
+    SuiteRun("IMOP2", "NSGA-II", 1, (500,)),
+)
+BBOB_RUNS = (BbobRun(1, 10, 10, WHOLE, 10_000), BbobRun(28, 10, 9, OURS, 25_000))
+_PLACES = {words: 1 + MEASURES.index(name) for name, words in NAMES.items()}
+"""Where the measures of a run stand in the outcome."""
+SAME = 2e-5
+"""Relative difference that digits of the table leave open."""
+
+
+def anew_table(campaign: Campaign, outcome: Outcome) -> Table:
+    """Run them, and set their measures beside the stored ones."""
+    jobs: list[SuiteRun | BbobRun] = [*SUITE_RUNS]
+    if find_spec("cocoex") is not None:
+        jobs += BBOB_RUNS
+    made = Outcome()
+    made.add(jobs, campaign.run(jobs, "anew"))
+    rows: list[tuple[Cell, ...]] = []
+    for key, numbers in made.suites.items():
+        for measure, place in _PLACES.items() if key in outcome.suites else ():
+            rows.append((key[0], *key[1:], measure, outcome.suites[key][place], numbers[place]))
+    for run, shares in made.bbob.items():
+        if run in outcome.bbob:
+            name = f"bbob-biobj f{run.function}, instance {run.instance}, {run.dimension}-D"
+            pair = outcome.bbob[run][run.told], shares[run.told]
+            rows.append((name, run.algorithm, run.told, run.seed, "share of targets", *pair))
+    # Two zeros, as of runs that reach no hypervolume, could not differ.
+    rows = [row for row in rows if row[-2] or row[-1]]
+    stored, now = np.array([row[-2:] for row in rows], dtype=float).reshape(-1, 2).T
+    same = int(np.sum(np.isclose(stored, now, rtol=SAME, atol=1e-12)))
+    sentence = (
+        f"{same} of {len(rows)} numbers of runs made anew here are the stored ones; a relative "
+        f"difference of {SAME:g} is allowed."
+    )
+    if same < len(rows):
+        sentence += " Another processor or version may round otherwise, which a search amplifies."
+    return Table(
+        "anew",
+        "Runs of the stored outcome made anew",
+        (
+            *(Column("problem"), Column("algorithm"), Column("evaluations"), Column("seed")),
+            *(Column("measure"), Column("stored", digits=6), Column("now", digits=6)),
+        ),
+        tuple(rows),
+        note="What is 0 in both is left out: it could not differ.",
+        findings=(Finding(same == len(rows), sentence, check=True),) if rows else (),
+        folded=True,
     )

@@ -6,8 +6,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from experiments.comparing.figures import BLUE, GREEN, GREY, ORANGE, PINK, SKY, YELLOW, grid
-from experiments.studies.suites.bbob.published import BEST, CITED, curves
-from experiments.studies.suites.bbob_tables import told_most
+from experiments.studies.suites.bbob_tables import BEST, CITED, curves, told_most
 from experiments.studies.suites.data import Outcome
 from experiments.studies.suites.peers import OURS
 from experiments.studies.suites.protocol import BUDGETS, DIMENSIONS, HELD_OUT
@@ -37,10 +36,10 @@ def runtime_profiles(outcome: Outcome) -> Figure:
 
 def _run_here(axis: Axes, outcome: Outcome, dimension: int) -> None:
     """Draw what ran here, each algorithm's run of the largest budget."""
-    told = dict(told_most(outcome, dimension))
+    budgets = dict(told_most(outcome, dimension))
     for name, colour in LINES.items():
-        if name in told:
-            shares = outcome.shares(dimension, name, told[name])
+        if name in budgets:
+            shares = outcome.shares(dimension, name, budgets[name])
             width = 2.2 if name == OURS else 1.3
             axis.plot(*_line(shares), color=colour, lw=width, label=f"{name}, here")
 
@@ -58,9 +57,9 @@ def how_to_choose(outcome: Outcome) -> Figure:
     for axis, (measure, words) in zip(
         axes[0], (("hypervolume", "hypervolume"), ("igd_plus", "IGD+")), strict=False
     ):
-        found = {budget: ranks(outcome, suite, budget, measure) for budget in budgets}
+        by_budget = {budget: ranks(outcome, suite, budget, measure) for budget in budgets}
         for name, colour in colours.items():
-            line = {b: by_name[name] for b, by_name in found.items() if name in by_name}
+            line = {b: by_name[name] for b, by_name in by_budget.items() if name in by_name}
             if not line:
                 continue
             bold = name in (OURS, "ElitistSwarm")

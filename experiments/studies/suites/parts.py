@@ -45,11 +45,13 @@ class PartTest(NamedTuple):
 
 def part_tests(outcome: Outcome) -> list[PartTest]:
     """Return the tests of all parts left out alone; p after Holm over all of them."""
-    found = [one for part in ALONE for one in (*on_bbob(outcome, part), *_on_suites(outcome, part))]
-    corrected = holm([one.test.p for one in found])
+    tests = [
+        test for part in ALONE for test in (*on_bbob(outcome, part), *_on_suites(outcome, part))
+    ]
+    corrected = holm([finding.test.p for finding in tests])
     return [
-        one._replace(test=one.test._replace(p=float(p)))
-        for one, p in zip(found, corrected, strict=True)
+        test._replace(test=test.test._replace(p=float(p)))
+        for test, p in zip(tests, corrected, strict=True)
     ]
 
 
@@ -72,7 +74,7 @@ def on_suites(
 ) -> Iterable[PartTest]:
     """Yield the test by the median hypervolume on some suites together, if both ran there."""
     names = [WHOLE, less]
-    medians = [outcome.medians(one, budget, "hypervolume", names, WHOLE) for one in suites]
+    medians = [outcome.medians(suite, budget, "hypervolume", names, WHOLE) for suite in suites]
     values = np.concatenate(medians)
     values = values[~np.isnan(values).any(axis=1)]
     if len(values):
@@ -85,10 +87,10 @@ def parts_table(outcome: Outcome) -> Table:
     """Show what a part brings."""
     rows = [
         (
-            *(one.part, one.where, one.evaluations, one.problems, one.whole, one.less),
-            *(one.test.better, one.test.worse, one.test.p, "yes" if one.helps else "no"),
+            *(test.part, test.where, test.evaluations, test.problems, test.whole, test.less),
+            *(test.test.better, test.test.worse, test.test.p, "yes" if test.helps else "no"),
         )
-        for one in part_tests(outcome)
+        for test in part_tests(outcome)
     ]
     return Table(
         "parts",

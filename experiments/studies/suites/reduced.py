@@ -1,16 +1,15 @@
 """The compact swarm with all parts that it once had, and with some of them left out, by name.
 
-By the rule of `protocol` left it: `Attraction` among its moves; a level of violation that counts as
+These left it: `Attraction` among its moves; a level of violation that counts as
 none (T. Takahama, S. Sakai 2006), nine tenths of the swarm's median, which shrinks as the swarm
 follows; a fifth of the places for infeasible particles, the guests; `Difference`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection
 from dataclasses import replace
 from functools import partial
-from itertools import combinations
 from typing import Any
 
 import numpy as np
@@ -78,8 +77,8 @@ class _Whole(CompactSwarm):
         # A callback may have left few particles: not all of them are guests.
         invited = guests(points, min(int(self.INVITED * self.pop_size), len(points) - 1))
         others = np.delete(np.arange(len(points)), invited)
-        kept = survivors(points[others], self.pop_size - len(invited), self._truncation)
-        return np.sort(np.concatenate([invited, others[kept]]))
+        rows = survivors(points[others], self.pop_size - len(invited), self._truncation)
+        return np.sort(np.concatenate([invited, others[rows]]))
 
     def _level(self, swarm: Points) -> float:
         """Return the violation that is tolerated: none once more than half is feasible."""
@@ -140,39 +139,8 @@ ON_PLAIN, ON_CONSTRAINED = (
 WHOLE = "with all parts"
 SPREAD = "with quality=spread"
 
-LEFT = (Attraction.__name__, TOLERANCE)
-"""Parts that left first."""
-CANDIDATES = (GUESTS, SHARES, Exchange.__name__, Difference.__name__, LEADERS)
-"""Parts that were tried after these, in this order."""
-
-
-def without_all(parts: Sequence[str]) -> str:
-    """Return the name of the swarm that lacks these parts, in this order."""
-    return f"without {' and '.join(parts)}"
-
-
-_TOGETHER = [LEFT[: 1 + n] for n in range(len(LEFT))] + [
-    (*LEFT, *chosen)
-    for count in range(1, 1 + len(CANDIDATES))
-    for chosen in combinations(CANDIDATES, count)
-]
-
-_LACKS = {without_all(parts): parts for parts in _TOGETHER}
-
-
-def twins_without_constraints(name: str) -> list[str]:
-    """Return the names of the swarms that move as this one where there are no constraints."""
-
-    def counting(parts: tuple[str, ...]) -> list[str]:
-        return [part for part in parts if part not in _OF_CONSTRAINED.values()]
-
-    own = counting(_LACKS.get(name, (name,)))
-    return [other for other, parts in _LACKS.items() if counting(parts) == own and other != name]
-
-
 LESS: dict[str, Callable[[Problem], Algorithm]] = {
     **{name: _without(part) for name, part in LACKED.items()},
-    **{name: _without(*parts) for name, parts in _LACKS.items()},
     GROWTH: lambda _: _Whole(50),
     WHOLE: lambda _: _Whole(),
     SPREAD: lambda _: CompactSwarm(quality="spread"),

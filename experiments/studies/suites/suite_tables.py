@@ -11,16 +11,17 @@ from numpy.typing import NDArray
 from experiments.comparing import indicators as measures
 from experiments.comparing.paired import SIGNIFICANT
 from experiments.comparing.ranks import average_ranks
-from experiments.comparing.rates import rate
-from experiments.comparing.rivals import RivalTest, tests_of_medians
+from experiments.comparing.rivals import RivalTest, signs_against, tests_of_medians
+from experiments.comparing.statistics import rate
 from experiments.runner.result import Cell, Column, Table
-from experiments.studies.suites.bbob.published import BEST, CITED
-from experiments.studies.suites.bbob_tables import reached
+from experiments.studies.suites.bbob_tables import BEST, CITED, reached
+from experiments.studies.suites.coco import FUNCTIONS
 from experiments.studies.suites.data import Outcome
-from experiments.studies.suites.jobs import MEASURES
-from experiments.studies.suites.peers import OURS
+from experiments.studies.suites.jobs import MEASURES, BbobRun
+from experiments.studies.suites.peers import BBOB_PEERS, OURS
 from experiments.studies.suites.problems import PROBLEMS, SUITES
 from experiments.studies.suites.protocol import (
+    BESIDE_PEERS,
     BUDGETS,
     CONSTRAINED,
     DIMENSIONS,
@@ -34,7 +35,7 @@ SWARMS = (OURS, "ElitistSwarm")
 
 def indicators(suite: str) -> list[str]:
     """Return the indicators of a suite: IGD+ only where all fronts are known in closed form."""
-    known = all(one.front is not None for one in SUITES[suite])
+    known = all(problem.front is not None for problem in SUITES[suite])
     return list(NAMES) if known else ["hypervolume"]
 
 
@@ -135,7 +136,7 @@ def _ranks_table(outcome: Outcome, suite: str) -> Table:
     constrained = suite in CONSTRAINED
     rows: list[tuple[Cell, ...]] = []
     for name in order:
-        row: list[Cell] = [name, *(found.get(name) for found in by_place.values())]
+        row: list[Cell] = [name, *(entry.get(name) for entry in by_place.values())]
         if constrained:
             row.append("{} of {}".format(*feasible_runs(outcome, suite, budgets[-1], name)))
         rows.append(tuple(row))
@@ -195,8 +196,10 @@ def medians_tables(outcome: Outcome) -> list[Table]:
                     f"{suite}: median hypervolume after {budget:,} evaluations",
                     (Column("problem"), *map(Column, algorithms)),
                     tuple(
-                        (one, *(None if np.isnan(value) else float(value) for value in row))
-                        for one, row in zip(outcome.problems(suite, budget), values, strict=True)
+                        (problem, *(None if np.isnan(value) else float(value) for value in row))
+                        for problem, row in zip(
+                            outcome.problems(suite, budget), values, strict=True
+                        )
                     ),
                     folded=True,
                 )
@@ -237,8 +240,91 @@ def _ranks_in_short(outcome: Outcome, suite: str, measure: str) -> tuple[str | N
         if budget not in budgets:
             cells.append(None)
             continue
-        found = ranks(outcome, suite, budget, measure)
-        ours = " / ".join(f"{found.pop(name):.2f}" for name in SWARMS if name in found)
-        best = min(found, key=lambda name: found[name])
-        cells.append(f"{ours} ({best} {found[best]:.2f})")
+        by_rank = ranks(outcome, suite, budget, measure)
+        ours = " / ".join(f"{by_rank.pop(name):.2f}" for name in SWARMS if name in by_rank)
+        best = min(by_rank, key=lambda name: by_rank[name])
+        cells.append(f"{ours} ({best} {by_rank[best]:.2f})")
     return tuple(cells)
+
+
+MEASURE = "hypervolume"
+
+
+def entrants(outcome: Outcome, budget: int) -> list[str]:
+    """Return who ran on all problems of all held-out suites, none if ours did not."""
+    names = [
+        name
+        for name in BBOB_PEERS
+        if all(name in outcome.algorithms(suite, budget) for suite in HELD_OUT)
+        and _shares(outcome, name, budget) is not None
+    ]
+    return names if OURS in names and len(names) > 1 else []
+
+
+def values(outcome: Outcome, budget: int, names: Sequence[str]) -> NDArray[np.float64]:
+    """Return the hypervolumes and shares of those who ran on all, shape (problems, algorithms)."""
+    medians = [outcome.medians(suite, budget, MEASURE, names) for suite in HELD_OUT]
+    shares = [_shares(outcome, name, budget) for name in names]
+    return np.vstack([*medians, np.array(shares, dtype=float).T])
+
+
+def ranks_together(outcome: Outcome, budget: int) -> dict[str, float]:
+    """Return average ranks over all problems by algorithm; empty if it was not run."""
+    names = entrants(outcome, budget)
+    if not names:
+        return {}
+    means = average_ranks(values(outcome, budget, names), smaller_is_better=False)
+    return dict(zip(names, means.tolist(), strict=True))
+
+
+def signs_together(outcome: Outcome, budget: int) -> list[RivalTest]:
+    """Test ours against each other by the signs over all problems, corrected after Holm."""
+    names = entrants(outcome, budget)
+    if not names:
+        return []
+    medians = missing_as_ours(values(outcome, budget, names), names)
+    return signs_against(OURS, names, medians, smaller_is_better=False)
+
+
+def _shares(outcome: Outcome, name: str, budget: int) -> list[float] | None:
+    """Return the share on each problem after a budget, None if one was not run."""
+    anew = BBOB_PEERS[name].starts_anew
+    shares = []
+    for dimension in DIMENSIONS:
+        for function in FUNCTIONS:
+            for told in (budget,) if anew else (budget, *BUDGETS[::-1]):
+                run = BbobRun(function, dimension, BESIDE_PEERS, name, told)
+                if budget in outcome.bbob.get(run, ()):
+                    shares.append(outcome.bbob[run][budget])
+                    break
+            else:
+                return None
+    return shares
+
+
+def together_table(outcome: Outcome) -> Table:
+    """Show average ranks over all problems, and ours against each."""
+    rows: list[tuple[Cell, ...]] = []
+    for budget in BUDGETS:
+        tests = {test.rival: test for test in signs_together(outcome, budget)}
+        by_rank = ranks_together(outcome, budget)
+        for name in sorted(by_rank, key=lambda name: by_rank[name]):
+            cells: tuple[Cell, ...] = (None, None, None)
+            if name in tests:
+                cells = tests[name].better, tests[name].worse, tests[name].p
+            rows.append((budget, name, by_rank[name], *cells))
+    problems = len(DIMENSIONS) * len(FUNCTIONS)
+    return Table(
+        "together",
+        "All held-out suites together, by hypervolume: average ranks over the problems",
+        (
+            *(Column("evaluations"), Column("algorithm"), Column("average rank", digits=2)),
+            *(Column(f"{OURS} better"), Column("worse"), Column("p", digits=2)),
+        ),
+        tuple(rows),
+        note=f"The problems of {' and '.join(HELD_OUT)} by their median hypervolume, {problems} of "
+        f"bbob-biobj (instance {BESIDE_PEERS}, {' and '.join(map(str, DIMENSIONS))} dimensions) by "
+        "the share of targets; of those who ran on all of them. p is that of the sign test over "
+        "the problems, after Holm over the rivals of a budget; two dimensions of a function count "
+        "as two problems. IGD+ needs a front, which bbob-biobj has not.",
+    )

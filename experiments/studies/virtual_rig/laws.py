@@ -229,18 +229,18 @@ def static_error(mesh: Mesh, angle: float) -> tuple[float, float]:
         slope += amplitude * order * math.cos(argument)
     if mesh.kinematic != 0.0:
         order = mesh.kinematic_order
-        first = order * angle + mesh.kinematic_phase
+        angle_of = order * angle + mesh.kinematic_phase
         second = 2.0 * order * angle + mesh.kinematic_second
-        value += mesh.kinematic * (math.sin(first) + 0.15 * math.sin(second))
-        slope += mesh.kinematic * order * (math.cos(first) + 0.3 * math.cos(second))
+        value += mesh.kinematic * (math.sin(angle_of) + 0.15 * math.sin(second))
+        slope += mesh.kinematic * order * (math.cos(angle_of) + 0.3 * math.cos(second))
     return value, slope
 
 
 @compiled
 def angle_wave(order: float, angle: float, phase: float, second_phase: float) -> float:
     """Return a cosine of the angle plus a fifth of its second harmonic."""
-    first = math.cos(order * angle + phase)
-    return first + 0.2 * math.cos(2.0 * order * angle + second_phase)
+    cosine = math.cos(order * angle + phase)
+    return cosine + 0.2 * math.cos(2.0 * order * angle + second_phase)
 
 
 @compiled

@@ -36,9 +36,9 @@ def with_effects(campaign: Campaign, rig: TrueRig, effects: Sequence[DriveEffect
     Campaign
     """
     records = campaign.running
-    speed, load = np.array([(one.input_speed, one.load_torque) for one in records]).T
+    speed, load = np.array([(record.input_speed, record.load_torque) for record in records]).T
     base = base_parameters(rig.drive, campaign.rig, rig.error_phases, 0.0)
-    values = {one.name: np.array([one.start]) for one in base}
+    values = {pair.name: np.array([pair.start]) for pair in base}
     count = len(records)
     when = Conditions(speed, load, np.zeros(count), np.zeros((count, 3, 2), dtype=complex))
     calm, changed = (
@@ -50,7 +50,7 @@ def with_effects(campaign: Campaign, rig: TrueRig, effects: Sequence[DriveEffect
     )
     if campaign.rig.output_torque_at == "brake":
         pairs = zip(running, records, strict=True)
-        running = tuple(replace(one, output_torque=old.output_torque) for one, old in pairs)
+        running = tuple(replace(pair, output_torque=old.output_torque) for pair, old in pairs)
     return replace(campaign, running=running)
 
 

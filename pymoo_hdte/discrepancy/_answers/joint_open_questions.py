@@ -32,7 +32,7 @@ def near_by(finding: JointFinding) -> list[Hypothesis]:
     found = [
         one
         for one in sorted(every, key=lambda one: one.bic)
-        if all(candidate.frees is None for candidate in one.candidates)
+        if all(candidate.releases is None for candidate in one.candidates)
         and share_removed(torsion.sensors, torsion.data, verdict.base, one.fit) >= least
     ]
     return found[:_MOST_TOLD]
@@ -95,13 +95,13 @@ def _delay(finding: JointFinding) -> list[str]:
     whole = fitted_values(finding.torque.mechanism, finding.torque.accepted)
     damping = sum(one for name, one in whole.items() if name.startswith("damping of "))
     told = (
-        f"A torsion in proportion to the speed may be friction ahead of the gear, "
+        f"A torsion proportional to the speed may be friction ahead of the gear, "
         f"{levels[0]:.3g} N.m.s/rad, or the load's encoder is read {late:.2g} ms after the "
-        "motor's: the angles do not tell."
+        "motor's: the angles cannot separate these."
     )
     if 0.0 < damping < levels[0]:
         told += (
-            f" The viscous friction of the whole joint is {damping:.3g} only, so that it cannot "
+            f" The viscous friction of the whole joint is only {damping:.3g}, so it cannot "
             "all be friction."
         )
     return [told]
@@ -186,7 +186,7 @@ def wiring_doubts(finding: JointFinding) -> list[str]:
     (drag, spring, *_), share = _explained(torque, [speed], [twist, acceleration, ones])
     if drag < 0.0 < spring and share >= rules.explained_share:
         return [
-            "What is left is in proportion to the speed, and drives, as no friction does: the "
+            "The residual is proportional to the speed and drives, as no friction does: the "
             f"encoder of {motor} may be read {-1e3 * drag / spring:.2g} ms after that of {load}."
         ]
     return []

@@ -80,7 +80,7 @@ def next_experiment(finding: DriveFinding) -> Proposal:
     if verdict.chosen is None:
         return _most_uncertain(grid, grid.model(verdict.base))
     if verdict.status == "unlisted" and not verdict.comes_near:
-        said = "No known effect comes near, so that a test between two of them would tell nothing."
+        said = "No effect in the library comes near, so no test between two of them would help."
         return Proposal(said, "none", None, None, None, 0.0)
     chosen = verdict.chosen.fit
     model = grid.model(chosen)
@@ -124,7 +124,10 @@ def _in_words(grid: Grid, label: str) -> str:
 
 def _inseparable(grid: Grid, label: str, rivals: Sequence[Model]) -> str:
     others = " or from ".join(_in_words(grid, rival.label) for rival in rivals)
-    return f"What separates {_in_words(grid, label)} from {others}? No test within the limits does."
+    return (
+        f"No test within your speed and load range separates {_in_words(grid, label)} from "
+        f"{others}."
+    )
 
 
 def _no_test(
@@ -163,10 +166,10 @@ def nearest_rivals(verdict: Verdict) -> list[Fit]:
 def _aim(verdict: Verdict, one: str, other: str, same: bool) -> str:
     """Return what a test is for; ``same`` tells whether both models are of one class."""
     if verdict.status == "unlisted":
-        return f"Neither {one} nor {other} explains the data; they differ most in"
+        return f"Neither {one} nor {other} explains the data. They differ most in"
     if same:
-        return f"The data cannot tell {one} from {other}; what can is"
-    return f"The data separate {one} from others; the best further test against {other} is"
+        return f"These data cannot distinguish {one} from {other}. The best test is"
+    return f"These data already favour {one}. The best further test against {other} is"
 
 
 def _proposal(
@@ -181,11 +184,11 @@ def _most_uncertain(grid: Grid, model: Model) -> Proposal:
     running = slice(len(grid.speed_rpm))
     variance = np.sum(model.influence[running] ** 2, axis=(1, 2)) * model.steady[running]
     if not variance.any():
-        said = "In none of the tests within the limits does the drive have a steady state."
+        said = "The drive has no steady state in any test within your speed and load range."
         return Proposal(said, "none", None, None, None, 0.0)
     test = int(np.argmax(variance))
     what, speed, load, kind = grid.condition(test)
-    text = f"The model is least certain of {what}: make it."
+    text = f"The prediction is least certain for {what}; run this test next."
     return Proposal(text, kind, speed, load, None, float(variance[test]))
 
 
@@ -213,7 +216,7 @@ def _encoder_twin(grid: Grid, chosen: Fit, model: Model) -> Proposal | None:
         _, speed, load, _ = grid.condition(test)
         text = (
             f"{_in_words(grid, candidate.label)} and {_in_words(grid, twin)} predict nearly the "
-            "same in every record: turn the disc of the output encoder by "
+            "same in every record. Turn the disc of the output encoder by "
             f"{180.0 / turns:.3g} degrees on its shaft and repeat a "
             f"record at {speed:.4g} r/min with {load:.3g} N.m. A line of the encoder turns "
             "with it; one of the drive stays."
@@ -247,7 +250,7 @@ def _zero_twin(grid: Grid, finding: DriveFinding, chosen: Fit, model: Model) -> 
         what = "" if placed[1].breakaway == level else "The level of "
         text = (
             f"{what}{_in_words(grid, candidate.label)} and a {twin} of {level:.2g} N.m predict the "
-            "same as long as the input turns one way: repeat the record at "
+            "same as long as the input turns one way. Repeat the record at "
             f"{speed:.4g} r/min with {load:.3g} N.m in reverse, or tare the sensor with the motor "
             "uncoupled."
         )

@@ -50,7 +50,7 @@ def next_repetition(finding: MachineFinding) -> Repetition:
         left = verdict.accepted.residuals[: len(record_of)] ** 2
         most = int(np.argmax(np.bincount(record_of, left)))
         name = finding.names[most]
-        text = f"Repeat {name} over a wider range: the model leaves most there."
+        text = f"Repeat {name} over a wider range: the residual is largest there."
         return Repetition(name, (), 0.0, text)
     difference = chosen.fit.residuals - competing.fit.residuals
     base = chosen.fit.jacobian[:, : len(data.base)]
@@ -64,9 +64,9 @@ def next_repetition(finding: MachineFinding) -> Repetition:
     best = int(np.argmax(separations))
     name, separation = finding.names[best], separations[best]
     both = f"{in_words(chosen.label)} from {in_words(competing.label)}"
-    text = f"Repeat {name}: it separates {both} best (expected chi-square {separation:.3g})."
+    text = f"Repeat {name}: it best separates {both} (expected chi-square {separation:.3g})."
     if separation < verdict.rules.separated_chi_square:
-        text = f"No repetition of these records separates {both}: it takes another test."
+        text = f"No repetition of these records separates {both}; that takes another test."
     return Repetition(name, (chosen.label, competing.label), separation, text)
 
 

@@ -85,22 +85,22 @@ def next_test(finding: MechanismFinding) -> NextTest:
             tuple(effect.name for effect in law_effects() if effect.constant_one_way),
             0.0,
             f"Run the same speeds in the reverse direction: the {one_way[0]} moves one way only, "
-            "in which dry friction cannot be told from a constant force.",
+            "where dry friction looks like a constant force.",
         )
     if finding.verdict.status == "unlisted" and (reversed_inputs := _reversed(finding)):
         text = (
             f"First check the sign of the gain of {' and of '.join(reversed_inputs)}: with the "
-            "opposite sign the believed mechanism alone leaves less than anything that was found."
+            "opposite sign the nominal mechanism alone fits better than any set of effects."
         )
         return NextTest(first, 1.0, 1.0, (), 0.0, text)
     hypothesis = _nearest(finding)
     if chosen is None or hypothesis is None:
         why = {
             "adequate": "an effect too small to be seen may grow with the motion",
-            "unlisted": "how what is left grows with the motion says what it may be",
+            "unlisted": "how the residual grows with the motion shows what it may be",
         }.get(
             finding.verdict.status,
-            "no rival is left, and what was found is to be proved beyond where it was found",
+            "no competing hypothesis remains, and this validates the result under new conditions",
         )
         text = f"Repeat {first} {_how(3.0, 1.0)}: {why}."
         return NextTest(first, 3.0, 1.0, (), 0.0, text)
@@ -161,12 +161,12 @@ def _best_repetition(
     if separation < 1.0:
         description = (
             "No repetition of these records with another travel or at another rate separates "
-            f"{told}: it takes another motion."
+            f"{told}; that takes another motion."
         )
     else:
         description = (
-            f"Repeat {name} {_how(size, rate)}: this separates {told}, whose forces differ there "
-            f"by {separation:.2g} times what the model leaves now."
+            f"Repeat {name} {_how(size, rate)}. This separates {told}, whose forces then differ "
+            f"by {separation:.2g} times the present residual."
         )
     return NextTest(name, size, rate, (chosen.label, hypothesis.label), separation, description)
 

@@ -51,14 +51,14 @@ def revised_model(finding: DriveFinding) -> DriveModel:
     fitted = verdict.accepted
     if fitted.candidates:
         labels = ", ".join(candidate.label for candidate in fitted.candidates)
-        what = f"the believed drive with {labels}, all values fitted"
+        what = f"the nominal drive with {labels}, all values fitted"
     elif verdict.status == "adequate":
-        what = "the believed drive with fitted values; nothing was found to be missing"
+        what = "the nominal drive with fitted values; nothing is missing"
     else:
-        what = "the believed drive with fitted values; what is missing is in no list, so none added"
+        what = "the nominal drive with fitted values; the missing effect is outside the library"
     if finding.campaign.believed.effects:
         names = ", ".join(effect.name for effect in finding.campaign.believed.effects)
-        what = f"{what}; {names} as believed"
+        what = f"{what}; {names} as stated"
     return drive_model(finding.campaign, fitted, "revised", what)
 
 

@@ -67,5 +67,5 @@ def revised_values(finding: MachineFinding) -> RevisedValues:
     accepted = finding.verdict.accepted
     names = [parameter.name for parameter in accepted.parameters[: accepted.n_base]]
     values = dict(zip(names, accepted.values[: accepted.n_base].tolist(), strict=True))
-    effects = (*finding.data.known, *accepted.effects)
+    effects = (*finding.data.model.known, *accepted.effects)
     return RevisedValues(f"{finding.title}, revised", values, effects)

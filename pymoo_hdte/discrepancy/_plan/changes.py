@@ -35,32 +35,36 @@ def signatures_of(data: Data, limits: PlanLimits, rated_torque: float) -> Signat
     Parameters
     ----------
     data : Data
-        Of imagined records: running ones, then sweeps.
+        Data of imagined records: running ones, then sweeps.
     limits : PlanLimits
     rated_torque : float
-        Scale of torques where all loads are zero, N.m.
+        Scale of torques if all loads are zero, N.m.
     """
     objective = Objective(data, ())
     residuals, jacobian = objective.residuals(objective.start), objective.jacobian(objective.start)
     fitted = Fit((), data.base, objective.start, residuals, jacobian)
     change = data.response(fitted)
     by_port: dict[str, list[Candidate]] = {}
-    for one in _candidates(data, limits, rated_torque):
-        if one.listed:
-            by_port.setdefault(_label(one.name, one.port), []).append(one)
+    for candidate in _candidates(data, limits, rated_torque):
+        if candidate.listed:
+            by_port.setdefault(_label(candidate.name, candidate.port), []).append(candidate)
     wanted = _wanted(limits, by_port)
     rivals = [
         (
             label,
-            [(_by_test(data, form), sided) for one in ones for form, sided in _forms(one, change)],
+            [
+                (_by_test(data, form), sided)
+                for candidate in candidates
+                for form, sided in _forms(candidate, change)
+            ],
         )
-        for label, ones in by_port.items()
+        for label, candidates in by_port.items()
     ]
     layout = Layout(data.base)
     widths = (layout.array("upper") - layout.array("lower")) / layout.array("scale")
-    # What bounds tell counts as a uniform distribution between them, as in `Fit.covariance`.
+    # Bounds count as a uniform distribution between them, as in `Fit.covariance`.
     known = 12.0 / widths**2 + (layout.array("scale") / layout.array("prior")) ** 2
-    found = Signatures.of(
+    signatures = Signatures.of(
         list(wanted),
         _by_test(data, [change(parts) for parts in wanted.values()]),
         rivals,
@@ -70,9 +74,9 @@ def signatures_of(data: Data, limits: PlanLimits, rated_torque: float) -> Signat
     held = flanks_held(data.features, data.campaign.torque_scale, data.rules)
     labels = {*wanted, *by_port}
     return replace(
-        found,
+        signatures,
         held=np.append(held, np.ones(len(data.torsion), dtype=bool)),
-        rattling=frozenset(one for one in labels if effect_named(one.split(":")[0]).rattles),
+        rattling=frozenset(label for label in labels if effect_named(label.split(":")[0]).rattles),
     )
 
 
@@ -81,9 +85,9 @@ def _label(name: str, port: str) -> str:
 
 
 def _candidates(data: Data, limits: PlanLimits, rated_torque: float) -> list[Candidate]:
-    """Return candidates at the sizes that matter, lines at the orders of the stated effects."""
+    """Return candidates of the sizes that matter, with lines at the orders of stated effects."""
     believed, features = data.campaign.believed, data.features
-    paths = [float(np.abs(one.path).max()) for one in data.torsion]
+    paths = [float(np.abs(sweep.path).max()) for sweep in data.torsion]
     torque = max([float(np.abs(features.conditions.output_torque).max()), *paths])
     torque = torque if limits.sweeps or any(limits.loads) else rated_torque
     motor = float(np.abs(features.values[:, MEANS.index(1)]).max())
@@ -107,63 +111,63 @@ def _candidates(data: Data, limits: PlanLimits, rated_torque: float) -> list[Can
 
 def stated_orders(effects: Sequence[DriveEffect], ratio: float) -> list[float]:
     """Return the orders of effects in cycles per input turn."""
-    found = set()
+    orders = set()
     for effect in effects:
         _, port, order = place_of(effect)
         if order is not None:
-            found.add(order / (ratio if port in ("output", "sensor") else 1.0))
-    return sorted(found)
+            orders.add(order / (ratio if port in ("output", "sensor") else 1.0))
+    return sorted(orders)
 
 
 def _wanted(
     limits: PlanLimits, by_port: dict[str, list[Candidate]]
 ) -> dict[str, tuple[DriveEffect, ...]]:
-    """Return the effects to be found by their label; stated ones of one label act together."""
+    """Return the effects to be found by label; stated effects with the same label act together."""
     if not limits.effects:
         return {
-            label: ones[0].build([one.start for one in ones[0].parameters])
-            for label, ones in by_port.items()
+            label: candidates[0].build([parameter.start for parameter in candidates[0].parameters])
+            for label, candidates in by_port.items()
         }
-    found: dict[str, tuple[DriveEffect, ...]] = {}
+    effects: dict[str, tuple[DriveEffect, ...]] = {}
     for effect in limits.effects:
         name, port, _ = place_of(effect)
         label = _label(name, port)
-        found[label] = (*found.get(label, ()), effect)
-    return found
+        effects[label] = (*effects.get(label, ()), effect)
+    return effects
 
 
-def _forms(one: Candidate, change: Change) -> list[tuple[list[Values], bool]]:
+def _forms(candidate: Candidate, change: Change) -> list[tuple[list[Values], bool]]:
     """Return the linearised forms of a candidate: changes, and whether the first is one-sided."""
-    if one.linear:
-        return [([change(one.build(start)) for start in one.starts], False)]
-    one_sided = one.parameters[0].lower >= 0.0
-    found = []
-    for start in (*one.starts, *_strongest(one)):
-        here = change(one.build(start))
+    if candidate.linear:
+        return [([change(candidate.build(start)) for start in candidate.starts], False)]
+    one_sided = candidate.parameters[0].lower >= 0.0
+    forms = []
+    for start in (*candidate.starts, *_strongest(candidate)):
+        here = change(candidate.build(start))
         changes = [here]
-        for place, parameter in enumerate(one.parameters[1:], start=1):
+        for place, parameter in enumerate(candidate.parameters[1:], start=1):
             step = _STEP * parameter.scale
             step = -step if start[place] + step > parameter.upper else step
             moved = [value + step * (k == place) for k, value in enumerate(start)]
-            changes.append((change(one.build(moved)) - here) / _STEP)
-        found.append((changes, one_sided))
-    return found
+            changes.append((change(candidate.build(moved)) - here) / _STEP)
+        forms.append((changes, one_sided))
+    return forms
 
 
-def _strongest(one: Candidate) -> list[tuple[float, ...]]:
-    """Return the starts of a candidate with a larger strength, where its form is another one.
+def _strongest(candidate: Candidate) -> list[tuple[float, ...]]:
+    """Return the starts of a candidate with a larger strength, at which its form is another one.
 
-    A wind-up that is as soft as it may be is nearly a play.
+    A wind-up as soft as its bound allows is nearly a play.
     """
-    most = one.parameters[0].upper
-    return [(min(_STRONGER * start[0], most), *start[1:]) for start in one.starts]
+    strongest = candidate.parameters[0].upper
+    return [(min(_STRONGER * start[0], strongest), *start[1:]) for start in candidate.starts]
 
 
 def _by_test(data: Data, rows: Sequence[Values]) -> list[Values]:
-    """Return whitened changes as arrays of tests, (n_tests, f), padded with zeros."""
+    """Return whitened changes by test, shape (n_tests, f) each, padded with zeros."""
     records, size = data.features.values.shape
-    widest = max([size, *(len(one.angle) - 1 for one in data.torsion)])
-    found = []
+    widest = max([size, *(len(sweep.angle) - 1 for sweep in data.torsion)])
+    changes = []
     for row in rows:
         placed = np.zeros((records + len(data.torsion), widest))
         placed[:records, :size] = np.nan_to_num(row[: records * size]).reshape(records, size)
@@ -172,5 +176,5 @@ def _by_test(data: Data, rows: Sequence[Values]) -> list[Values]:
             length = len(points.angle) - 1
             placed[records + k, :length] = np.nan_to_num(row[start : start + length])
             start += length
-        found.append(placed)
-    return found
+        changes.append(placed)
+    return changes

@@ -1,4 +1,4 @@
-"""The smallest set of tests that separates effects: one test after the other, then fewer again."""
+"""The smallest set of tests that separates effects: tests are added one by one, then removed."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from pymoo_hdte.discrepancy._selection.rules import Rules
 Values = NDArray[np.float64]
 
 _GAIN = 1e-9
-"""Least gain of a further test, as a share of one aim: rounding."""
+"""Least gain of a further test, as a share of one aim; smaller gains are rounding."""
 
 
 @dataclass(frozen=True, eq=False)
 class Aims:
-    """What a set of tests should reach: each effect detected, and told from each of its rivals.
+    """What a set of tests should reach: each effect detected, and separated from its rivals.
 
     Attributes
     ----------
@@ -27,7 +27,7 @@ class Aims:
     rules : Rules
         `Rules.single_effect_gain` detects an effect, `Rules.evidence_distance` separates two.
     power : float
-        Wanted chance of each.
+        Wanted probability of each detection and separation.
     """
 
     signatures: Signatures
@@ -36,17 +36,18 @@ class Aims:
 
     @property
     def pairs(self) -> NDArray[np.bool_]:
-        """Which rivals are to be told from which effects, (n_effects, n_rivals)."""
+        """Which rivals are to be separated from which effects, shape (n_effects, n_rivals)."""
         signatures = self.signatures
-        found = [
-            [is_rival(one, other) for other in signatures.rivals] for one in signatures.effects
+        separable = [
+            [is_rival(effect, rival) for rival in signatures.rivals]
+            for effect in signatures.effects
         ]
-        return np.array(found, dtype=bool).reshape(len(found), len(signatures.rivals))
+        return np.array(separable, dtype=bool).reshape(len(separable), len(signatures.rivals))
 
     def powers(self, counts: Counts) -> tuple[Values, Values]:
         """Return the powers of detection (n_effects,) and separation (n_effects, n_rivals).
 
-        ``counts``, shape (n_tests,), tells how often each test is made.
+        ``counts``, shape (n_tests,), is how often each test is made.
         """
         alone, beside = self.signatures.noncentralities(counts)
         return (
@@ -55,7 +56,7 @@ class Aims:
         )
 
     def shares(self, counts: Counts) -> Values:
-        """Return how much of what each aim needs a set of tests gives, at most 1; (n_aims,)."""
+        """Return the share of each aim that a set of tests reaches, at most 1; shape (n_aims,)."""
         alone, beside = self.signatures.noncentralities(counts)
         detected = alone / noncentrality_for(self.power, self.rules.single_effect_gain)
         apart = beside / noncentrality_for(self.power, self.rules.evidence_distance)
@@ -65,10 +66,10 @@ class Aims:
 def smallest_set(aims: Aims, most: int) -> Counts:
     """Return how often each test is made in a small set that reaches what can be reached.
 
-    Tests are added by what they contribute to the aims, and taken away again as long as every aim
-    that was reached still is. Aims that all tests, each made ``most`` times, do not reach are left
-    aside: no set of ``most`` tests reaches them. Nor are effects told from others at the cost of
-    tests, if the tests do not even show them.
+    Tests are added by what they contribute to the aims, and removed again as long as every aim that
+    was reached still is. Aims that all tests, each made ``most`` times, do not reach are left out,
+    since no set of ``most`` tests reaches them. Neither are tests spent on separating effects that
+    they do not even detect.
 
     Parameters
     ----------
@@ -103,12 +104,12 @@ def _set_for(aims: Aims, most: int, pursued: NDArray[np.bool_]) -> Counts:
         if max(gains) <= _GAIN:
             break
         grown = one_more[int(np.argmax(gains))]
-    found = [_pruned(aims, grown, pursued)]
-    if not _reached(aims, found[0], pursued).all():
+    sets = [_pruned(aims, grown, pursued)]
+    if not _reached(aims, sets[0], pursued).all():
         # Where tests help only together, adding one by one does not find them.
-        found.append(_pruned(aims, np.ones(n_tests, dtype=int), pursued))
-    allowed = [one for one in found if one.sum() <= most]
-    return max(allowed, key=lambda one: (_reached(aims, one, pursued).sum(), -one.sum()))
+        sets.append(_pruned(aims, np.ones(n_tests, dtype=int), pursued))
+    allowed = [counts for counts in sets if counts.sum() <= most]
+    return max(allowed, key=lambda counts: (_reached(aims, counts, pursued).sum(), -counts.sum()))
 
 
 def _reached(aims: Aims, counts: Counts, pursued: NDArray[np.bool_]) -> NDArray[np.bool_]:
@@ -116,16 +117,16 @@ def _reached(aims: Aims, counts: Counts, pursued: NDArray[np.bool_]) -> NDArray[
 
 
 def _pruned(aims: Aims, counts: Counts, pursued: NDArray[np.bool_]) -> Counts:
-    """Take tests away, the most dispensable first, while all that was reached still is."""
+    """Remove tests, the most dispensable first, while all that was reached still is."""
     counts, reached = counts.copy(), _reached(aims, counts, pursued)
     while counts.any():
-        left: dict[int, float] = {}
+        information: dict[int, float] = {}
         for test in np.flatnonzero(counts):
             fewer = counts - np.eye(len(counts), dtype=int)[test]
             alone, beside = aims.signatures.noncentralities(fewer)
             if np.all(_reached(aims, fewer, pursued) >= reached):
-                left[int(test)] = float(np.log1p(alone).sum() + np.log1p(beside).sum())
-        if not left:
+                information[int(test)] = float(np.log1p(alone).sum() + np.log1p(beside).sum())
+        if not information:
             return counts
-        counts[max(left, key=lambda test: left[test])] -= 1
+        counts[max(information, key=lambda test: information[test])] -= 1
     return counts

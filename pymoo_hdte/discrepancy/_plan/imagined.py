@@ -1,6 +1,6 @@
-"""The records that possible tests would give of the believed drive, with noise, as a campaign.
+"""The records that possible tests would give of the nominal drive, with noise, as a campaign.
 
-They go the same way as measured ones: the same checks refuse limits with which no campaign could be
+They are treated as measured ones: the same checks refuse limits with which no campaign could be
 analysed, and the same line fits give the covariance of their features.
 """
 
@@ -31,8 +31,8 @@ from pymoo_hdte.discrepancy._verdicts.drive import expected_orders, highest_orde
 from pymoo_hdte.drive import DriveEffect, mean_torsion
 
 _ROWS_A_TURN = 40
-"""Rows per input turn to which raw samples are averaged where there are more: enough for order 14,
-up to which lines are looked at, and the information of all samples."""
+"""Most rows per input turn; more raw samples are averaged. This suffices for order 14, up to which
+lines are fitted, and keeps the information of all samples."""
 _SWEEP_ROWS = 480
 """Rows of a sweep from one end to the other."""
 _UNMEASURED = 1e12
@@ -50,11 +50,11 @@ class PlannedTest:
     kind : str
         ``"running"`` or ``"torsion_sweep"``.
     speed : float
-        Of the input, rad/s, negative in reverse; 0 for a sweep.
+        Input speed, rad/s, negative in reverse; 0 for a sweep.
     load : float
-        N.m, signed as in `RunningRecord`; for a sweep its largest torque.
+        Load torque, N.m, signed as in `RunningRecord`; for a sweep the largest torque.
     elapsed : float
-        Time of the session at which it starts, s.
+        Time in the session at which the test starts, s.
     """
 
     kind: str
@@ -64,8 +64,8 @@ class PlannedTest:
 
 
 def possible_tests(limits: PlanLimits) -> tuple[PlannedTest, ...]:
-    """Return all tests within limits: running ones first, then sweeps."""
-    signs = [1.0 if one == "forward" else -1.0 for one in limits.directions]
+    """Return all possible tests within limits: running ones first, then sweeps."""
+    signs = [1.0 if direction == "forward" else -1.0 for direction in limits.directions]
     times = (0.0, limits.session) if limits.session else (0.0,)
     running = [
         # Adding zero turns a negative zero into zero.
@@ -83,7 +83,7 @@ def imagined_campaign(
     effects: Sequence[DriveEffect] = (),
     rules: Rules = RULES,
 ) -> Campaign:
-    """Return the records that tests would give, in their order, all of them to be fitted.
+    """Return the records that tests would give, in their order, all with the role to be fitted.
 
     Parameters
     ----------
@@ -92,42 +92,42 @@ def imagined_campaign(
     tests : sequence of PlannedTest
         At least one running record.
     rng : Generator
-        For phases of the static error, and noise.
+        Generator for phases of the static error, and noise.
     effects : sequence of DriveEffect
-        What the drive has besides.
+        Effects that the drive has besides the nominal ones.
     rules : Rules
 
     Raises
     ------
     InvalidInput
-        Whatever `Campaign` refuses.
+        If `Campaign` refuses the records.
     """
     phases = rng.uniform(-np.pi, np.pi, len(believed.error_orders))
     base = base_parameters(believed, limits.rig, phases.tolist(), 0.0)
-    values = {one.name: np.array([one.start]) for one in base}
-    running = [one for one in tests if one.kind == "running"]
-    sweeps = [one for one in tests if one.kind != "running"]
+    values = {parameter.name: np.array([parameter.start]) for parameter in base}
+    running = [test for test in tests if test.kind == "running"]
+    sweeps = [test for test in tests if test.kind != "running"]
     orders = _orders(believed)
-    speed, travel = np.array([one.speed for one in running]), _travel(limits, believed.ratio)
+    speed, travel = np.array([test.speed for test in running]), _travel(limits, believed.ratio)
     conditions = Conditions(
         speed,
-        np.array([one.load for one in running]),
-        np.array([one.elapsed for one in running]),
+        np.array([test.load for test in running]),
+        np.array([test.elapsed for test in running]),
         np.zeros((len(running), 3, 1 + len(orders)), dtype=complex),
-        # What is read at an order is written there, as records of this length have it.
+        # A line is fitted at the nearest analysed order, as in a record of this length.
         input_angle=np.sign(speed) * travel / 2.0,
         travel=np.full(len(running), travel),
     )
-    found = predict(believed, limits.rig, conditions, orders, values, effects)
+    prediction = predict(believed, limits.rig, conditions, orders, values, effects)
     records = [
-        _running(f"run_{k:03d}", one, believed.ratio, limits, orders, lines, mean, rng)
-        for k, (one, lines, mean) in enumerate(
-            zip(running, found.phasors[0], found.mean[0], strict=True)
+        _running(f"run_{k:03d}", test, believed.ratio, limits, orders, lines, mean, rng)
+        for k, (test, lines, mean) in enumerate(
+            zip(running, prediction.phasors[0], prediction.mean[0], strict=True)
         )
     ]
     swept = [
-        _swept(f"sweep_{k:03d}", one.load, believed, limits, values, effects, rng)
-        for k, one in enumerate(sweeps)
+        _swept(f"sweep_{k:03d}", test.load, believed, limits, values, effects, rng)
+        for k, test in enumerate(sweeps)
     ]
     return Campaign(
         "planned", "believed", believed, limits.rig, tuple(records), tuple(swept), rules
@@ -140,11 +140,11 @@ def _travel(limits: PlanLimits, ratio: float) -> float:
 
 
 def _orders(believed: BelievedDrive) -> list[float]:
-    """Return the orders of the lines that records have: of the error, both shafts, and sums."""
+    """Return the orders of lines in the records: of the error, their sums, and both shafts."""
     lines = believed.error_orders
-    sums = [one + other for one in lines for other in lines]
-    found = [1.0 / believed.ratio, 2.0 / believed.ratio, *map(float, range(1, 9)), *lines, *sums]
-    return sorted({round(one, 9) for one in found if one < _ROWS_A_TURN / 2})
+    sums = [order + partner for order in lines for partner in lines]
+    orders = [1.0 / believed.ratio, 2.0 / believed.ratio, *map(float, range(1, 9)), *lines, *sums]
+    return sorted({round(order, 9) for order in orders if order < _ROWS_A_TURN / 2})
 
 
 def imagined_data(
@@ -154,15 +154,15 @@ def imagined_data(
     looked_at = expected_orders(campaign, rules)
     apart = rules.line_separation / campaign.believed.ratio
     for order in orders:
-        near = min(abs(order - one) for one in looked_at)
-        if near >= apart and order <= highest_order(campaign, rules):
+        distance = min(abs(order - known) for known in looked_at)
+        if distance >= apart and order <= highest_order(campaign, rules):
             looked_at.append(order)
     features = measure(campaign, campaign.running, sorted(looked_at))
     return training_data(campaign, _measured_only(features, limits), rules)
 
 
 def _measured_only(features: Features, limits: PlanLimits) -> Features:
-    """Return features of which the channels that are not measured say nothing."""
+    """Return features in which channels that are not measured carry no information."""
     covariance = features.covariance.copy()
     for channel, name in enumerate(CHANNELS):
         if name not in limits.channels:
@@ -221,7 +221,7 @@ def _swept(
     """Return a sweep 0, reach, -reach, reach N.m with the noise of the sensors."""
     whole, half = _SWEEP_ROWS, _SWEEP_ROWS // 2
     legs = ((0.0, reach, half), (reach, -reach, whole), (-reach, reach, whole))
-    path = [np.linspace(one, other, rows + 1)[1:] for one, other, rows in legs]
+    path = [np.linspace(start, end, rows + 1)[1:] for start, end, rows in legs]
     ends = np.concatenate([[0.0], *path])
     every = (*believed.effects, *effects)
     torsion = mean_torsion(coefficients_of(believed, values, every, 1), ends)[0]

@@ -23,42 +23,42 @@ DIRECTIONS = ("forward", "reverse")
 
 @dataclass(frozen=True)
 class PlanLimits:
-    """What can be tested, and what is to be told apart.
+    """What can be tested, and which effects are to be found.
 
     Attributes
     ----------
     rig : Rig
         Speed loop and noise of the sensors.
     speeds : tuple of float, any length n
-        Of the input, rad/s, above zero.
+        Input speeds, rad/s, above zero.
     loads : tuple of float, any length n
-        N.m at the output; positive ones brake the motion, negative ones drive it, in either
-        direction.
+        Load torques at the output, N.m. Positive ones brake the motion, negative ones drive it, in
+        either direction.
     sample_rate : float
-        Of the raw samples, Hz.
+        Sample rate of the raw samples, Hz.
     most_records : int
-        Most tests of the plan: those to be fitted, sweeps among them, and those held out.
+        Largest number of tests of the plan: those to be fitted, with sweeps, and those held out.
     directions : tuple of str
-        Of `DIRECTIONS`.
+        Directions of motion, of `DIRECTIONS`.
     sweeps : tuple of float, any length n
         Largest torques of possible torsion sweeps, N.m.
     output_turns : int
         Length of a running record.
     session : float
-        Time from the first record to the last, s; at zero no drift can be looked for.
+        Time from the first record to the last, s; at zero no drift can be found.
     channels : tuple of str
-        Measured ones, of `CHANNELS`.
+        Measured channels, of `CHANNELS`.
     held_out : int
-        Number of running records that are kept out of the fit to prove its result.
+        Number of running records that are kept out of the fit to validate its result.
     power : float
-        Wanted probability to detect an effect, and to tell it from each other one.
+        Wanted probability to detect an effect, and to separate it from each other one.
     share : float
         Size of the effects that are not in ``effects``: the share of the largest wind-up and
         torques that a fit without them leaves unexplained.
     effects : tuple of DriveEffect
         Effects to be found, at the size that matters; by default all that the package knows.
     tolerance, error_tolerance, tolerances
-        Relative half-widths of the believed values, as in `BelievedDrive`.
+        Relative half-widths of the nominal values, as in `BelievedDrive`.
 
     Raises
     ------
@@ -112,7 +112,7 @@ class PlanLimits:
         real_number("share", self.share, above=0.0, below=1.0)
 
     def believed(self, model: DriveModel) -> BelievedDrive:
-        """Return a drive model as what is believed; errors as `believed_of_model`."""
+        """Return a drive model with these tolerances; errors are those of `believed_of_model`."""
         return believed_of_model(model, self.tolerance, self.error_tolerance, self.tolerances)
 
     def with_noise(self, factor: float) -> PlanLimits:
@@ -133,12 +133,12 @@ def read_limits(path: str | Path) -> PlanLimits:
     Returns
     -------
     PlanLimits
-        SI units.
+        Limits in SI units.
 
     Raises
     ------
     InvalidInput
-        With file and line, for a missing, unknown or impossible field.
+        If a field is missing, unknown or impossible; the message names file and line.
     OSError
         If the file cannot be read.
 
@@ -184,22 +184,22 @@ _KEYS = {
     "directions": ("directions", 1.0),
     "channels": ("channels", 1.0),
 }
-"""Of each attribute the key in the file and the factor to SI."""
+"""Key in the file, and factor to SI, of each attribute."""
 _REQUIRED = ("speeds", "loads", "sample_rate", "most_records")
 
 
 def _given(top: Fields) -> dict[str, Any]:
     """Return the attributes that the file gives, in SI."""
-    found: dict[str, Any] = {}
+    attributes: dict[str, Any] = {}
     for name, (key, factor) in _KEYS.items():
         if name not in _REQUIRED and not top.has(key):
             continue
         if name in ("speeds", "loads", "sweeps"):
-            found[name] = tuple(factor * number for number in top.numbers(key))
+            attributes[name] = tuple(factor * number for number in top.numbers(key))
         elif name in ("directions", "channels"):
-            found[name] = top.texts(key)
+            attributes[name] = top.texts(key)
         elif name in ("most_records", "held_out", "output_turns"):
-            found[name] = top.whole(key, at_least=0)
+            attributes[name] = top.whole(key, at_least=0)
         else:
-            found[name] = top.number(key)
-    return found
+            attributes[name] = top.number(key)
+    return attributes

@@ -1,4 +1,4 @@
-"""The plan: tests to make, the power they give, and what no test within the limits separates."""
+"""The plan: tests to make, their power, and effects that no test within the limits separates."""
 
 from __future__ import annotations
 
@@ -32,13 +32,13 @@ class Chance:
     Attributes
     ----------
     effect : str
-        With its port.
+        Label of the effect, with its port.
     rival : str
-        Empty for detection.
+        Label of the rival; empty for detection.
     power : float
-        Of the planned tests; for two effects to be found that of the one that is harder to tell.
+        Power of the planned tests; for two effects to be found, the smaller of both.
     possible : float
-        No set of as many tests within the limits gives more.
+        Largest power of any set of as many tests within the limits.
     """
 
     effect: str
@@ -49,20 +49,20 @@ class Chance:
 
 @dataclass(frozen=True)
 class Plan:
-    """What to measure, and what that tells.
+    """What to measure, and which effects that detects and separates.
 
     Attributes
     ----------
     tests : tuple of PlannedTest
-        To be fitted, in the order to make them.
+        Tests to be fitted, in the order to make them.
     held_out : tuple of PlannedTest
-        Running tests of other conditions, where there are any, to prove what the fit names.
+        Running tests at other conditions, if there are any, to validate what the fit names.
     detected : tuple of Chance
-        One of each effect to be found.
+        Chance to detect each effect.
     separated : tuple of Chance
-        Of the effects that are detected from each other one.
+        Chance to separate each detected effect from each rival.
     wanted : float
-        Probability that was wanted as power.
+        Probability that was requested as power.
 
     Examples
     --------
@@ -78,33 +78,34 @@ class Plan:
 
     @property
     def missed(self) -> list[str]:
-        """A sentence for each effect that is not detected, or not told from others.
+        """A sentence for each effect that is not detected, or not separated from others.
 
-        What is not detected is not told from anything either, and not in `separated`.
+        An effect that is not detected is not in `separated`.
         """
-        unseen = {one.effect: one for one in self.detected if one.power < self.wanted}
-        found = [_missed([one], self.wanted) for one in unseen.values()]
+        unseen = {chance.effect: chance for chance in self.detected if chance.power < self.wanted}
+        sentences = [_missed([chance], self.wanted) for chance in unseen.values()]
         confused: dict[tuple[str, bool], list[Chance]] = {}
-        for one in self.separated:
-            if one.power < self.wanted:
-                key = one.effect, one.possible < self.wanted
-                confused.setdefault(key, []).append(one)
-        return found + [_missed(ones, self.wanted) for ones in confused.values()]
+        for chance in self.separated:
+            if chance.power < self.wanted:
+                key = chance.effect, chance.possible < self.wanted
+                confused.setdefault(key, []).append(chance)
+        return sentences + [_missed(chances, self.wanted) for chances in confused.values()]
 
     def as_dict(self) -> dict[str, Any]:
         """Return the plan as plain types, in the units of the names."""
-        roles = [("train", one) for one in self.tests] + [
-            ("held_out", one) for one in self.held_out
+        roles = [("train", test) for test in self.tests] + [
+            ("held_out", test) for test in self.held_out
         ]
         return {
             "wanted_power": self.wanted,
-            "test": [_test(role, one) for role, one in roles],
+            "test": [_test(role, test) for role, test in roles],
             "effect": [
-                {"effect": one.effect, "power": _rounded(one.power)} for one in self.detected
+                {"effect": chance.effect, "power": _rounded(chance.power)}
+                for chance in self.detected
             ],
             "pair": [
-                {"effect": one.effect, "rival": one.rival, "power": _rounded(one.power)}
-                for one in self.separated
+                {"effect": chance.effect, "rival": chance.rival, "power": _rounded(chance.power)}
+                for chance in self.separated
             ],
             "not_reached": self.missed,
         }
@@ -119,16 +120,16 @@ def plan_tests(
 ) -> Plan:
     """Return the smallest set of tests that separates the effects that matter.
 
-    Changes of the readings are linear in the unknowns of a rival about its typical values, so that
-    the power is that of small effects.
+    Readings are taken as linear in the unknowns of a rival around its typical values, so that the
+    power holds for small effects.
 
     Parameters
     ----------
     model : DriveModel
-        What is believed of the drive.
+        Nominal model of the drive.
     limits : PlanLimits
     rng : Generator, optional
-        For phases and noise of the imagined records; by default of seed 0.
+        Generator for phases and noise of the imagined records; by default with seed 0.
     rules : Rules
 
     Returns
@@ -138,7 +139,7 @@ def plan_tests(
     Raises
     ------
     InvalidInput
-        If records within the limits could not be analysed: see `Campaign` and `expected_orders`.
+        If records within the limits could not be analysed, as `Campaign` checks them.
 
     Examples
     --------
@@ -169,22 +170,25 @@ def _chances(
         Chance(name, "", float(alone[k]), float(best_alone[k]))
         for k, name in enumerate(signatures.effects)
     )
-    found: dict[frozenset[str], Chance] = {}
+    separated: dict[frozenset[str], Chance] = {}
     for k, effect in enumerate(signatures.effects):
         for j, rival in enumerate(signatures.rivals):
             if not pairs[k, j] or alone[k] < aims.power:
                 continue
-            one = Chance(effect, rival, float(beside[k, j]), float(best_beside[k, j]))
-            known = found.setdefault(frozenset((effect, rival)), one)
-            if (one.possible, one.power) < (known.possible, known.power):
-                found[frozenset((effect, rival))] = one
-    return detected, tuple(found.values())
+            chance = Chance(effect, rival, float(beside[k, j]), float(best_beside[k, j]))
+            hardest = separated.setdefault(frozenset((effect, rival)), chance)
+            if (chance.possible, chance.power) < (hardest.possible, hardest.power):
+                separated[frozenset((effect, rival))] = chance
+    return detected, tuple(separated.values())
 
 
 def _enough(counts: Counts, tests: Sequence[PlannedTest], least: int) -> Counts:
-    """Add running tests, unlike those chosen, up to the least number that can be analysed."""
+    """Return counts with running tests added, up to the least number that can be analysed.
+
+    Each added test is the one whose condition differs most from those chosen.
+    """
     counts = counts.copy()
-    running = [k for k, one in enumerate(tests) if one.kind == "running"]
+    running = [k for k, test in enumerate(tests) if test.kind == "running"]
     while sum(counts[running]) < least:
         chosen = [tests[k] for k in running if counts[k]]
         distances = [_distance(tests[k], chosen, tests) for k in running]
@@ -195,42 +199,48 @@ def _enough(counts: Counts, tests: Sequence[PlannedTest], least: int) -> Counts:
 def _held_out(
     made: Sequence[PlannedTest], tests: Sequence[PlannedTest], number: int
 ) -> tuple[PlannedTest, ...]:
-    """Return running tests as unlike those made, and each other, as the limits allow."""
-    running = [one for one in tests if one.kind == "running"]
-    found: list[PlannedTest] = []
+    """Return running tests that differ as much as possible from those made, and from each other."""
+    running = [test for test in tests if test.kind == "running"]
+    held_out: list[PlannedTest] = []
     for _ in range(number):
-        known = [*(one for one in made if one.kind == "running"), *found]
-        found.append(max(running, key=lambda one: _distance(one, known, running)))
-    return tuple(found)
+        known = [*(test for test in made if test.kind == "running"), *held_out]
+        held_out.append(max(running, key=lambda test: _distance(test, known, running)))
+    return tuple(held_out)
 
 
 def _distance(
-    one: PlannedTest, others: Sequence[PlannedTest], tests: Sequence[PlannedTest]
+    test: PlannedTest, others: Sequence[PlannedTest], tests: Sequence[PlannedTest]
 ) -> float:
-    """Return the distance of a condition to the nearest other one, in units of the limits."""
+    """Return the distance of a condition to the nearest of others, in units of the limits."""
     speed = max(abs(test.speed) for test in tests)
     load = max(max(abs(test.load) for test in tests), 1e-12)
     time = max(max(test.elapsed for test in tests), 1e-12)
     return min(
         (
-            abs(one.speed - other.speed) / speed
-            + abs(one.load - other.load) / load
-            + abs(one.elapsed - other.elapsed) / time
-            for other in others
+            abs(test.speed - neighbour.speed) / speed
+            + abs(test.load - neighbour.load) / load
+            + abs(test.elapsed - neighbour.elapsed) / time
+            for neighbour in others
         ),
         default=np.inf,
     )
 
 
 def _ordered(tests: Sequence[PlannedTest]) -> tuple[PlannedTest, ...]:
-    def place(one: PlannedTest) -> tuple[bool, float, bool, float, float]:
-        return one.kind == "running", one.elapsed, one.speed < 0.0, abs(one.speed), abs(one.load)
+    def place(test: PlannedTest) -> tuple[bool, float, bool, float, float]:
+        return (
+            test.kind == "running",
+            test.elapsed,
+            test.speed < 0.0,
+            abs(test.speed),
+            abs(test.load),
+        )
 
     return tuple(sorted(tests, key=place))
 
 
 def chance_words(chance: float) -> str:
-    """Return a chance in per cent, rounded down: what falls short of 80 % is not shown as 80 %.
+    """Return a chance in per cent, rounded down, so that 79.6 % is not shown as 80 %.
 
     >>> chance_words(0.796), chance_words(0.004), chance_words(0.9999)
     ('79 %', 'less than 1 %', 'over 99 %')
@@ -242,36 +252,37 @@ def chance_words(chance: float) -> str:
     return f"{whole} %" if whole else "less than 1 %"
 
 
-def _missed(ones: Sequence[Chance], wanted: float) -> str:
-    """Say what tests do not tell of one effect, of which all ``ones`` are."""
-    effect = ones[0].effect
-    rivals = ", nor from ".join(one.rival for one in ones)
-    if max(one.possible for one in ones) < wanted:
-        asked = f"tells {effect} from {rivals}" if rivals else f"shows {effect}"
-        best = max(one.possible for one in ones)
+def _missed(chances: Sequence[Chance], wanted: float) -> str:
+    """Return a sentence on what tests do not show of the effect of all ``chances``."""
+    effect = chances[0].effect
+    rivals = ", nor from ".join(chance.rival for chance in chances)
+    if max(chance.possible for chance in chances) < wanted:
+        outcome = f"separates {effect} from {rivals}" if rivals else f"shows {effect}"
+        best = max(chance.possible for chance in chances)
         most = f"the chance is {chance_words(best)} at best"
-        return f"No test within the limits {asked} at this size: {most}."
-    least = min(one.power for one in ones)
-    asked = f"tell {effect} from {rivals.replace(', nor', ' and')}" if rivals else f"show {effect}"
+        return f"No test within the limits {outcome} at this size: {most}."
+    least = min(chance.power for chance in chances)
+    separate = f"separate {effect} from {rivals.replace(', nor', ' and')}"
+    outcome = separate if rivals else f"show {effect}"
     return (
-        f"To {asked} at this size takes more records than the limits allow: these give a chance "
+        f"To {outcome} at this size takes more records than the limits allow: these give a chance "
         f"of {chance_words(least)}."
     )
 
 
-def _test(role: str, one: PlannedTest) -> dict[str, Any]:
-    if one.kind != "running":
-        return {"test": one.kind, "role": role, "largest_torque_Nm": one.load}
+def _test(role: str, test: PlannedTest) -> dict[str, Any]:
+    if test.kind != "running":
+        return {"test": test.kind, "role": role, "largest_torque_Nm": test.load}
     return {
-        "test": one.kind,
+        "test": test.kind,
         "role": role,
-        "input_speed_rpm": float(f"{one.speed / REVOLUTION_PER_MINUTE:.9g}"),
-        "load_torque_Nm": one.load,
-        "direction": "forward" if one.speed > 0.0 else "reverse",
-        "elapsed_s": one.elapsed,
+        "input_speed_rpm": float(f"{test.speed / REVOLUTION_PER_MINUTE:.9g}"),
+        "load_torque_Nm": test.load,
+        "direction": "forward" if test.speed > 0.0 else "reverse",
+        "elapsed_s": test.elapsed,
     }
 
 
 def _rounded(power: float) -> float:
-    # Down, so that a power that is written reaches what is wanted only where the power does.
+    # Rounded down, so that a printed power reaches the wanted one only if the power does.
     return math.floor(1e4 * power + 1e-9) / 1e4

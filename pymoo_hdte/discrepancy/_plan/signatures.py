@@ -1,4 +1,4 @@
-"""What effects change in every possible test, and how far others can imitate it."""
+"""The changes that effects cause in every possible test, and how far others can imitate them."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ Values = NDArray[np.float64]
 Counts = NDArray[np.int_]
 
 _RIDGE = 1e-10
-"""Information on the directions of a rival, relative to what all tests together tell: it keeps
-equations solvable where two directions are the same."""
+"""Information on the directions of a rival, relative to that of all tests together. It keeps
+equations solvable if two directions are the same."""
 
 
 @dataclass(frozen=True)
@@ -28,7 +28,7 @@ class Imitation:
     ----------
     columns : tuple of int
     one_sided : bool
-        Whether the first of them, a strength, cannot be negative.
+        Whether the first column, a strength, cannot be negative.
     """
 
     columns: tuple[int, ...]
@@ -39,25 +39,25 @@ class Imitation:
 class Signatures:
     """Inner products of whitened changes, test by test.
 
-    Columns are those of the effects to be found, then of the rivals' imitations, then of the base
-    parameters in units of their scale.
+    Columns are those of the effects to be found, of the rivals' imitations, and of the base
+    parameters in units of their scale, in this order.
 
     Attributes
     ----------
     effects : tuple of str
-        Effects to be found, each with its port.
+        Labels of the effects to be found, with their ports.
     rivals : tuple of str
-        Effects that may imitate them, each with its port.
+        Labels of the effects that may imitate them, with their ports.
     imitations : tuple of tuple of Imitation
-        For each of the rivals its forms.
+        Forms of each rival.
     grams : ndarray, shape (n_tests, n, n)
     known : ndarray, shape (n,)
         Information on the columns before any test.
     held : ndarray of bool, shape (n_tests,), optional
         Tests whose load holds the tooth flanks together. In the others a drive with a clearance
-        rattles, and what it does then is predicted for no model.
+        rattles, which no model predicts.
     rattling : frozenset of str
-        Effects and rivals with a clearance, which only tests in ``held`` tell from others.
+        Effects and rivals with a clearance, which only tests in ``held`` separate from others.
     """
 
     effects: tuple[str, ...]
@@ -104,14 +104,16 @@ class Signatures:
         by_test = np.moveaxis(matrix, 1, 0)
         grams = np.ascontiguousarray(by_test @ np.swapaxes(by_test, 1, 2))
         known = np.zeros(len(matrix))
-        told = np.einsum("tii->i", grams)[len(signatures) : len(columns)]
-        known[len(signatures) : len(columns)] = np.where(told > 0.0, _RIDGE * told, 1.0)
+        information = np.einsum("tii->i", grams)[len(signatures) : len(columns)]
+        known[len(signatures) : len(columns)] = np.where(
+            information > 0.0, _RIDGE * information, 1.0
+        )
         known[len(signatures) + moving :] = base_known
         names = tuple(name for name, _ in rivals)
         return cls(tuple(effects), names, tuple(imitations), grams, known)
 
     def noncentralities(self, counts: Counts) -> tuple[Values, Values]:
-        """Return what a set of tests leaves of each effect, to no rival and to each of them.
+        """Return what a set of tests leaves of each effect, alone and beside each rival.
 
         Parameters
         ----------
@@ -121,14 +123,14 @@ class Signatures:
         Returns
         -------
         alone : ndarray, shape (n_effects,)
-            Not imitated by the base parameters.
+            Part that the base parameters cannot imitate.
         beside : ndarray, shape (n_effects, n_rivals)
-            Nor by a rival that is fitted with them: its best form.
+            Part that the best form of a rival cannot imitate either, fitted with them.
         """
         alone, beside = self._of(counts)
         if self.held is not None and self.rattling and np.any(counts[~self.held]):
             effect, rival = (
-                np.array([one in self.rattling for one in names])
+                np.array([label in self.rattling for label in names])
                 for names in (self.effects, self.rivals)
             )
             held_alone, held_beside = self._of(counts * self.held)
@@ -137,16 +139,16 @@ class Signatures:
         return alone, beside
 
     def _of(self, counts: Counts) -> tuple[Values, Values]:
-        """Return `noncentralities` of all effects by the same tests."""
+        """Return the `noncentralities` of all effects if every test counts for all of them."""
         flat = counts @ self.grams.reshape(len(self.grams), -1)
         together = flat.reshape(self.grams.shape[1:]) + np.diag(self.known)
         count = len(self.effects)
-        moving = sum(len(one.columns) for forms in self.imitations for one in forms)
-        left = unimitated(together, count + moving)
-        alone = np.maximum(np.diagonal(left)[:count], 0.0)
+        moving = sum(len(form.columns) for forms in self.imitations for form in forms)
+        unexplained = unimitated(together, count + moving)
+        alone = np.maximum(np.diagonal(unexplained)[:count], 0.0)
         beside = np.repeat(alone[:, None], len(self.rivals), axis=1)
         if self.imitations:
-            by_form = np.maximum(self._beside_forms(left), 0.0)
+            by_form = np.maximum(self._beside_forms(unexplained), 0.0)
             for rival in range(len(self.rivals)):
                 forms = by_form[self._owners == rival]
                 beside[:, rival] = np.minimum(alone, forms.min(axis=0))
@@ -154,7 +156,7 @@ class Signatures:
 
     @cached_property
     def _forms(self) -> list[Imitation]:
-        return [one for forms in self.imitations for one in forms]
+        return [form for forms in self.imitations for form in forms]
 
     @cached_property
     def _owners(self) -> NDArray[np.int_]:
@@ -163,45 +165,47 @@ class Signatures:
 
     @cached_property
     def _places(self) -> tuple[NDArray[np.int_], NDArray[np.bool_]]:
-        """Columns of each form, padded to the largest number, and which are no padding."""
-        most = max(len(one.columns) for one in self._forms)
+        """Columns of each form, padded to the largest number, and a mask without the padding."""
+        most = max(len(form.columns) for form in self._forms)
         places = np.zeros((len(self._forms), most), dtype=int)
         used = np.zeros(places.shape, dtype=bool)
-        for row, one in enumerate(self._forms):
-            places[row, : len(one.columns)] = one.columns
-            used[row, : len(one.columns)] = True
+        for row, form in enumerate(self._forms):
+            places[row, : len(form.columns)] = form.columns
+            used[row, : len(form.columns)] = True
         return places, used
 
-    def _beside_forms(self, left: Values) -> Values:
+    def _beside_forms(self, unexplained: Values) -> Values:
         """Return what each form leaves of each effect, shape (n_forms, n_effects)."""
         places, used = self._places
         count = len(self.effects)
-        whole = np.diagonal(left)[:count]
-        rest, strength = _rest(left, whole, places, used)
-        one_sided = np.array([one.one_sided for one in self._forms])
+        total = np.diagonal(unexplained)[:count]
+        residual, strength = _unimitated_by_forms(unexplained, total, places, used)
+        one_sided = np.array([form.one_sided for form in self._forms])
         weaker = used.copy()
         weaker[:, 0] = False
-        without, _ = _rest(left, whole, places, weaker)
+        without, _ = _unimitated_by_forms(unexplained, total, places, weaker)
         # Least squares under one bound: where it is violated, the solution lies at the bound.
-        return np.where(one_sided[:, None] & (strength < 0.0), without, rest)
+        return np.where(one_sided[:, None] & (strength < 0.0), without, residual)
 
 
-def _rest(
-    left: Values, whole: Values, places: NDArray[np.int_], used: NDArray[np.bool_]
+def _unimitated_by_forms(
+    unexplained: Values, total: Values, places: NDArray[np.int_], used: NDArray[np.bool_]
 ) -> tuple[Values, Values]:
     """Return what forms leave of effects, and their strengths, both (n_forms, n_effects)."""
-    both = used[:, :, None] & used[:, None, :]
-    own = np.where(both, left[places[:, :, None], places[:, None, :]], np.eye(places.shape[1]))
-    cross = np.where(used[:, :, None], left[places][:, :, : len(whole)], 0.0)
+    used_pairs = used[:, :, None] & used[:, None, :]
+    own = np.where(
+        used_pairs, unexplained[places[:, :, None], places[:, None, :]], np.eye(places.shape[1])
+    )
+    cross = np.where(used[:, :, None], unexplained[places][:, :, : len(total)], 0.0)
     strengths = np.linalg.solve(own, cross)
-    return whole - np.sum(cross * strengths, axis=1), strengths[:, 0]
+    return total - np.sum(cross * strengths, axis=1), strengths[:, 0]
 
 
 def is_rival(effect: str, rival: str) -> bool:
-    """Tell whether a rival is another explanation than an effect, and no wider one that holds it.
+    """Tell whether a rival is another explanation than an effect, and does not contain it.
 
-    Both as labels ``name:port``. What contains the effect imitates it in every test; the special
-    case is then named.
+    Both are labels ``name:port``. A law that contains the effect imitates it in every test; the
+    special case is then named.
     """
-    (one, port), (other, there) = effect.split(":"), rival.split(":")
-    return effect != rival and not (port == there and is_contained(one, other))
+    (name, port), (rival_name, rival_port) = effect.split(":"), rival.split(":")
+    return effect != rival and not (port == rival_port and is_contained(name, rival_name))

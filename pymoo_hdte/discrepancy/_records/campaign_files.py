@@ -7,10 +7,10 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from pymoo_hdte._io.csv_table import write_columns
 from pymoo_hdte._io.fields import Fields
 from pymoo_hdte._io.layout import layout_from_fields
-from pymoo_hdte._io.text_lines import Progress, told
-from pymoo_hdte._io.text_table import write_columns
+from pymoo_hdte._io.text_lines import Progress, byte_counter
 from pymoo_hdte._io.toml import toml_text, toml_with_lines
 from pymoo_hdte.checks import Complaints, InvalidInput, complaints_of
 from pymoo_hdte.discrepancy._records.believed import SENSOR_PLACES, BelievedDrive, Rig
@@ -101,7 +101,7 @@ def read_campaign(
             with complaints.noted():
                 paths.append(record_path(entry, place, folder))
         complaints.finish()
-        seen = told(progress, paths)
+        seen = byte_counter(progress, paths)
         files: list[FileOfRecord] = []
         for (entry, place), path in zip(pairs, paths, strict=True):
             with complaints.noted():

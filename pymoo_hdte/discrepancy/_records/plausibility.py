@@ -186,7 +186,7 @@ def check_torsion(record: TorsionRecord, believed: BelievedDrive, rules: Rules) 
             else "the sign of one of the columns: here a positive torque turns the output backwards"
         )
         allowed = (
-            f"{1.0 / believed.stiffness:.3g} rad/(N.m), as of the believed stiffness of "
+            f"{1.0 / believed.stiffness:.3g} rad/(N.m), as the nominal stiffness of "
             f"{believed.stiffness:.4g} N.m/rad, within a factor of {factor:g}. Likely {cause}"
         )
         raise InvalidInput(

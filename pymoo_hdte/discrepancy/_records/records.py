@@ -99,7 +99,7 @@ class RunningRecord:
         Lowest and highest mean speed, rad/s, and mean load torque, N.m, that the record may have.
         Without them both must be near the values set, within the limits of `Rules`.
     temperature : float, optional
-        Mean over the record near the lubricant, K.
+        Of the lubricant in kelvin; the mean over the record.
     jumps : tuple of Jump
         Jumps of sensors that were taken out of the rows; none in a record as measured.
     reading_errors : tuple of ReadingError

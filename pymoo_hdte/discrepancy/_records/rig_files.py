@@ -1,62 +1,8 @@
 """A rig in a folder: ``rig.toml`` has its mechanism and lists its records, all without code.
 
-The believed model has coordinates, ports, inputs, loops and effects, each value with its tolerance.
-The ``revised_model.toml`` of a report is one. Numbers of the mechanism are in SI; the columns of
-the records have units of their own::
-
-    title = "An electro-mechanical positioning system"
-    cutoff = 40.0                                  # optional, Hz
-
-    [coordinates.q]
-    inertia = { value = 100.0, tolerance = 0.5 }   # relative, 0 to 1; or factor = 3.0; or known
-    angle = true                                   # optional: of a shaft; else the unit tells
-    [ports.joint]
-    motion = { q = 1.0 }                           # share of each coordinate
-    damping = { value = 300.0, tolerance = 1.0 }   # optional, as stiffness
-    read = false                                   # optional; true for a force sensor
-    load = { brake = 1.0 }                         # optional: share of inputs in its load
-    gear = { ratio = 101, kind = "harmonic drive" }  # optional, as `Gear`: its output is the port,
-                                                   # or with motion = { motor = 1.0, load = -1.0 }
-                                                   # its torsion: a joint with two encoders
-    [[ports.joint.error]]                          # optional: kinematic error, as `ErrorLine`
-    coordinate = "q"
-    order = 2.0
-    amplitude = 1e-4
-    phase = 0.0
-    [inputs.vir]
-    acts = { q = 1.0 }
-    gain = { value = 35.15 }                       # absent, of the only input: forces in its unit
-    [[loops]]                                      # optional, as `Loop`
-    input = "vir"
-    reference = "qg"
-    coordinate = "q"
-    position_gain = 38995.8
-    speed_gain = 243.45
-    limit = 10.0                                   # optional
-    [[effects]]                                    # optional: known laws
-    name = "coulomb_friction"                      # of a registered effect, with all its numbers
-    port = "joint"
-    level = 20.4
-
-    model = "revised_model.toml"                   # instead of all tables above: a file with them
-
-    [noise]                                        # optional: standard deviations, SI
-    q = 1e-6
-
-    [table]                                        # as `layout_from_fields` has it
-    ...
-    [[records]]
-    file = "DATA_EMPS.mat"                         # in the folder of the data
-    files = { vir = "voltage.csv" }                # optional: channels that have files of their own
-    role = "train"                                 # or "held_out"; absent: first 60 %, last 40 %
-    share = [0.0, 0.5]                             # optional, with a role: part of the rows; or
-    rows = [0, 12000]                              # instead: first row, and the first after it; or
-    seconds = [0.0, 12.0]                          # instead: as in the column of time
-    name = "trapezoids"                            # optional: without it the name of the file
-    sha256 = "6cf6814ae14618"                      # optional: first 8 or more digits
-    zero = { q = 12.5 }                            # optional: readings at zero, unit of the column
-    [records.table]                                # optional: a layout of its own
-    ...
+``docs/rig_format.md`` has every key. The believed model has coordinates, ports, inputs, loops and
+effects, each value with its tolerance; the ``revised_model.toml`` of a report is one. Numbers of
+the mechanism are in SI; the columns of the records have units of their own.
 """
 
 from __future__ import annotations
@@ -67,7 +13,7 @@ from pathlib import Path
 
 from pymoo_hdte._io.fields import Fields
 from pymoo_hdte._io.layout import COUNTS, layout_from_fields
-from pymoo_hdte._io.text_lines import Progress, told
+from pymoo_hdte._io.text_lines import Progress, byte_counter
 from pymoo_hdte._io.toml import toml_with_lines
 from pymoo_hdte.checks import InvalidInput, one_of
 from pymoo_hdte.discrepancy._records.rig_model import (
@@ -182,7 +128,7 @@ def read_rig(
         ]
         _check_names(listed)
         # Each part is read on its own, so that a fault outside of it does no harm.
-        seen = told(
+        seen = byte_counter(
             progress, [file for listing in listed for _ in listing.parts for file in listing.paths]
         )
         coordinates = model.mechanism.coordinates

@@ -95,6 +95,6 @@ def _place_hint(campaign: Campaign) -> str:
         return ""
     where, place = ("behind", "brake") if at_drive else ("in front of", "drive")
     return (
-        f"The output torque shows {100.0 * abs(share):.0f} % of the believed load inertia: if its "
+        f"The output torque shows {100.0 * abs(share):.0f} % of the nominal load inertia: if its "
         f'sensor sits {where} the load, put output_torque_at = "{place}" into [rig].'
     )

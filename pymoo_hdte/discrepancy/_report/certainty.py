@@ -11,8 +11,8 @@ from pymoo_hdte.discrepancy._report.words import doubts
 from pymoo_hdte.discrepancy._selection.hypothesis import (
     Hypothesis,
     adequate,
+    contradicted_parts,
     explains,
-    unexplained,
 )
 from pymoo_hdte.discrepancy._selection.verdict import Verdict
 from pymoo_hdte.discrepancy._verdicts.drive_finding import DriveFinding
@@ -26,25 +26,25 @@ def how_sure(finding: DriveFinding) -> str:
     residual = verdict.base.chi_square / verdict.degrees_of_freedom
     if verdict.status == "adequate":
         return (
-            f"{_probably(verdict)} The misfit of the believed drive, fitted within its tolerances, "
+            f"{_probably(verdict)} The misfit of the nominal drive, fitted within its tolerances, "
             f"has {residual:.2f} times the variance of the noise; up to {limit:.2f} counts as "
             "noise. An effect too small for these records may still be there."
         )
     if verdict.chosen is None:
-        return "That something is missing is certain; no effect was there to be tried."
+        return "Something is certainly missing, but no effect could be tried."
     share = percent(verdict.chosen.explained)
     if not verdict.chosen.listed:
         return (
-            f"No effect of the list is as likely: this explains {share} of the misfit. An error of "
-            "the encoder takes no part in the motion of the drive."
+            f"No effect in the library is as likely: this explains {share} of the misfit. An error "
+            "of the encoder takes no part in the motion of the drive."
         )
     if verdict.status == "unlisted":
-        certain = "That something is missing is certain; what it is, is not."
+        certain = "Something is certainly missing, but what it is remains open."
         if not verdict.comes_near:
             most = labels_by_order(verdict.chosen.label, orders)
-            return f"{certain} The most that was explained is {share}, by {most}."
+            return f"{certain} At most {share} of the misfit is explained, by {most}."
         return (
-            f"{certain} The nearest known effect, "
+            f"{certain} The nearest effect, "
             f"{labels_by_order(verdict.chosen.label, orders)}, explains {share} of the misfit, "
             f"{_too_little(finding, verdict.chosen)}."
             + "".join(f" Against it: {one}." for one in doubts(verdict, orders))
@@ -62,26 +62,26 @@ def how_sure_of_records(verdict: Verdict) -> str:
     if verdict.status == "adequate":
         return "An effect too small for these records may still be there."
     if chosen is None:
-        return "It is seen in the forces beyond the cutoff only, and no rival was compared."
+        return "It shows only in the forces beyond the cutoff, where no other effect was compared."
     share = percent(chosen.explained)
     if verdict.status == "unlisted":
         return (
-            "That something is missing is certain; what it is, is not. The nearest known effect, "
-            f"{in_words(chosen.label)}, explains {share} of what known effects can explain."
+            "Something is certainly missing, but what it is remains open. The nearest effect, "
+            f"{in_words(chosen.label)}, explains {share} of what the library can explain."
         )
     others = _others(verdict, chosen)
-    words = [f"It explains {share} of what known effects can explain."]
+    words = [f"It explains {share} of what the library can explain."]
     if verdict.equivalent:
         shares = ", ".join(percent(one.explained) for one in verdict.equivalent)
-        words.append(f"What these records cannot tell from it explains {shares}.")
+        words.append(f"The indistinguishable alternatives explain {shares}.")
     elif others:
         best = max(others, key=lambda one: one.explained)
         words.append(_next_best(best, chosen))
     else:
         words.append("No other set of effects came near enough to be compared.")
     if not verdict.shown_in_held_out:
-        words.append("The records kept out of the fit do not show it.")
-    words.append("Real records leave more than noise, so that no probability is given.")
+        words.append("The held-out records do not show it.")
+    words.append("No probability is given, because real records leave more than noise.")
     return " ".join(words)
 
 
@@ -90,7 +90,7 @@ def _next_best(best: Hypothesis, chosen: Hypothesis, error_orders: Sequence[floa
     share, gap = percent(best.explained), best.bic - chosen.bic
     label = labels_by_order(best.label, error_orders)
     if share == percent(chosen.explained):
-        share = "as much to a tenth of a per cent"
+        share = "the same share to 0.1 %"
     elif gap > 0.0 and best.explained < chosen.explained:
         return f"The best other explanation, {label}, explains {share}."
     return (
@@ -101,7 +101,7 @@ def _next_best(best: Hypothesis, chosen: Hypothesis, error_orders: Sequence[floa
 
 def _too_little(finding: DriveFinding, nearest: Hypothesis) -> str:
     """Return why the nearest effect is not named."""
-    residual = unexplained(finding.data, finding.verdict.base, nearest.fit)
+    residual = contradicted_parts(finding.data, finding.verdict.base, nearest.fit)
     if residual.any():
         parts = [
             part.replace("_", " ") for part, missed in zip(PARTS, residual, strict=True) if missed
@@ -109,32 +109,32 @@ def _too_little(finding: DriveFinding, nearest: Hypothesis) -> str:
         return f"but not what shows in the {listed(parts)}"
     rules = finding.verdict.rules
     if explains(finding.data, nearest, finding.verdict.base, finding.verdict.degrees_of_freedom):
-        return "but a name needs more than that"
+        return "too little to name it"
     share = rules.exact_share if nearest.exact else rules.explained_share
-    return f"where a name takes {100.0 * share:g} %, or what is left to be noise"
+    return f"while naming it takes {100.0 * share:g} %, or a residual within the noise"
 
 
 def _evidence(finding: DriveFinding, chosen: Hypothesis, share: str) -> list[str]:
     verdict = finding.verdict
     after = chosen.fit.chi_square / verdict.degrees_of_freedom
     words = [
-        f"It explains {share} of the misfit that is not noise; what is left has {after:.3g} times "
-        "the variance of the noise."
+        f"It explains {share} of the misfit beyond noise; the residual has {after:.3g} times the "
+        "variance of the noise."
     ]
     if verdict.leaves_more_than_noise:
         words.append(
-            "That is more than noise: its form is not quite right or more is missing, and values "
-            "may be off by more than their intervals say."
+            "That is more than noise: the form of the law is not quite right or more is missing, "
+            "so values may be off by more than their intervals say."
         )
     orders = finding.campaign.believed.error_orders
     others = _others(verdict, chosen)
     if verdict.equivalent:
         shares = ", ".join(percent(hypothesis.explained) for hypothesis in verdict.equivalent)
-        words.append(f"What these data cannot tell from it explains {shares}.")
+        words.append(f"The indistinguishable alternatives explain {shares}.")
     elif verdict.in_another_form is not None:
         words.append(
-            f"In another form of its law it explains {percent(verdict.in_another_form)}, and "
-            "nothing else that was compared comes down to the noise in any form."
+            f"In another form of its law it explains {percent(verdict.in_another_form)}; no other "
+            "hypothesis reaches the noise in any form."
         )
     elif others:
         best = min(others, key=lambda hypothesis: hypothesis.bic)
@@ -155,18 +155,14 @@ def _evidence(finding: DriveFinding, chosen: Hypothesis, share: str) -> list[str
 def _probably(verdict: Verdict) -> str:
     """Return the probability that a verdict is right, in words."""
     what = {
-        "adequate": "nothing of the list is missing",
+        "adequate": "no effect in the library is missing",
         "class": "one of these is the cause",
-        "partial": "what is named is missing, if not all",
+        "partial": "what is named is missing, though perhaps not all of it",
     }.get(verdict.status, "this is the cause")
     if verdict.status == "class" and verdict.leaves_more_than_noise:
-        what = "one of these is missing, if not all"
+        what = "at least one of these is missing"
     whole = int(100.0 * (verdict.probability or 0.0))
-    return (
-        f"The probability that {what} is {whole} %, by the evidence of "
-        "everything that was compared and by how often such verdicts were right on campaigns with "
-        "a known truth."
-    )
+    return f"Probability that {what}: {whole} % (calibrated on test campaigns)."
 
 
 def _others(verdict: Verdict, chosen: Hypothesis) -> list[Hypothesis]:

@@ -15,7 +15,7 @@ from pymoo_hdte.discrepancy._answers.where.map import Location
 from pymoo_hdte.discrepancy._answers.where.relevance import relevance
 from pymoo_hdte.discrepancy._evidence.order_lines.evidence import PARTS
 from pymoo_hdte.discrepancy._evidence.order_lines.parameters import base_unit, labels_by_order
-from pymoo_hdte.discrepancy._report.words import doubts
+from pymoo_hdte.discrepancy._report.words import doubts, what_is_missing
 from pymoo_hdte.discrepancy._selection.candidate import Candidate, labels_apart
 from pymoo_hdte.discrepancy._selection.fitting import Fit
 from pymoo_hdte.discrepancy._selection.hypothesis import (
@@ -28,7 +28,6 @@ from pymoo_hdte.discrepancy._selection.rules import Rules
 from pymoo_hdte.discrepancy._selection.verdict import Verdict
 from pymoo_hdte.discrepancy._verdicts.drive_finding import DriveFinding
 from pymoo_hdte.discrepancy._verdicts.stated_sensors import scale_error, shares_scale
-from pymoo_hdte.effects.sentence_blanks import joined_sentences
 from pymoo_hdte.effects.unknowns import HARMONIC_NAMES, Parameter, line_with_variance
 
 SCHEMA_VERSION = 1
@@ -59,7 +58,7 @@ def verdict_document(
     """
     verdict = finding.verdict
     matters, orders = relevance(finding, location), finding.campaign.believed.error_orders
-    absent = {"reason": "no held-out record can be predicted, so that nothing can be proved"}
+    absent = {"reason": "no held-out record can be predicted, so the correction is not validated"}
     return {
         "schema_version": SCHEMA_VERSION,
         "campaign": finding.campaign.title,
@@ -114,14 +113,14 @@ def sentence(verdict: Verdict, error_orders: Sequence[float] = ()) -> str:
     """Return the verdict in words; lines of the static error of a drive by their orders."""
     chosen = verdict.chosen
     if verdict.status == "adequate":
-        return "Nothing is missing: the believed drive explains the records within its tolerances."
+        return "Nothing is missing: the nominal drive explains the records within its tolerances."
     if chosen is None:
-        return "Something is missing that no known effect explains."
-    what = joined_sentences([candidate.sentence for candidate in chosen.candidates])
+        return "Something is missing that no effect in the library explains."
+    what = what_is_missing(chosen.candidates)
     if not chosen.listed:
-        return f"Something is missing that is none of the known effects. {what}"
+        return f"What is missing is outside the library. {what}"
     if verdict.status == "unlisted":
-        missing = "Something is missing that no known effect explains"
+        missing = "Something is missing that no effect in the library explains"
         if not verdict.comes_near:
             return f"{missing}, not even half of it."
         return f"{missing}. The nearest is {labels_by_order(chosen.label, error_orders)}."
@@ -129,7 +128,7 @@ def sentence(verdict: Verdict, error_orders: Sequence[float] = ()) -> str:
         what = f"{what} {_or_else([chosen, *verdict.equivalent], error_orders)}"
     if verdict.reasons:
         against = "; ".join(doubts(verdict, error_orders))
-        return f"{what} That is not all, or not quite right: {against}."
+        return f"{what} With caveats: {against}."
     return what
 
 
@@ -140,11 +139,10 @@ def _or_else(sets: Sequence[Hypothesis], error_orders: Sequence[float]) -> str:
     """
     labels = labels_apart([one.candidates for one in sets])
     first, *others = (labels_by_order(one, error_orders) for one in labels)
-    place = "" if labels[0] == sets[0].label else f", in place of {first}"
     whole = label_of(sets[0].candidates)
-    alone = [" alone, which leaves doubts" * (label_of(one.candidates) < whole) for one in sets[1:]]
-    listed = "; or ".join(one + how for one, how in zip(others, alone, strict=True))
-    return f"Or, which these data cannot tell from it{place}: {listed}."
+    alone = [" alone, with caveats" * (label_of(one.candidates) < whole) for one in sets[1:]]
+    listed = " or from ".join(one + how for one, how in zip(others, alone, strict=True))
+    return f"These data cannot distinguish {first} from {listed}."
 
 
 def residual_of_parts(finding: DriveFinding) -> dict[str, dict[str, float]]:
@@ -232,8 +230,8 @@ def _parameters(
     The phase is that of amplitude cos(order theta_in + phase), in the direction of the part fitted.
     """
     found: dict[str, Any] = {}
-    if candidate.frees is not None:
-        rows = [[one.name for one in fitted.parameters].index(candidate.frees)]
+    if candidate.releases is not None:
+        rows = [[one.name for one in fitted.parameters].index(candidate.releases)]
     values, scale = expected_values(fitted, rules), scale_error(fitted, rules)
     for row in rows:
         one = fitted.parameters[row]

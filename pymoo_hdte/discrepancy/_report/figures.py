@@ -76,7 +76,7 @@ def gap_by_channel(proof: Proof) -> Figure:
     # Without a gap the axis would otherwise magnify differences of a few per cent.
     low, high = axis.get_xlim()
     axis.set_xlim(min(low, 0.5), max(high, 10.0))
-    axis.set_xlabel("gap on held-out records / noise floor (dotted: 1)", fontsize=9)
+    axis.set_xlabel("prediction error on held-out records / noise floor", fontsize=9)
     axis.xaxis.set_major_formatter("{x:g}")
     axis.xaxis.set_minor_formatter("")
     return figure
@@ -90,7 +90,7 @@ def gap_by_order(proof: Proof) -> Figure:
     floors = [gap.noise_floor for gap in proof.by_order]
     residual.plot(floors, range(len(floors)), "|", color=GREY, markersize=9, label="noise floor")
     residual.set_xscale("log")
-    residual.set_xlabel("gap of the transmission error [arcsec]")
+    residual.set_xlabel("prediction error [arcsec]")
     residual.set_ylabel("order of the input")
     residual.legend(fontsize=8, frameon=False)
     measured, before, after = proof.dte

@@ -22,7 +22,7 @@ from pymoo_hdte.discrepancy._report.document import (
     with_believed_effects,
 )
 from pymoo_hdte.discrepancy._report.folder import FOLDER
-from pymoo_hdte.discrepancy._report.tables import STATUSES, effect_rows, hypothesis_rows
+from pymoo_hdte.discrepancy._report.tables import effect_rows, hypothesis_rows
 from pymoo_hdte.discrepancy._report.words import doubts
 from pymoo_hdte.discrepancy._verdicts.machine import HeldOutErrors, MachineFinding
 from pymoo_hdte.mechanism.effects import table_of
@@ -55,7 +55,7 @@ def write_machine_report(
         If it cannot be written.
     """
     FOLDER.check(Path(out))
-    verdict, unit_of = finding.verdict, lambda name: finding.data.units.get(name, "1")
+    verdict, unit_of = finding.verdict, lambda name: finding.data.model.units.get(name, "1")
     document = {
         "schema_version": SCHEMA_VERSION,
         "campaign": finding.title,
@@ -71,7 +71,7 @@ def write_machine_report(
             "degrees_of_freedom": verdict.degrees_of_freedom,
             "parameters": base_parameters(verdict.accepted, verdict.rules, unit_of),
         },
-        **with_believed_effects([table_of(effect) for effect in finding.data.known]),
+        **with_believed_effects([table_of(effect) for effect in finding.data.model.known]),
         "location": location.summary(),
         "held_out": {"reason": "no record was held out"} if errors is None else errors.as_dict(),
         "gap_sentence": error_sentence(finding, errors),
@@ -86,7 +86,6 @@ def write_machine_report(
         "pymoo_hdte.discrepancy._report",
         "machine.html.j2",
         document=document,
-        status=STATUSES[verdict.status],
         rows=effect_rows(document["effects"], ()),
         hypotheses=hypothesis_rows(verdict, ()),
         nominal={parameter.name: parameter.start for parameter in finding.data.base},
@@ -100,21 +99,21 @@ def write_machine_report(
 
 def _sentence(finding: MachineFinding) -> str:
     if finding.verdict.status == "adequate":
-        return "Nothing is missing: the model explains the records within its tolerances."
+        return "Nothing is missing: the nominal model explains the records within its tolerances."
     return sentence(finding.verdict)
 
 
 def error_sentence(finding: MachineFinding, errors: HeldOutErrors | None) -> str:
     """Return in words how the error of prediction on held-out records changed."""
     if errors is None:
-        return "No record was held out, so nothing can be said about conditions not fitted."
+        return "No record was held out, so the correction is not validated."
     gap = errors.overall
     before, after = f"{number(gap.before)} times the noise", number(gap.after)
     if not finding.verdict.accepted.candidates:
-        return f"Nothing was added; the model is off by {before} on held-out records."
-    words = f"On held-out records the model was off by {before}; with the correction by {after}."
+        return f"Nothing was added. Prediction error on held-out records: {before}."
+    words = f"Prediction error on held-out records: {before} before, {after} after."
     if gap.shrinkage is not None:
-        words += f" {percent(min(gap.shrinkage, 1.0))} of what noise does not explain is gone."
+        words += f" The correction removes {percent(min(gap.shrinkage, 1.0))} of the excess."
     if errors.growths:
         words += f" Worse than before: {', '.join(errors.growths)}."
     return words

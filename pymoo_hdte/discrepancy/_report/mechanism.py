@@ -23,7 +23,6 @@ from pymoo_hdte.discrepancy._report.mechanism_figures import (
     misfit_over_motion,
     overlay,
 )
-from pymoo_hdte.discrepancy._report.tables import STATUSES
 from pymoo_hdte.discrepancy._report.torsion import torsion_document, torsion_picture
 from pymoo_hdte.discrepancy._verdicts.joint import JointFinding, revised_joint
 from pymoo_hdte.discrepancy._verdicts.mechanism_finding import MechanismFinding
@@ -105,7 +104,6 @@ def _page(
         "pymoo_hdte.discrepancy._report",
         "mechanism.html.j2",
         document=document,
-        status=STATUSES[document["status"]],
         torsion=document.get("torsion"),
         torsion_rows=_effect_rows(document["torsion"]["effects"]) if joint else [],
         rows=rows,
@@ -131,10 +129,10 @@ def _shown(gaps: Sequence[MeasuredGap]) -> MeasuredGap | None:
 def proof_sentence(finding: MechanismFinding, gaps: Sequence[MeasuredGap]) -> str:
     """Return in words the effect of the correction on records that were not fitted."""
     if not gaps:
-        return "No record was held out, so that nothing can be proved."
+        return "No record was held out, so the correction is not validated."
     if not finding.accepted.candidates:
         words = [f"{gap.quantity} by {gap.kind}: {gap.after:.3g} {gap.unit}" for gap in gaps]
-        return f"Nothing was added; the model is off by {', '.join(words)}. {extent_sentence(gaps)}"
+        return f"Nothing was added. Errors: {', '.join(words)}. {extent_sentence(gaps)}"
     words = []
     for kind in ("simulation", "balance"):
         for quantity in dict.fromkeys(gap.quantity for gap in gaps if gap.kind == kind):
@@ -147,7 +145,7 @@ def proof_sentence(finding: MechanismFinding, gaps: Sequence[MeasuredGap]) -> st
             words.append(
                 f"{quantity} by {kind} {change} from {number(before)} to {number(after)} {unit}"
             )
-    return f"Root mean square errors, before and after: {'; '.join(words)}. {extent_sentence(gaps)}"
+    return f"Root mean square errors: {'; '.join(words)}. {extent_sentence(gaps)}"
 
 
 def extent_sentence(gaps: Sequence[MeasuredGap]) -> str:

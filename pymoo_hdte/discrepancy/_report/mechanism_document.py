@@ -62,7 +62,7 @@ def mechanism_verdict_document(
         "limits": limits(finding),
         "record_remarks": record_remarks(finding),
         "held_out": [gap.as_dict() for gap in gaps]
-        or {"reason": "no record was held out, so that nothing can be proved"},
+        or {"reason": "no record was held out, so the correction is not validated"},
         "next_experiment": test.as_dict(),
         "versions": {
             "python": platform.python_version(),
@@ -75,7 +75,7 @@ def _sentence(finding: MechanismFinding) -> str:
     verdict, beyond = finding.verdict, finding.ripples.sentence
     if verdict.status == "adequate":
         return (
-            "Nothing is missing: the believed mechanism explains the records within its tolerances."
+            "Nothing is missing: the nominal mechanism explains the records within its tolerances."
         )
     if verdict.status == "named" and verdict.chosen is None:
         return beyond
@@ -106,16 +106,16 @@ def remainder(finding: MechanismFinding) -> dict[str, Any]:
     after, noise = finding.remainder, finding.sensor_noise
     size = ", ".join(
         f"{one:.3g} {unit_of(finding.mechanism, name)} in the {finding.data.what(name)} "
-        f"({one / max(floor, 1e-300):.2g} times the sensors' noise)"
+        f"({one / max(floor, 1e-300):.2g} times the sensor noise)"
         for name, one, floor in zip(finding.data.names, after, noise, strict=True)
     )
     named = bool(finding.accepted.candidates)
     removed = finding.share_removed if named else 0.0
-    words = f"The model leaves {size}."
+    words = f"The residual is {size}."
     if named:
-        residual = "What is left is" if np.all(after <= noise) else "What nobody explains is"
+        residual = "The residual is" if np.all(after <= noise) else "The unexplained residual is"
         words = (
-            f"It removes {percent(removed)} of the power of the misfit beyond the sensors' "
+            f"The correction removes {percent(removed)} of the misfit's power beyond sensor "
             f"noise. {residual} {size}."
         )
     return {
@@ -155,8 +155,8 @@ def band(finding: MechanismFinding) -> dict[str, Any]:
         "share_of_motion_beyond": motion,
         "share_of_force_beyond": force,
         "sentence": f"Model and records are compared up to {cutoff:.3g} Hz; beyond lie "
-        f"{power(motion)} of the motion's power and {power(force)} of the forces'"
-        f"{', in which only ripple is looked for' if much else ''}.",
+        f"{power(motion)} of the motion's power and {power(force)} of the forces' power"
+        f"{', where only ripple is looked for' if much else ''}.",
     }
 
 
@@ -170,15 +170,14 @@ def limits(finding: MechanismFinding) -> list[str]:
     ]
     found += rests_told(finding)
     found += [
-        f"What force a unit of {one.name} makes is not known: masses, springs, dampers and forces "
-        f"are told in units of {one.name}. Their ratios and the kind of effect are determined, "
-        "their sizes are not."
+        f"The force per unit of {one.name} is not known, so masses, springs, dampers and forces "
+        f"are in units of {one.name}: their ratios are determined, their absolute sizes are not."
         for one in finding.mechanism.inputs
         if not one.scaled
     ]
     found += _not_validated(finding)
     if not any(record.role == "held_out" for record in finding.records):
-        found.append("No record was held out: the correction is not proved where it was not made.")
+        found.append("No record was held out: the correction is not validated.")
     if any(finding.accepted.bound_sides[: len(finding.data.base)]):
         names = [n for n in finding.accepted.at_bounds if n in finding.mechanism.quantities]
         if names:
@@ -194,7 +193,7 @@ def _not_validated(finding: MechanismFinding) -> list[str]:
     sizes = []
     for name in finding.mechanism.coordinates:
         before, after, _ = np.mean([one.powers(name) for one in finding.simulated], axis=0) ** 0.5
-        sizes.append(f"{name} by simulation {before:.3g} without it, {after:.3g} with it")
+        sizes.append(f"{name} by simulation, {before:.3g} without it and {after:.3g} with it")
     return [
         f"{in_words(chosen.label)} would explain the records that were fitted, but "
         f"{in_a_sentence(Reason(NOT_VALIDATED))}: {', '.join(sizes)} (root mean square, SI)."

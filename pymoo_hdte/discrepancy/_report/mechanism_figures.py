@@ -63,7 +63,7 @@ def misfit_over_motion(finding: MechanismFinding) -> Figure:
 def misfit_over_frequency(finding: MechanismFinding) -> Figure:
     """Draw the amplitude density of the residual, beside that of the sensors' noise."""
     names = finding.data.names
-    figure = Figure(figsize=(4.2 * max(len(names), 1), 2.8), layout="constrained")
+    figure = Figure(figsize=(max(4.2 * len(names), 6.4), 3.0), layout="constrained")
     axes = figure.subplots(1, len(names), squeeze=False)[0]
     for part, name in enumerate(names):
         rows = finding.data.rows_of_parts()[part]
@@ -111,7 +111,8 @@ def overlay(finding: MechanismFinding, gap: MeasuredGap) -> Figure:
     upper.plot(time, gap.predicted_before[stride], "--", color=BEFORE, label="before")
     upper.plot(time, gap.predicted_after[stride], "-", color=AFTER, lw=1.0, label="after")
     upper.set_ylabel(f"{gap.quantity} [{gap.unit}]")
-    upper.legend(frameon=False, ncols=3)
+    # Above the axes, where it hides no curve.
+    upper.legend(frameon=False, ncols=3, loc="lower left", bbox_to_anchor=(0.0, 1.0))
     lower.plot(time, (gap.measured - gap.predicted_before)[stride], "--", color=BEFORE)
     lower.plot(time, (gap.measured - gap.predicted_after)[stride], "-", color=AFTER)
     lower.set(xlabel="time [s]", ylabel="difference")
@@ -137,7 +138,7 @@ def gaps(found: Sequence[MeasuredGap]) -> Figure:
         range(len(found)), [f"{gap.record}: {gap.quantity}, {gap.kind}" for gap in found]
     )
     axis.invert_yaxis()
-    axis.set(xlabel="gap over the gap before")
+    axis.set(xlabel="prediction error / error before")
     axis.legend(frameon=False, fontsize=8, ncols=3, loc="lower left", bbox_to_anchor=(0.0, 1.0))
     _plain(axis)
     return figure

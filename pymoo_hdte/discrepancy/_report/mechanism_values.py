@@ -51,16 +51,16 @@ def ripples(finding: MechanismFinding) -> list[dict[str, Any]]:
 
 
 def _unit(mechanism: Mechanism, candidate: Candidate, name: str) -> str:
-    if candidate.frees is not None or candidate.unit is None:
+    if candidate.releases is not None or candidate.unit is None:
         return base_unit(mechanism, name)
     return unit_of_number(mechanism, candidate.port, name, candidate.unit(name))
 
 
 def _rows(fitted: Fit, candidate: Candidate, rows: range) -> range:
     """Return the rows of a candidate's parameters, or of the quantity that it frees."""
-    if candidate.frees is None:
+    if candidate.releases is None:
         return rows
-    place = [one.name for one in fitted.parameters].index(candidate.frees)
+    place = [one.name for one in fitted.parameters].index(candidate.releases)
     return range(place, place + 1)
 
 

@@ -87,9 +87,9 @@ class OptimumShift:
             for mean, std in (choice.promised, choice.delivered, choice.reached)
         )
         judged = (
-            f"The old balanced design was promised {promised}; by the revised model it has "
-            f"{delivered}"
+            f"The old model predicted {promised} for its balanced design; the revised model "
+            f"predicts {delivered}"
         )
         if choice.stays:
-            return f"{judged}, as good as the best. The balanced design stays where it was."
-        return f"{judged}, and the new one reaches {reached}."
+            return f"{judged}, as good as its best. The balanced design stays where it was."
+        return f"{judged}. The new balanced design reaches {reached}."

@@ -42,16 +42,6 @@ METRICS = {
     "mean_error": "mean error",
 }
 
-STATUSES = {
-    "adequate": "nothing missing",
-    "named": "found",
-    "class": "one of several",
-    "parameter": "believed value wrong",
-    "unlisted": "unknown effect",
-    "partial": "found in part",
-}
-"""Words for the status of a verdict."""
-
 _HARMONICS = tuple(name.replace("_", " ") for name in HARMONIC_NAMES if name)
 
 
@@ -226,8 +216,8 @@ def _shown(unit: str) -> str:
 
 def _role(verdict: Verdict, hypothesis: Hypothesis) -> str:
     if hypothesis is verdict.chosen:
-        return "best known, but not enough" if verdict.status == "unlisted" else "chosen"
-    return "cannot be told apart" if verdict.is_equivalent(hypothesis) else "rejected"
+        return "nearest, not enough" if verdict.status == "unlisted" else "chosen"
+    return "indistinguishable" if verdict.is_equivalent(hypothesis) else "rejected"
 
 
 _MOST_FAULTS = 50
@@ -292,13 +282,13 @@ def rows_sentence(findings: RowFindings) -> str:
     replaced = [one for one in findings.noise if one.replaced]
     for zero in (one for one in replaced if one.name.endswith("_zero")):
         words.append(
-            f"The {_name(zero)} drifts, so that it counts as known to {zero.used:.2g} {zero.unit} "
-            f"instead of {zero.stated:.2g} {zero.unit}."
+            f"The {_name(zero)} drifts, so its uncertainty is taken as {zero.used:.2g} {zero.unit} "
+            f"instead of the stated {zero.stated:.2g} {zero.unit}."
         )
     changed = [one for one in replaced if not one.name.endswith("_zero")]
     if changed:
         ratios = listed([f"{one.used / one.stated:.2g} times ({_name(one)})" for one in changed])
-        words.append(f"The noise is not the stated one but {ratios}; what was found is used.")
+        words.append(f"The noise is {ratios} the stated one; the measured noise is used.")
     sentence = " ".join(words)
     return sentence[:1].upper() + sentence[1:]
 
@@ -318,12 +308,12 @@ def _treatment(findings: RowFindings) -> str:
     if "settling" in modelled:
         done.append("the decay at the beginning is fitted with the order lines")
         if hidden := sum(map(_hidden, findings.faults)):
-            done[-1] += f", also in {hidden} more, where noise may hide it"
+            done[-1] += f", also in {hidden} more records, where noise may hide it"
     if "new zero" in modelled:
         done.append("records with a new zero are shifted back")
     if "drift" in modelled:
         largest = max(abs(one.size) for one in findings.faults if one.kind == "drift")
-        done.append(f"drifts of up to {largest:.2g} N.m are taken out")
+        done.append(f"drifts of up to {largest:.2g} N.m are removed")
     if findings.left_out:
         done.append(f"left out as a whole: {listed(list(findings.left_out))}")
     return "; ".join(done) or "nothing had to be left out"

@@ -83,10 +83,10 @@ def _unnamed(finding: JointFinding) -> list[str]:
     if verdict.accepted is not verdict.base or not near:
         return []
     words = "; or ".join(in_words(one.label) for one in near)
-    told = f"What was fitted would also be explained by {words}"
+    told = f"The fitted records could be explained by {words}"
     if verdict.has_reason(NOT_VALIDATED):
         told += f"; but {in_a_sentence(Reason(NOT_VALIDATED))} with the best of them"
-    return [f"{told}: none is named."]
+    return [f"{told}. None is named."]
 
 
 def torsion_sentence(finding: JointFinding) -> str:
@@ -98,13 +98,13 @@ def torsion_sentence(finding: JointFinding) -> str:
         for one, _ in errors_of(torsion.ripples)
     )
     if verdict.status == "adequate":
-        return f"Beside the spring of the {gear} nothing is missing."
+        return f"Nothing is missing in the torsion of the {gear}: its spring explains it."
     if verdict.chosen is None and verdict.status == "named":
         return lines
     words = sentence(verdict)
     if verdict.rivals_beyond:
-        words = f"{' '.join(one.sentence for one in verdict.accepted.candidates)} Or, which these "
-        words += "data cannot tell from it: the readings of the two encoders are apart in time."
+        words = f"{' '.join(one.sentence for one in verdict.accepted.candidates)} These data "
+        words += "cannot distinguish it from a time delay between the two encoders."
     return f"{words} {lines}".strip()
 
 
@@ -116,7 +116,7 @@ def _location(finding: JointFinding) -> str:
         float(one[0]) / finding.stiffness / ARCSEC
         for one in (torsion.base_misfit, torsion.sensor_noise)
     )
-    return f"In the torsion of the {gear} (off by {off:.3g} arcseconds, sensors {noise:.2g})."
+    return f"In the torsion of the {gear} (error {off:.3g} arcseconds, sensor noise {noise:.2g})."
 
 
 def _effects(finding: JointFinding) -> list[dict[str, Any]]:
@@ -202,11 +202,11 @@ def _remainder(finding: JointFinding) -> dict[str, Any]:
     arcseconds = left / finding.stiffness / ARCSEC
     named = bool(torsion.accepted.candidates)
     removed = torsion.share_removed if named else 0.0
-    words = f"The model leaves {arcseconds:.3g} arcseconds of the torsion, {left:.3g} N.m"
+    words = f"The residual is {arcseconds:.3g} arcseconds of torsion, {left:.3g} N.m"
     if named:
-        words = f"It removes {100.0 * removed:.3g} % of the power of the misfit and leaves "
-        words += f"{arcseconds:.3g} arcseconds of the torsion, {left:.3g} N.m"
-    words += f" over its stiffness ({left / max(noise, 1e-300):.2g} times the sensors' noise)."
+        words = f"The correction removes {100.0 * removed:.3g} % of the misfit's power and leaves "
+        words += f"{arcseconds:.3g} arcseconds of torsion, {left:.3g} N.m"
+    words += f" over its stiffness ({left / max(noise, 1e-300):.2g} times the sensor noise)."
     return {
         "sentence": words,
         "share_removed": removed,
@@ -217,15 +217,15 @@ def _remainder(finding: JointFinding) -> dict[str, Any]:
 
 def _proof(finding: JointFinding) -> str:
     if not finding.gaps:
-        return "No record was held out, so that nothing can be proved."
+        return "No record was held out, so the correction is not validated."
     before, after, floor = (
         float(np.sqrt(np.mean([getattr(gap, one) ** 2 for gap in finding.gaps]))) / ARCSEC
         for one in ("before", "after", "noise_floor")
     )
     measured = float(np.sqrt(np.mean([np.var(gap.measured) for gap in finding.gaps]))) / ARCSEC
-    told = f"of {measured:.3g} arcseconds that were measured; the encoders' noise is {floor:.2g}"
+    told = f"of {measured:.3g} arcseconds measured; encoder noise is {floor:.2g}"
     if not finding.torsion.accepted.candidates:
-        return f"Nothing was added; the held-out torsion is off by {before:.3g} {told}."
+        return f"Nothing was added. The error of the held-out torsion is {before:.3g} {told}."
     how = "falls" if after < before else "does not fall,"
     return f"The error of the held-out torsion {how} from {before:.3g} to {after:.3g} {told}."
 

@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 
 from pymoo_hdte.discrepancy._evidence.order_lines.parameters import labels_by_order
 from pymoo_hdte.discrepancy._selection import reason as codes
+from pymoo_hdte.discrepancy._selection.candidate import Candidate
 from pymoo_hdte.discrepancy._selection.reason import Reason
 from pymoo_hdte.discrepancy._selection.verdict import Verdict
 from pymoo_hdte.effects.sentence_blanks import listed
@@ -21,40 +22,54 @@ _SENTENCES: dict[str, Callable[[Reason, Label], str]] = {
         f"the interval of {label(reason.effect)} contains zero"
     ),
     codes.FREED_AT_BOUND: lambda reason, label: (
-        "a base parameter ended at ten times or a tenth of what is believed"
+        "a base parameter ended at ten times or a tenth of its nominal value"
     ),
     codes.SENSOR_AT_BOUND: lambda reason, label: (
-        f"{reason.effect.replace('_', ' ')} ended far beyond what is stated of it"
+        f"{reason.effect.replace('_', ' ')} ended far outside its stated limits"
     ),
     codes.STANDS_FOR_FORM: lambda reason, label: (
-        f"values out of tolerance may stand for what {label(reason.effect)} leaves"
+        f"values out of tolerance may stand for the residual of {label(reason.effect)}"
     ),
     codes.HARMONIC_OF_ANOTHER: lambda reason, label: (
         f"{label(reason.effect)} may be a harmonic of {label(*reason.names)}"
     ),
     codes.NOT_VALIDATED: lambda reason, label: (
-        "the error on the records kept out of the fit does not shrink as it should"
+        "the prediction error on the held-out records does not shrink as it should"
     ),
     codes.HELD_OUT_ERROR_GROWS: lambda reason, label: (
-        f"the error on records kept out of the fit grows: {listed(reason.names)}"
+        f"the prediction error on held-out records grows: {listed(reason.names)}"
     ),
     codes.ABOVE_NOISE: lambda reason, label: (
-        f"what is left is {dict(reason.numbers)['times_noise']:.3g} times the noise"
+        f"the unexplained residual is {dict(reason.numbers)['times_noise']:.3g} times the noise"
     ),
     codes.NEEDS_ANOTHER_FORM: lambda reason, label: (
-        f"{label(reason.effect)} has to have another form to explain what is left"
+        f"{label(reason.effect)} needs another form to explain the residual"
     ),
     codes.EXPLAINS_TOO_LITTLE: lambda reason, label: (
         f"it explains {100.0 * dict(reason.numbers)['share']:.0f} % of the misfit, "
-        "less than a name takes"
+        "too little to name it alone"
     ),
     codes.RICHER_AT_BOUND: lambda reason, label: (
-        f"{label(reason.effect)} leaves less, but its {', '.join(reason.names)} ended at a bound"
+        f"{label(reason.effect)} fits better, but its {', '.join(reason.names)} ended at a bound"
     ),
     codes.AT_TOLERANCE: lambda reason, label: (
         f"{reason.effect} ended at the bound of its tolerance"
     ),
 }
+
+
+def what_is_missing(candidates: Sequence[Candidate]) -> str:
+    """Return the sentences of effects, values out of tolerance as one.
+
+    Parameters
+    ----------
+    candidates : sequence of Candidate
+    """
+    released = [candidate.released for candidate in candidates if candidate.released]
+    if len(released) < 2:
+        return " ".join(candidate.sentence for candidate in candidates)
+    effects = [candidate.sentence for candidate in candidates if not candidate.released]
+    return " ".join([*effects, f"The {listed(released)} lie outside their tolerances."])
 
 
 def in_a_sentence(reason: Reason, label: Label = str) -> str:

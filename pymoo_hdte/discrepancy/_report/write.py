@@ -32,7 +32,6 @@ from pymoo_hdte.discrepancy._report.figures import (
 from pymoo_hdte.discrepancy._report.folder import FOLDER
 from pymoo_hdte.discrepancy._report.optimum import OptimumShift
 from pymoo_hdte.discrepancy._report.tables import (
-    STATUSES,
     effect_rows,
     fault_rows,
     hypothesis_rows,
@@ -166,7 +165,6 @@ def _page(
         document=document,
         location=location,
         proof=proof,
-        status=STATUSES[finding.verdict.status],
         effects=effect_rows(document["effects"], orders),
         certainty=how_sure(finding),
         next_test=document["next_experiment"]["description"],
@@ -191,24 +189,26 @@ _SHOWN = 3
 
 
 def gap_sentence(finding: DriveFinding, proof: Proof | None) -> str:
-    """Return how much the gap shrank on held-out records, in words."""
+    """Return how much the prediction error on held-out records shrank, in words."""
     if proof is None:
-        return "No record was held out, so nothing can be said about conditions not fitted."
+        return "No record was held out, so the correction is not validated."
     gap = proof.channels[proof.leading]
     records = f"{len(proof.records)} held-out record{'s' if len(proof.records) > 1 else ''}"
     where = f"{records}, {proof.leading.replace('_', ' ')}"
-    noise = f"noise alone {number(gap.noise_floor)} {gap.unit}"
+    noise = f"(noise alone: {number(gap.noise_floor)})"
     if not finding.verdict.accepted.candidates:
-        return f"Nothing was added. On {where}: off by {number(gap.before)} {gap.unit}, {noise}."
-    words = f"On {where}: off by {number(gap.before)} before, {number(gap.after)} after, {noise}"
+        size = f"{number(gap.before)} {gap.unit} {noise}"
+        return f"Nothing was added. On {where}: prediction error {size}."
+    words = f"On {where}: prediction error {number(gap.before)} {gap.unit} before, "
+    words += f"{number(gap.after)} after {noise}"
     if gap.shrinkage is not None:
-        words += f"; {percent(min(gap.shrinkage, 1.0))} of what the noise does not explain is gone"
+        words += f"; the correction removes {percent(min(gap.shrinkage, 1.0))} of the excess"
     error = proof.channels["transmission_error"]
     if error is not gap:
         words += (
-            f". Transmission error: {number(error.before)} before, {number(error.after)} after, "
+            f". Transmission error: {number(error.before)} {error.unit} before, "
+            f"{number(error.after)} after (noise alone: {number(error.noise_floor)})"
         )
-        words += f"noise alone {number(error.noise_floor)} {error.unit}"
     return f"{words}.{_worse(proof)}"
 
 

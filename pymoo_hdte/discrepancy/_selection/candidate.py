@@ -1,7 +1,7 @@
 """A candidate: one effect that a verdict can name, with its unknowns, ranges and sentence.
 
 A candidate turns a vector of values into effects of a model of the machine. It is made from a guess
-of its effect: see `pymoo_hdte.effects.guess`.
+of its effect, as `pymoo_hdte.effects.guess` describes it.
 """
 
 from __future__ import annotations
@@ -29,39 +29,41 @@ class Candidate:
     ----------
     name, port : str
     parameters : tuple of Parameter
-        Its unknowns; ``start`` is a typical strength.
+        Unknowns of the effect; ``start`` is a typical strength.
     starts : tuple of tuple of float
         Values from which the joint fit starts, and the directions that the screening tries.
     build : callable
-        From values to its effects in the model.
+        Function from values to the effects in the model.
     sentence : str
-        What it is, for the report.
+        Description for the report.
     order : float or None
-        Cycles per input turn, where the candidate has one.
+        Cycles per input turn, if the candidate has an order.
     exact : bool
-        Whether its form is known exactly, so that it must explain the misfit down to the noise;
-        real curves of friction or stiffness follow those of the library only approximately.
+        Whether its form is known exactly, so that it must explain the misfit down to the noise.
+        Real curves of friction or stiffness follow those of the library only approximately.
     listed : bool
-        Whether a verdict may name it; if not, it serves to keep the misfit that it explains from
-        being attributed to another effect.
-    frees : str or None
-        Base parameter that it frees of its tolerance.
+        Whether a verdict may name it. If not, it keeps the misfit that it explains from being
+        attributed to another effect.
+    releases : str or None
+        Base parameter that it releases from its tolerance.
+    released : str
+        That parameter in words; empty for an effect.
     acts_at : str
         Port at which that parameter makes a torque, if it is at a port.
     covered_by, covered_at : str
-        Name and port of the effect that says the same as that parameter out of tolerance, if any.
+        Name and port of the effect equivalent to that parameter out of tolerance, if any.
     form : str
-        In a word, where the library holds several forms of one effect.
+        Name of its form, if the library holds several forms of the effect.
     remembers : bool
         Whether its force depends on the previous motion, which a model follows less exactly.
     instead_of : tuple of str
-        Names of the effects in whose place alone it is tried; a search leaves it out.
+        Names of the effects that it may replace. A search does not try it otherwise.
     among : int
-        Number of candidates from which it differs only by a number that no fit follows.
+        Number of candidates that differ only by a number that no fit follows, itself included.
     unit : callable or None
-        From an unknown, or the line whose cosine and sine parts two of them are, to its SI unit.
+        Function from the name of an unknown, or of a line, to its SI unit.
     effect : Effect or None
-        From which it is made; of a base parameter out of its tolerance the one that says the same.
+        Effect from which it is made; for a base parameter out of tolerance, the equivalent effect.
     """
 
     name: str
@@ -73,7 +75,8 @@ class Candidate:
     order: float | None = None
     exact: bool = False
     listed: bool = True
-    frees: str | None = None
+    releases: str | None = None
+    released: str = ""
     acts_at: str = ""
     covered_by: str = ""
     covered_at: str = ""
@@ -92,46 +95,49 @@ class Candidate:
         return f"{self.name}{form}:{self.port}{order}"
 
     @property
-    def says(self) -> tuple[str, str]:
-        """Name and port; of a value out of tolerance, those of the effect that says the same."""
+    def named_effect(self) -> tuple[str, str]:
+        """Name and port; for a value out of tolerance, those of the equivalent effect."""
         if self.covered_by:
             return self.covered_by, self.covered_at
         return self.name, self.port
 
     @property
     def places(self) -> frozenset[Place]:
-        """Places of its effects in a drive model, which takes one of a name at each place."""
+        """Places of its effects in a drive model; each place takes one effect of a name."""
         return frozenset(place_of(effect) for effect in self.build(self.starts[0]))
 
-    def goes_with(self, other: Candidate) -> bool:
+    def goes_with(self, candidate: Candidate) -> bool:
         """Tell whether a drive may have both: no two effects at one place, nor forms of one."""
-        forms = self.form != other.form and (self.name, self.port) == (other.name, other.port)
-        return not (forms or self.places & other.places)
+        forms = self.form != candidate.form and (self.name, self.port) == (
+            candidate.name,
+            candidate.port,
+        )
+        return not (forms or self.places & candidate.places)
 
-    def beside(self, other: Candidate) -> bool:
+    def shares_port_with(self, candidate: Candidate) -> bool:
         """Tell whether both act at one port, where one may stand for the form of the other."""
-        return (self.acts_at or self.port) == (other.acts_at or other.port)
+        return (self.acts_at or self.port) == (candidate.acts_at or candidate.port)
 
     def replaces(self, member: Candidate) -> bool:
-        """Tell whether it is tried in the place of another: at its port, or with a memory."""
+        """Tell whether it may replace an effect, which is at the same port or has a memory."""
         named = member.name != self.name and member.name in self.instead_of
         return named and (member.port == self.port or member.remembers)
 
     @property
     def only_as_form(self) -> bool:
-        """Whether it is tried only in the place of another form of the same effect."""
+        """Whether it is tried only instead of another form of the same effect."""
         return self.name in self.instead_of
 
-    def holds(self, other: Candidate) -> bool:
+    def holds(self, special: Candidate) -> bool:
         """Tell whether another effect is a special case of this one, or of this form of it."""
-        return is_contained(other.name, self.name) or (
-            self.form != "" and is_contained(other.name, f"{self.name}/{self.form}")
+        return is_contained(special.name, self.name) or (
+            self.form != "" and is_contained(special.name, f"{self.name}/{self.form}")
         )
 
     def is_form_of(self, member: Candidate) -> bool:
         """Tell whether it is another form of an effect, or of the one that covers a parameter.
 
-        The times of a new zero are forms, too, of which each is one among many: not of these.
+        The times at which a zero may change are forms too, but do not count as such here.
         """
         if self.form == member.form or self.among > 1:
             return False
@@ -140,9 +146,9 @@ class Candidate:
         return (self.name, self.port) == (member.name, member.port)
 
     def stands_for(self, member: Candidate, any_curve: bool) -> bool:
-        """Tell whether it may be what an effect is: another form of it, or its special case there.
+        """Tell whether it may replace an effect: as another form, or as a special case at its port.
 
-        With ``any_curve`` a curve may be any other at its port that is not tried as a form only.
+        With ``any_curve`` any curve may replace another at its port, unless it is `only_as_form`.
         """
         curve = any_curve and member.is_curve and self.is_curve and not self.only_as_form
         special = self.port == member.port and (curve or member.holds(self))
@@ -150,16 +156,16 @@ class Candidate:
 
     @property
     def linear(self) -> bool:
-        """Whether a prediction is close to linear in all its unknowns: parts of lines, and levels.
+        """Whether predictions are close to linear in all its unknowns: parts of lines, and levels.
 
-        Each of `starts` then changes one of them.
+        Each of `starts` then changes one unknown.
         """
-        return all(one.linear for one in self.parameters)
+        return all(parameter.linear for parameter in self.parameters)
 
     @property
     def lines(self) -> list[NDArray[np.int_]]:
-        """Where cosine and sine part of each line of its law stand among its parameters, (2,)."""
-        begins = [row for row, one in enumerate(self.parameters) if one.begins_line]
+        """Indices of the cosine and sine part of each line among its parameters, shape (2,)."""
+        begins = [row for row, parameter in enumerate(self.parameters) if parameter.begins_line]
         return [np.array([row, row + 1]) for row in begins]
 
     @property
@@ -169,13 +175,16 @@ class Candidate:
 
     @property
     def unknowns(self) -> int:
-        """Number of parameters that it adds to a fit or sets free."""
-        return len(self.parameters) + (self.frees is not None)
+        """Number of parameters that it adds to a fit or releases."""
+        return len(self.parameters) + (self.releases is not None)
 
     def outside(self, base: Sequence[Parameter], values: NDArray[np.float64]) -> bool:
-        """Tell whether the base parameter that it frees lies outside its tolerance."""
+        """Tell whether the base parameter that it releases lies outside its tolerance.
+
+        ``base`` are the parameters of the base, ``values`` begins with theirs.
+        """
         for parameter, value in zip(base, values, strict=False):
-            if parameter.name == self.frees:
+            if parameter.name == self.releases:
                 return not parameter.lower <= value <= parameter.upper
         return False
 
@@ -194,12 +203,12 @@ def candidate_of(
     ----------
     effect : Effect
     guess : Guess
-        The form that it may have.
+        Form that the effect may have.
     port : str
     force : str
         Word for what acts at the port.
     standing : callable
-        From the name of an effect, port and law (or other change) to an effect of a model.
+        Function from the name of an effect, its port and its law to an effect of a model.
     slower : float
         Turns of the reference shaft, to which orders refer, per turn of the port.
     """
@@ -231,14 +240,14 @@ def candidate_of(
 def out_of_tolerance(
     name: str, words: str, acts_at: str = "", covering: Effect | None = None
 ) -> Candidate:
-    """Return the candidate that frees a base parameter, called ``words``, of its tolerance.
+    """Return the candidate that releases a base parameter, called ``words``, from its tolerance.
 
     Parameters
     ----------
     name, words, acts_at : str
         See `Candidate`.
     covering : Effect or None
-        That says the same.
+        Effect that is equivalent to this parameter out of tolerance.
     """
     return Candidate(
         "parameter",
@@ -248,7 +257,8 @@ def out_of_tolerance(
         _no_effect,
         out_of_tolerance_sentence(words),
         exact=True,
-        frees=name,
+        releases=name,
+        released=words,
         acts_at=acts_at,
         covered_by=covering.name if covering else "",
         covered_at=covering.sought_at[0] if covering else "",
@@ -257,18 +267,18 @@ def out_of_tolerance(
 
 
 def labels_apart(sets: Sequence[Sequence[Candidate]]) -> list[str]:
-    """Return the label of each set without what all of them share.
+    """Return the label of each set without what all sets share.
 
-    The whole labels if nothing of one would be left. A set may have one effect twice.
+    Whole labels are returned if nothing would remain of one. A set may have an effect twice.
     """
-    labels = [[candidate.label for candidate in one] for one in sets]
+    labels = [[candidate.label for candidate in members] for members in sets]
     shared = reduce(Counter.__and__, map(Counter, labels))
-    own = [list((Counter(each) - shared).elements()) for each in labels]
-    return ["+".join(one) for one in (own if all(own) else labels)]
+    remaining = [list((Counter(members) - shared).elements()) for members in labels]
+    return ["+".join(names) for names in (remaining if all(remaining) else labels)]
 
 
 def _no_effect(values: Sequence[float]) -> tuple[Any, ...]:
-    """Return nothing: a base parameter out of tolerance is no effect."""
+    """Return no effects: a base parameter out of tolerance is none."""
     return ()
 
 

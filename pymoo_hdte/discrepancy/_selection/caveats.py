@@ -1,4 +1,4 @@
-"""What forbids to name a set of effects plainly."""
+"""Reasons why a set of effects cannot be named without qualification."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.stats import chi2, norm
 
 from pymoo_hdte.discrepancy._selection.candidate import Candidate
-from pymoo_hdte.discrepancy._selection.excess import Vote
+from pymoo_hdte.discrepancy._selection.excess import HeldOutTest
 from pymoo_hdte.discrepancy._selection.fitted_sets import beyond_stated
 from pymoo_hdte.discrepancy._selection.fitting import Fit
 from pymoo_hdte.discrepancy._selection.hypothesis import (
@@ -35,62 +35,62 @@ from pymoo_hdte.discrepancy._selection.rules import Rules
 from pymoo_hdte.discrepancy._selection.search import Search
 
 
-def reasons_of(search: Search, chosen: Hypothesis, vote: Vote | None) -> list[Reason]:
-    """Return what forbids to name a set plainly; nothing if it may be named."""
-    found, fitted = [], chosen.fit
+def reasons_of(search: Search, chosen: Hypothesis, held_out: HeldOutTest | None) -> list[Reason]:
+    """Return why a set cannot be named without qualification; nothing if it can."""
+    reasons, fitted = [], chosen.fit
     unsure = uncertain(fitted, search.data.rules)
     for candidate, bounded in bounded_unknowns(fitted):
         if bounded:
-            found.append(Reason.of(AT_BOUND, candidate.label, bounded))
+            reasons.append(Reason.of(AT_BOUND, candidate.label, bounded))
         elif candidate in unsure:
-            found += holds_zero([candidate])
-    if freed := _freed_at_bounds(chosen):
-        found.append(Reason.of(FREED_AT_BOUND, numbers=freed))
+            reasons += holds_zero([candidate])
+    if released := _released_at_bounds(chosen):
+        reasons.append(Reason.of(FREED_AT_BOUND, numbers=released))
     for name in _contradicted_in_any_form(search, chosen):
-        found.append(Reason(SENSOR_AT_BOUND, name))
-    curves = [one.label for one in chosen.candidates if not one.exact]
+        reasons.append(Reason(SENSOR_AT_BOUND, name))
+    curves = [candidate.label for candidate in chosen.candidates if not candidate.exact]
     if not search.enough(chosen):
-        if curves and chosen.freed:
-            found.append(Reason(STANDS_FOR_FORM, curves[0]))
-        found += _harmonics_of_another(chosen.candidates)
-    if vote is not None and vote.denies(search.data.rules, fitted.misfit):
-        found.append(Reason(NOT_VALIDATED))
+        if curves and chosen.released:
+            reasons.append(Reason(STANDS_FOR_FORM, curves[0]))
+        reasons += _harmonics_of_another(chosen.candidates)
+    if held_out is not None and held_out.denies(search.data.rules, fitted.misfit):
+        reasons.append(Reason(NOT_VALIDATED))
     per_degree = fitted.chi_square / search.degrees_of_freedom
     if per_degree > search.data.rules.contradicting_chi_square:
-        found.append(above_noise(per_degree))
-    return found
+        reasons.append(above_noise(per_degree))
+    return reasons
 
 
 def other_forms(search: Search, chosen: Hypothesis) -> list[Reason]:
-    """Return which members stand for what their listed forms do not explain.
+    """Return which members explain the misfit only in another form than the listed one.
 
-    All together where the listed forms contradict a part of the data and only others do not.
+    It is all members together if the listed forms contradict a part of the data and others do not.
     """
     members = chosen.members if len(chosen.members) > 1 else []
-    found = [
-        "+".join(one.label for one in member)
+    labels = [
+        "+".join(candidate.label for candidate in member)
         for member in members
-        if search.forms.only_in_another(chosen, search.without(chosen, member))
+        if search.forms.only_in_another_form(chosen, search.without(chosen, member))
     ]
-    if not found and not explains_as_listed(search, chosen):
+    if not labels and not explains_as_listed(search, chosen):
         forms = search.forms
-        if forms.explains(chosen) or forms.explains_in_another(chosen):
-            found = [chosen.label]
-    return [Reason(NEEDS_ANOTHER_FORM, label) for label in found]
+        if forms.explains(chosen) or forms.explains_in_another_form(chosen):
+            labels = [chosen.label]
+    return [Reason(NEEDS_ANOTHER_FORM, label) for label in labels]
 
 
-def explains_in_any_form(search: Search, one: Hypothesis) -> bool:
+def explains_in_any_form(search: Search, hypothesis: Hypothesis) -> bool:
     """Tell whether a set explains the misfit, in the listed forms of its laws or in others."""
-    return explains_as_listed(search, one) or search.forms.explains(one)
+    return explains_as_listed(search, hypothesis) or search.forms.explains(hypothesis)
 
 
-def explains_as_listed(search: Search, one: Hypothesis) -> bool:
+def explains_as_listed(search: Search, hypothesis: Hypothesis) -> bool:
     """Tell whether a set explains the misfit in the listed forms of its laws."""
-    return explains(search.data, one, search.base, search.degrees_of_freedom)
+    return explains(search.data, hypothesis, search.base, search.degrees_of_freedom)
 
 
 def _harmonics_of_another(candidates: Sequence[Candidate]) -> list[Reason]:
-    """Return which effects may be no more than harmonics of the form of another.
+    """Return which effects may be mere harmonics of another effect's form.
 
     A clearance that varies once in some angle need not do so as a cosine; its harmonics look like
     an error of their order. Effects that fit down to the noise as listed leave no such choice.
@@ -110,68 +110,73 @@ def is_harmonic(higher: float, order: float) -> bool:
 
 
 def above_noise(per_degree: float) -> Reason:
-    """Return what a chi-square per degree of freedom means."""
+    """Return that more than noise is left, for a chi-square per degree of freedom."""
     return Reason.of(ABOVE_NOISE, numbers={"times_noise": np.sqrt(per_degree)})
 
 
-def _freed_at_bounds(chosen: Hypothesis) -> dict[str, float]:
-    """Return the base values that a set frees and that ended at a bound."""
+def _released_at_bounds(chosen: Hypothesis) -> dict[str, float]:
+    """Return the base values that a set releases and that ended at a bound."""
     fitted = chosen.fit
-    freed = {one.frees for one in chosen.candidates} & set(fitted.at_bounds)
+    released = {candidate.releases for candidate in chosen.candidates} & set(fitted.at_bounds)
     # Parameters of effects follow those of the base, and may have the same names.
     named = reversed([*zip(fitted.parameters, fitted.values, strict=True)])
-    return {one.name: float(value) for one, value in named if one.name in freed}
+    return {
+        parameter.name: float(value) for parameter, value in named if parameter.name in released
+    }
 
 
 def _contradicted_in_any_form(search: Search, chosen: Hypothesis) -> list[str]:
-    """Return what is `_contradicted` by a set, and not by the listed forms of its laws alone.
+    """Return which sensors a set contradicts in every form of its laws.
 
-    A friction that falls as no listed one does is fitted best with a wrong gain. If in a free form
-    of several laws all sensors are as stated and noise is left, which is so in no form without one
-    of these laws, the gain stood for their forms. One law in any form follows too much alone.
+    Friction that falls as no listed one does is fitted best with a wrong gain. If several laws in a
+    free form leave only noise with all sensors as stated, and fewer laws do not, the gain stood for
+    the form. A single law in a free form can follow too much to show this.
     """
     rules, forms = search.data.rules, search.forms
-    found = _contradicted(chosen.fit, rules)
-    if not found or len(chosen.members) < 2:
-        return found
-    free = forms.in_free_form(chosen.fit)
-    if not forms.rest_is_noise(free) or beyond_stated(free, rules).any():
-        return found
-    fewer = [search.without(chosen, one).fit for one in chosen.members]
-    every = [*fewer, *map(forms.in_free_form, fewer)]
-    return found if any(map(forms.rest_is_noise, every)) else []
+    names = _contradicted(chosen.fit, rules)
+    if not names or len(chosen.members) < 2:
+        return names
+    free_fit = forms.in_free_form(chosen.fit)
+    if not forms.unexplained_is_noise(free_fit) or beyond_stated(free_fit, rules).any():
+        return names
+    simpler_fits = [search.without(chosen, member).fit for member in chosen.members]
+    every = [*simpler_fits, *map(forms.in_free_form, simpler_fits)]
+    return names if any(map(forms.unexplained_is_noise, every)) else []
 
 
 def _contradicted(fitted: Fit, rules: Rules) -> list[str]:
-    """Return what ended at a bound far beyond its stated deviation: a sensor's zero or gain.
+    """Return the zeros and gains of sensors that ended at a bound far beyond what is stated.
 
-    It then takes what the effects leave, and what they are is not known.
+    They then absorb what the effects leave, so that the effects are not certain.
     """
-    far = beyond_stated(fitted, rules)
+    excess = beyond_stated(fitted, rules)
     return [
-        one.name
-        for one, side, away in zip(fitted.parameters, fitted.bound_sides, far, strict=True)
-        if side != 0.0 and away
+        parameter.name
+        for parameter, side, beyond in zip(
+            fitted.parameters, fitted.bound_sides, excess, strict=True
+        )
+        if side != 0.0 and beyond
     ]
 
 
 def uncertain(
     fitted: Fit, rules: Rules, covariance: NDArray[np.float64] | None = None
 ) -> list[Candidate]:
-    """Return the candidates of a fit whose strength may be nothing.
+    """Return the candidates of a fit whose strength may be zero.
 
-    By its own covariance, or by another one that reports state, shape (n_parameters, n_parameters).
+    ``covariance``, shape (n_parameters, n_parameters), is that of the fit unless a report states
+    another one.
     """
     return [
-        one
-        for one, place in fitted.places
-        if not strength_is_certain(fitted, one, place, rules, covariance)
+        candidate
+        for candidate, place in fitted.places
+        if not strength_is_certain(fitted, candidate, place, rules, covariance)
     ]
 
 
 def holds_zero(candidates: Sequence[Candidate]) -> list[Reason]:
     """Return that the intervals of candidates contain zero."""
-    return [Reason(ZERO_IN_INTERVAL, one.label) for one in candidates]
+    return [Reason(ZERO_IN_INTERVAL, candidate.label) for candidate in candidates]
 
 
 def strength_is_certain(
@@ -181,10 +186,10 @@ def strength_is_certain(
     rules: Rules,
     covariance: NDArray[np.float64] | None = None,
 ) -> bool:
-    """Tell whether the strength of an effect differs from nothing, by the noise of the records.
+    """Tell whether the strength of an effect differs from zero by more than the noise.
 
-    Strengths are the unknowns that may be zero, lines with both their parts; one of them is enough:
-    friction that falls with speed may have no level. Shapes, which are not zero, do not count.
+    Strengths are the unknowns that may be zero; a line counts with both its parts. One strength
+    suffices: friction that falls with speed may have no level. Shapes do not count.
     """
     if not candidate.parameters:
         return True
@@ -203,7 +208,7 @@ def strength_is_certain(
 def varies(
     law: Candidate, values: NDArray[np.float64], covariance: NDArray[np.float64], rules: Rules
 ) -> bool:
-    """Tell whether any line of a law differs from nothing, by values (k,) and covariance (k, k)."""
+    """Tell whether any line of a law differs from zero, by values (k,) and covariance (k, k)."""
     limit = chi2.isf(2.0 * norm.sf(rules.certain_deviations), 2)
     return any(
         values[pair] @ np.linalg.solve(covariance[np.ix_(pair, pair)], values[pair]) > limit

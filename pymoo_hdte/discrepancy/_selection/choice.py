@@ -1,9 +1,9 @@
-"""Which of the sets that a search has found a verdict chooses.
+"""How a verdict chooses among the sets that a search has fitted.
 
-The one of least BIC that explains the misfit, or a special case of it that does as well, without
-small members that the data deny. Where none explains the misfit, the one effect that does so in
-another form of its law than the library holds: the listed form may remove next to nothing of what
-another form does, where the base imitates what most forms of the law share.
+It chooses the set of least BIC that explains the misfit, or a special case of it that does as well,
+without small members that the data deny. If no set explains the misfit, it chooses a single effect
+that does so in another form than the listed one. The listed form may then remove next to nothing,
+since the base imitates what most forms of the law share.
 """
 
 from __future__ import annotations
@@ -33,244 +33,283 @@ from pymoo_hdte.discrepancy._selection.search import Search
 
 
 def best_set(search: Search) -> Hypothesis:
-    """Return the set of least BIC of those that explain the misfit, of all if none does.
+    """Return the set of least BIC that explains the misfit, or of least BIC if none does.
 
-    A set of several effects counts only if each of them is earned. What is fitted on the way, as
-    the set without one of them, counts too.
+    A set of several effects counts only if each member is significant. Sets that are fitted in the
+    course of this, such as those without one member, count too.
     """
-    found: list[Hypothesis] = []
-    while found != search.found:
-        found = search.found
+    hypotheses: list[Hypothesis] = []
+    while hypotheses != search.hypotheses:
+        hypotheses = search.hypotheses
         best = _least_that(
-            search, lambda one: explains_in_any_form(search, one) and search.earned(one)
-        ) or _least_that(search, search.earned)
-    assert best is not None, "a single effect is earned"
+            search,
+            lambda hypothesis: (
+                explains_in_any_form(search, hypothesis) and search.is_significant(hypothesis)
+            ),
+        ) or _least_that(search, search.is_significant)
+    assert best is not None, "a single effect is always significant"
     return best
 
 
 def _least_that(search: Search, passes: Callable[[Hypothesis], bool]) -> Hypothesis | None:
-    """Return the set of least BIC that passes, of all that are known once it has been judged."""
+    """Return the set of least BIC that passes, among all that are known after its test."""
     passed: set[Hypothesis] = set()
     refused: set[Hypothesis] = set()
-    while left := [one for one in search.found if one not in refused]:
-        if left[0] in passed:
-            return left[0]
-        (passed if passes(left[0]) else refused).add(left[0])
+    while open_sets := [
+        hypothesis for hypothesis in search.hypotheses if hypothesis not in refused
+    ]:
+        if open_sets[0] in passed:
+            return open_sets[0]
+        (passed if passes(open_sets[0]) else refused).add(open_sets[0])
     return None
 
 
 def special_case(search: Search, best: Hypothesis) -> Hypothesis:
-    """Return the special case of a set that does as well as the forms of laws allow to tell.
+    """Return the special case of a set that does as well, if there is one; otherwise the set.
 
-    What it leaves beyond the set is then the model's own error, or the set ended at a bound: there
-    lies a simpler law, or one that these data do not show. Dry friction that falls within less than
-    the slowest speed is dry friction; one that falls by a hundredth may be, and is in its class.
+    The special case leaves no more than the model's own error beyond the set, or the set ended at a
+    bound. There the law is its special case, or these data do not show what it adds. Dry friction
+    that falls within less than the slowest speed is plain dry friction.
     """
     error = search.data.rules.model_accuracy**2 * search.excess
     if is_bounded(best.fit):
         error = np.inf
     simpler = (
-        search.finished(one)
-        for one in search.found
-        if one.names != best.names and contains(best, one)
+        search.finished(hypothesis)
+        for hypothesis in search.hypotheses
+        if hypothesis.names != best.names and contains(best, hypothesis)
     )
     good = (
-        one
-        for one in simpler
-        if search.enough(one) and one.fit.chi_square - best.fit.chi_square <= error
+        hypothesis
+        for hypothesis in simpler
+        if search.enough(hypothesis) and hypothesis.fit.chi_square - best.fit.chi_square <= error
     )
     return next(
-        (one for one in good if explains_in_any_form(search, one) and search.earned(one)), best
+        (
+            hypothesis
+            for hypothesis in good
+            if explains_in_any_form(search, hypothesis) and search.is_significant(hypothesis)
+        ),
+        best,
     )
 
 
 def confirmed(search: Search, chosen: Hypothesis) -> Hypothesis:
     """Return a set without small members that held-out records or their own intervals deny.
 
-    What a member removes beside others that leave no more than noise, fitted and held-out records
-    taken together, has to be more than noise gives, and its strength has to differ from nothing.
+    This concerns members beside others that leave only noise. On fitted and held-out records
+    together such a member has to remove more than noise gives, and its strength must not be zero.
     """
     rules, smaller = search.data.rules, []
     doubted = uncertain(chosen.fit, rules)
     for member in chosen.members if len(chosen.members) > 1 else ():
-        rest = search.without(chosen, member)
-        if not search.enough(rest):
+        reduced = search.without(chosen, member)
+        if not search.enough(reduced):
             continue
-        vote = search.data.held_out_vote(rest.fit, chosen.fit)
-        gain = rest.fit.chi_square - chosen.fit.chi_square
-        denied = vote and gain + vote.before - vote.after < rules.single_effect_gain
-        unsure = any(one in doubted for one in member)
-        if denied or (unsure and explains_in_any_form(search, rest)):
-            smaller.append(rest)
-    return confirmed(search, min(smaller, key=lambda one: one.bic)) if smaller else chosen
+        held_out = search.data.held_out_test(reduced.fit, chosen.fit)
+        gain = reduced.fit.chi_square - chosen.fit.chi_square
+        denied = held_out and gain + held_out.before - held_out.after < rules.single_effect_gain
+        unsure = any(candidate in doubted for candidate in member)
+        if denied or (unsure and explains_in_any_form(search, reduced)):
+            smaller.append(reduced)
+    return (
+        confirmed(search, min(smaller, key=lambda hypothesis: hypothesis.bic))
+        if smaller
+        else chosen
+    )
 
 
 def simpler_law(search: Search, chosen: Hypothesis) -> Hypothesis:
-    """Return the special case of a set that leaves about as little, where neither explains enough.
+    """Return the special case of a set that leaves about as little, if neither explains enough.
 
-    A law with more unknowns follows more of the form of any other law: that it leaves less of a
-    misfit that is no noise does not show it.
+    A law with more unknowns also follows more of the form of any other law. That it leaves less of
+    a misfit that is not noise does not show that it is there.
     """
-    most = search.data.rules.form_ratio * left_beyond_noise(search, chosen)
+    limit = search.data.rules.form_ratio * left_beyond_noise(search, chosen)
     special = (
-        one
-        for one in search.found
-        if one.names != chosen.names
-        and contains(chosen, one)
-        and left_beyond_noise(search, one) < most
+        hypothesis
+        for hypothesis in search.hypotheses
+        if hypothesis.names != chosen.names
+        and contains(chosen, hypothesis)
+        and left_beyond_noise(search, hypothesis) < limit
     )
-    return next((one for one in special if search.earned(one)), chosen)
+    return next((hypothesis for hypothesis in special if search.is_significant(hypothesis)), chosen)
 
 
-def left_beyond_noise(search: Search, one: Hypothesis) -> float:
+def left_beyond_noise(search: Search, hypothesis: Hypothesis) -> float:
     """Return the excess chi-square that a set leaves."""
-    return one.fit.chi_square - search.degrees_of_freedom
+    return hypothesis.fit.chi_square - search.degrees_of_freedom
 
 
-def twins(search: Search, chosen: Hypothesis) -> list[Hypothesis]:
-    """Return the sets of as many effects and values as the chosen one that no evidence tells apart.
+def competing_by_evidence(search: Search, chosen: Hypothesis) -> list[Hypothesis]:
+    """Return the sets of as many effects and values that evidence cannot separate from the chosen.
 
-    A law that contains the chosen one follows more of any form, and is none.
+    A law that contains the chosen one is left out, since it follows more of any form.
     """
     return [
-        one
-        for one in search.of_size(len(chosen.members))
-        if one.names != chosen.names
-        and len(one.candidates) == len(chosen.candidates)
-        and bool(one.freed) == bool(chosen.freed)
-        and near_by_evidence(one, chosen, search.degrees_of_freedom, search.data.rules)
-        and not (contains(one, chosen) or contains(chosen, one))
-        and search.earned(one)
+        hypothesis
+        for hypothesis in search.of_size(len(chosen.members))
+        if hypothesis.names != chosen.names
+        and len(hypothesis.candidates) == len(chosen.candidates)
+        and bool(hypothesis.released) == bool(chosen.released)
+        and near_by_evidence(hypothesis, chosen, search.degrees_of_freedom, search.data.rules)
+        and not (contains(hypothesis, chosen) or contains(chosen, hypothesis))
+        and search.is_significant(hypothesis)
     ]
 
 
 def stands_out(search: Search, chosen: Hypothesis, together: Sequence[Hypothesis] = ()) -> bool:
-    """Tell whether a set is certain as far as it goes, alone or ``together`` with its twins.
+    """Tell whether a set is certain as far as it goes, alone or ``together`` with competing sets.
 
-    It removes most of the misfit, and all other sets of its size leave plainly more: what is left
-    may be the form of a law, or a further effect. Sets that say the same and more do not count as
-    others; those that the screening left out are far behind.
+    It removes most of the misfit, and all other sets of its size leave clearly more. What remains
+    may be the form of a law or a further effect. Sets that contain its effects do not count as
+    others, and those that the screening left out are far behind.
     """
     rules = search.data.rules
-    others = (
-        one
-        for one in search.of_size(len(chosen.members))
-        if not one.names >= chosen.names and one not in together and not contains(one, chosen)
+    competing = (
+        hypothesis
+        for hypothesis in search.of_size(len(chosen.members))
+        if not hypothesis.names >= chosen.names
+        and hypothesis not in together
+        and not contains(hypothesis, chosen)
     )
     enough = chosen.explained >= rules.partial_share and gains_enough(chosen, search.base, rules)
     least = rules.form_ratio * left_beyond_noise(search, chosen)
-    return enough and all(left_beyond_noise(search, one) >= least for one in others)
+    return enough and all(
+        left_beyond_noise(search, hypothesis) >= least for hypothesis in competing
+    )
 
 
-def replaced(search: Search, chosen: Hypothesis, others: Sequence[Candidate]) -> list[Hypothesis]:
+def replaced(
+    search: Search, chosen: Hypothesis, replacements: Sequence[Candidate]
+) -> list[Hypothesis]:
     """Return sets that explain the misfit with another effect in the place of some members.
 
-    What could follow the form of any law in a part of the data is no explanation unless it leaves
-    plainly less than what it replaces, or noise: elsewhere the sets are left out.
+    A replacement that could follow the form of any law has to leave clearly less than the effects
+    that it replaces, or only noise. Sets in which it does not are left out of all comparisons.
 
     Parameters
     ----------
     search : Search
     chosen : Hypothesis
-        The set that it found: if that leaves no more than noise, only its members are replaced.
-    others : sequence of Candidate
-        Which effects they may replace, they say.
+        Chosen set; if it leaves only noise, only its members are replaced.
+    replacements : sequence of Candidate
+        Effects that may replace others, by `Candidate.replaces`.
     """
     rules = search.data.rules
-    near = [one for size in (1, 2, 3) for one in search.of_size(size)[: rules.most_firsts]]
-    found, tried = list[Hypothesis](), set[frozenset[str]]()
-    for one in [chosen] if search.enough(chosen) else near:
-        for other in others:
-            kept = tuple(each for each in one.candidates if not other.replaces(each))
-            effects, label = (*kept, other), label_of((*kept, other))
-            if len(kept) == len(one.candidates) or label in tried:
+    leading = [
+        hypothesis for size in (1, 2, 3) for hypothesis in search.of_size(size)[: rules.most_firsts]
+    ]
+    explaining, tried = list[Hypothesis](), set[frozenset[str]]()
+    for hypothesis in [chosen] if search.enough(chosen) else leading:
+        for replacement in replacements:
+            remaining = tuple(
+                candidate
+                for candidate in hypothesis.candidates
+                if not replacement.replaces(candidate)
+            )
+            effects, label = (*remaining, replacement), label_of((*remaining, replacement))
+            if len(remaining) == len(hypothesis.candidates) or label in tried:
                 continue
             tried.add(label)
-            values = one.values_of(kept)
-            for start in other.starts:
-                whole = search.fitted(effects, np.append(values, start), again=True)
-            if left_beyond_noise(search, whole) <= left_beyond_noise(search, one):
-                whole = search.finished(whole)
-            less = rules.form_ratio * left_beyond_noise(search, whole)
-            plainly = less <= left_beyond_noise(search, one) or search.enough(whole)
-            if plainly and explains_as_listed(search, whole):
-                found.append(whole)
+            values = hypothesis.values_of(remaining)
+            for start in replacement.starts:
+                trial = search.fitted(effects, np.append(values, start), again=True)
+            if left_beyond_noise(search, trial) <= left_beyond_noise(search, hypothesis):
+                trial = search.finished(trial)
+            less = rules.form_ratio * left_beyond_noise(search, trial)
+            plainly = less <= left_beyond_noise(search, hypothesis) or search.enough(trial)
+            if plainly and explains_as_listed(search, trial):
+                explaining.append(trial)
             else:
-                search.leave_out(whole)
-    return found
+                search.leave_out(trial)
+    return explaining
 
 
 def in_another_form(
     search: Search, chosen: Hypothesis, screened: Sequence[Screened]
 ) -> list[Hypothesis]:
-    """Return what explains the misfit in another form, the best as listed first.
+    """Return the sets that explain the misfit in another form, by rising BIC of their listed form.
 
-    Single effects, or else the chosen set.
+    They are single effects, or the chosen set if no single effect does.
 
     Parameters
     ----------
     search : Search
-        In which no set explains the misfit.
+        Search in which no set explains the misfit.
     chosen : Hypothesis
-        The set that comes nearest to it.
+        Set that comes closest to explaining it.
     screened : sequence of Screened
-        All candidates beside its base; none if only the sets that it knows are compared.
+        All candidates, screened beside the base; empty if only known sets are compared.
     """
-    if any(search.data.corrections(one) is None for one in search.candidates[:1]):
+    if any(search.data.corrections(candidate) is None for candidate in search.candidates[:1]):
         return []
-    effects = [one for one in screened if one.candidate.frees is None]
-    for one in search.forms.hopeful_in_another(effects) if effects else ():
-        search.alone(one)
-    singles = [one for one in search.found if one.listed and _is_effect(one)]
-    finished = [one if one is chosen else search.finished(one) for one in singles]
-    found = [one for one in finished if _explains(search, one)]
-    if not found and chosen.listed and _explains(search, chosen):
-        found = [chosen]
-    return sorted(found, key=lambda one: one.bic)
+    effects = [effect for effect in screened if effect.candidate.releases is None]
+    for effect in search.forms.shortlisted_in_another_form(effects) if effects else ():
+        search.alone(effect)
+    singles = [
+        hypothesis
+        for hypothesis in search.hypotheses
+        if hypothesis.listed and _is_effect(hypothesis)
+    ]
+    finished = [
+        hypothesis if hypothesis is chosen else search.finished(hypothesis)
+        for hypothesis in singles
+    ]
+    explaining = [hypothesis for hypothesis in finished if _explains(search, hypothesis)]
+    if not explaining and chosen.listed and _explains(search, chosen):
+        explaining = [chosen]
+    return sorted(explaining, key=lambda hypothesis: hypothesis.bic)
 
 
-def _explains(search: Search, one: Hypothesis) -> bool:
+def _explains(search: Search, hypothesis: Hypothesis) -> bool:
     """Tell whether a set explains the misfit in another form, and is more than that form.
 
-    A load on a soft sensor moves as further inertia would in some form, of which none is there: the
-    strength of an effect of exact form has to be certain beside its corrections.
+    The strength of an effect of exact form has to be certain beside its corrections: a load on a
+    soft sensor moves like an added inertia in some form, although there is none.
     """
-    if not search.forms.explains_in_another(one):
+    if not search.forms.explains_in_another_form(hypothesis):
         return False
-    free, rules = search.forms.in_free_form(one.fit), search.data.rules
-    places = zip(one.candidates, free.places, strict=True)
+    free_fit, rules = search.forms.in_free_form(hypothesis.fit), search.data.rules
+    places = zip(hypothesis.candidates, free_fit.places, strict=True)
     return all(
-        strength_is_certain(free, own, place, rules) for own, (_, place) in places if own.exact
+        strength_is_certain(free_fit, candidate, place, rules)
+        for candidate, (_, place) in places
+        if candidate.exact
     )
 
 
-def _is_effect(one: Hypothesis) -> bool:
+def _is_effect(hypothesis: Hypothesis) -> bool:
     """Tell whether a set is a single effect, and no base parameter."""
-    return len(one.candidates) == 1 and one.candidates[0].frees is None
+    return len(hypothesis.candidates) == 1 and hypothesis.candidates[0].releases is None
 
 
 def in_one_law(search: Search, chosen: Hypothesis) -> list[Hypothesis]:
-    """Return single effects that explain in another form what a set has a curve and lines for.
+    """Return single effects that explain in another form what a set explains by a curve and lines.
 
-    A clearance that varies once in some angle need not do so as a cosine: its harmonics are lines
-    at its port, beside a play that does not vary.
+    A clearance that varies once in some angle need not do so as a cosine. In a set it then appears
+    as a constant play and lines at the harmonics.
     """
-    found = []
-    for wide in search.candidates:
-        if wide.listed and wide.order is not None and _consists_of(chosen, wide, wide.order):
-            one = search.finished(search.alone(Screened(wide, 0.0, wide.starts[0])))
-            if _explains(search, one):
-                found.append(one)
-    return sorted(found, key=lambda one: one.bic)
+    hypotheses = []
+    for law in search.candidates:
+        if law.listed and law.order is not None and _consists_of(chosen, law, law.order):
+            hypothesis = search.finished(search.alone(Screened(law, 0.0, law.starts[0])))
+            if _explains(search, hypothesis):
+                hypotheses.append(hypothesis)
+    return sorted(hypotheses, key=lambda hypothesis: hypothesis.bic)
 
 
-def _consists_of(chosen: Hypothesis, wide: Candidate, order: float) -> bool:
-    """Tell whether a set is a law or its special case and lines of harmonics at the same port."""
-    curves = [one for one in chosen.candidates if one.name == wide.name or wide.holds(one)]
-    lines = [one for one in chosen.candidates if one not in curves]
+def _consists_of(chosen: Hypothesis, law: Candidate, order: float) -> bool:
+    """Tell whether a set is a law, or its special case, with lines of its harmonics at one port."""
+    curves = [
+        candidate
+        for candidate in chosen.candidates
+        if candidate.name == law.name or law.holds(candidate)
+    ]
+    lines = [candidate for candidate in chosen.candidates if candidate not in curves]
     return (
         len(curves) == 1
         and bool(lines)
-        and all(one.port == wide.port for one in chosen.candidates)
-        and all(one.order is not None and is_harmonic(one.order, order) for one in lines)
+        and all(candidate.port == law.port for candidate in chosen.candidates)
+        and all(line.order is not None and is_harmonic(line.order, order) for line in lines)
     )

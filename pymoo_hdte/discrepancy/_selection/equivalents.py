@@ -1,6 +1,7 @@
-"""What a search tells: its chosen set, and sets that explain the data as well by something else.
+"""The chosen set of a search, and the sets that explain the data equally well by other effects.
 
-And whether data tell a law from its special case: a play that varies from one that does not.
+It also decides whether data separate a law from its special case, such as a play that varies from
+one that does not.
 """
 
 from __future__ import annotations
@@ -18,12 +19,12 @@ from pymoo_hdte.discrepancy._selection.caveats import (
 )
 from pymoo_hdte.discrepancy._selection.choice import (
     best_set,
+    competing_by_evidence,
     confirmed,
     in_another_form,
     simpler_law,
     special_case,
     stands_out,
-    twins,
 )
 from pymoo_hdte.discrepancy._selection.fitted_sets import may_be_together
 from pymoo_hdte.discrepancy._selection.fitting import Fit
@@ -42,10 +43,10 @@ from pymoo_hdte.discrepancy._selection.search import Search
 
 
 class Answer(NamedTuple):
-    """A chosen set, sets that may be told with it, and what is certain of them.
+    """A chosen set, the sets equivalent to it, and what is certain of them.
 
-    ``certain`` is that it explains the data, ``foreign`` that another form of its law does, and
-    ``in_part`` that it stands out although more is left.
+    ``certain`` says that it explains the data, ``foreign`` that only another form of its law does,
+    and ``in_part`` that it stands out although more is left.
     """
 
     chosen: Hypothesis
@@ -56,7 +57,7 @@ class Answer(NamedTuple):
 
 
 def answer_of(search: Search, chosen: Hypothesis, screened: Sequence[Screened]) -> Answer:
-    """Return what a search tells of its chosen set: itself, or what stands for it."""
+    """Return the answer of a search: its chosen set, or the set that replaces it."""
     certain = explains_in_any_form(search, chosen)
     if not certain:
         chosen = simpler_law(search, chosen)
@@ -64,144 +65,158 @@ def answer_of(search: Search, chosen: Hypothesis, screened: Sequence[Screened]) 
     if not (certain and chosen.listed):
         foreign = in_another_form(search, chosen, screened)
         if not certain and explains_in_any_form(search, best_set(search)):
-            # One of the effects that were fitted only now does so as it is listed.
+            # An effect that was fitted only now explains the misfit in its listed form.
             chosen, certain, foreign = chosen_of(search), True, []
     if foreign:
         equivalent = [*foreign[1:], *([chosen] if certain else [])]
         chosen, certain = foreign[0], True
     else:
-        more = with_one_more(search, chosen) if certain else []
-        told = [*more, chosen, *rivals(search, chosen)]
-        chosen, equivalent = told[0], told[1:]
-    together = [] if certain else twins(search, chosen)
+        extended = with_one_more(search, chosen) if certain else []
+        reported = [*extended, chosen, *competing_sets(search, chosen)]
+        chosen, equivalent = reported[0], reported[1:]
+    together = [] if certain else competing_by_evidence(search, chosen)
     in_part = not certain and stands_out(search, chosen, together)
     equivalent += together if in_part else []
-    if not chosen.listed and (listed := [one for one in equivalent if one.listed]):
-        equivalent = [chosen, *(one for one in equivalent if one is not listed[0])]
-        chosen = listed[0]
+    listed = [hypothesis for hypothesis in equivalent if hypothesis.listed]
+    if not chosen.listed and listed:
+        others = [hypothesis for hypothesis in equivalent if hypothesis is not listed[0]]
+        chosen, equivalent = listed[0], [chosen, *others]
     return Answer(chosen, equivalent, certain, bool(foreign), in_part)
 
 
 def chosen_of(search: Search) -> Hypothesis:
-    """Return the best set, or its special case that does as well, without doubted members."""
+    """Return the best set, or a special case that does as well, without uncertain members."""
     return confirmed(search, special_case(search, best_set(search)))
 
 
-def rivals(search: Search, chosen: Hypothesis) -> list[Hypothesis]:
+def competing_sets(search: Search, chosen: Hypothesis) -> list[Hypothesis]:
     """Return the sets that explain the data as well as the chosen one by something else.
 
-    What contains one of them is a further one only where it comes near that, too.
+    A set that contains another of them counts only if it comes close to that one as well.
     """
-    found = [
-        one
-        for one in search.found
-        if one is not chosen
-        and _comes_near(search, one, chosen)
-        and explains_in_any_form(search, one)
-        and search.earned(one)
+    competing = [
+        hypothesis
+        for hypothesis in search.hypotheses
+        if hypothesis is not chosen
+        and _competes(search, hypothesis, chosen)
+        and explains_in_any_form(search, hypothesis)
+        and search.is_significant(hypothesis)
     ]
     return [
-        one
-        for one in found
+        hypothesis
+        for hypothesis in competing
         if all(
-            _comes_near(search, one, special)
-            for special in found
-            if special.names != one.names and contains(one, special)
+            _competes(search, hypothesis, special)
+            for special in competing
+            if special.names != hypothesis.names and contains(hypothesis, special)
         )
     ]
 
 
-def _comes_near(search: Search, one: Hypothesis, other: Hypothesis) -> bool:
-    """Tell whether a set says something else than another that the data do not tell from it.
+def _competes(search: Search, hypothesis: Hypothesis, chosen: Hypothesis) -> bool:
+    """Tell whether a set competes with the chosen one: the data do not separate them.
 
-    A law that contains the other one and ends at its bound is the other one. Where its further
-    unknowns are determined, the evidence has told; where they are not, it is a rival.
+    A more general law whose extra parameter sits at its bound reduces to the special case and does
+    not compete. If the extra parameter is well determined, the evidence decides.
     """
-    near = search.alike(one, other) or undecided(one, other, search.data.rules)
-    near = near or _needs_fewer_values(search, one, other)
-    return near and not (contains(one, other) and is_bounded(one.fit))
-
-
-def _needs_fewer_values(search: Search, one: Hypothesis, other: Hypothesis) -> bool:
-    """Tell whether a set explains, in another form and with fewer values free, what another does.
-
-    Of two laws at one port the values beside one may stand for the form of the other: a soft
-    wind-up with an error of the gears too large is nearly a play with a soft skin.
-    """
-    shared = label_of(one.effects) & label_of(other.effects)
-    mine, theirs = (
-        [each for each in those if each.label not in shared]
-        for those in (one.effects, other.effects)
+    competes = (
+        search.indistinguishable(hypothesis, chosen)
+        or undecided(hypothesis, chosen, search.data.rules)
+        or _needs_fewer_values(search, hypothesis, chosen)
     )
-    fewer = label_of(one.freed) < label_of(other.freed)
-    if not fewer or not mine or len(mine) != len(theirs):
+    return competes and not (contains(hypothesis, chosen) and is_bounded(hypothesis.fit))
+
+
+def _needs_fewer_values(search: Search, hypothesis: Hypothesis, chosen: Hypothesis) -> bool:
+    """Tell whether a set explains in another form what the chosen one does with more values.
+
+    Released values beside a law may stand for the form of another law at the same port: a soft
+    wind-up with too large an error of the gears is nearly a play with a soft skin.
+    """
+    shared = label_of(hypothesis.effects) & label_of(chosen.effects)
+    own, replaced = (
+        [effect for effect in effects if effect.label not in shared]
+        for effects in (hypothesis.effects, chosen.effects)
+    )
+    fewer = label_of(hypothesis.released) < label_of(chosen.released)
+    if not fewer or not own or len(own) != len(replaced):
         return False
-    same = all(any(each.beside(law) for law in theirs) for each in mine)
-    further = one.fit.chi_square - other.fit.chi_square
-    most = search.data.rules.form_share**2 * search.excess
-    return same and further < most and search.forms.rest_is_noise(one.fit)
+    same = all(any(effect.shares_port_with(law) for law in replaced) for effect in own)
+    increase = hypothesis.fit.chi_square - chosen.fit.chi_square
+    limit = search.data.rules.form_share**2 * search.excess
+    return same and increase < limit and search.forms.unexplained_is_noise(hypothesis.fit)
 
 
 def with_one_more(search: Search, chosen: Hypothesis) -> list[Hypothesis]:
-    """Return what may be told before a set that leaves doubts: itself and one more effect.
+    """Return sets to prefer to a chosen one with caveats: its effects and one more.
 
-    Such a set leaves no more than noise with all its laws as they are listed, and no doubts. A drag
-    of any form holds a dry friction: where the drag alone needs sensors far from what is stated,
-    either may be true. The best first, and those that no evidence tells from it.
+    Such a set leaves only noise in the listed forms of its laws and has no caveats. A drag of any
+    form can imitate dry friction: if the drag alone needs sensors far from what is stated, either
+    may be true. The best set comes first, with those that the evidence does not separate from it.
     """
     rules, freedom = search.data.rules, search.degrees_of_freedom
-    known, freed = label_of(chosen.candidates), label_of(chosen.freed)
+    labels, released = label_of(chosen.candidates), label_of(chosen.released)
     larger = [
-        one
-        for one in search.of_size(len(chosen.members) + 1)
-        if label_of(one.candidates) > known
-        and label_of(one.freed) == freed
-        and one.listed
-        and chosen.bic - one.bic >= rules.bic_gain
+        hypothesis
+        for hypothesis in search.of_size(len(chosen.members) + 1)
+        if label_of(hypothesis.candidates) > labels
+        and label_of(hypothesis.released) == released
+        and hypothesis.listed
+        and chosen.bic - hypothesis.bic >= rules.bic_gain
     ]
-    # Where forms are not known, only what is listed was compared.
-    any_form = search.forms.known(chosen.effects)
+    # Where forms are not known, only listed forms were compared.
+    any_form = search.forms.forms_are_known(chosen.effects)
     if not (larger and any_form) or not reasons_of(search, chosen, None):
         return []
-    found = [
-        one
-        for one in map(search.finished, larger)
-        if search.enough(one)
-        and confirmed(search, one) is one
-        and not reasons_of(search, one, None)
+    extended = [
+        hypothesis
+        for hypothesis in map(search.finished, larger)
+        if search.enough(hypothesis)
+        and confirmed(search, hypothesis) is hypothesis
+        and not reasons_of(search, hypothesis, None)
     ]
-    found.sort(key=lambda one: one.bic)
-    return [one for one in found if near_by_evidence(one, found[0], freedom, rules)]
+    extended.sort(key=lambda hypothesis: hypothesis.bic)
+    return [
+        hypothesis
+        for hypothesis in extended
+        if near_by_evidence(hypothesis, extended[0], freedom, rules)
+    ]
 
 
 def distinct(chosen: Hypothesis, equivalent: Sequence[Hypothesis]) -> list[Hypothesis]:
-    """Return the sets that name other effects, each once: one order or another is one effect."""
-    of_names = {one.names: one for one in reversed(equivalent) if one.names != chosen.names}
+    """Return the sets that name other effects, one for each names; orders are not told apart."""
+    others = [hypothesis for hypothesis in equivalent if hypothesis.names != chosen.names]
+    of_names = {hypothesis.names: hypothesis for hypothesis in reversed(others)}
     return list(reversed(of_names.values()))
 
 
-def undecided(one: Hypothesis, chosen: Hypothesis, rules: Rules) -> bool:
-    """Tell whether a set and the chosen one are a law and its special case, and either may be true.
+def undecided(hypothesis: Hypothesis, chosen: Hypothesis, rules: Rules) -> bool:
+    """Tell whether two sets are a law and its special case, and either may be true.
 
-    A special case is not shown where its law may vary as much as it is strong: flanks that are held
-    by a load show a play that varies as a line of the static error, which has a tolerance. And a
-    law is not shown by a part of it so small that its special case in another form has it too.
+    The special case is not shown if the law may vary as much as it is strong. Flanks that a load
+    holds together show a varying play as a line of the static error, which has a tolerance. The
+    law is not shown if what it adds is so small that its special case in another form has it too.
     """
-    if contains(one, chosen):
-        pairs = differing(one.effects, chosen.effects)
+    if contains(hypothesis, chosen):
+        pairs = differing(hypothesis.effects, chosen.effects)
         return any(
-            _may_vary_as_much(one.fit, wide, chosen.fit, case, rules) for wide, case in pairs
+            _may_vary_as_much(hypothesis.fit, law, chosen.fit, case, rules) for law, case in pairs
         )
-    if contains(chosen, one):
-        pairs = differing(chosen.effects, one.effects)
-        return any(_is_its_form(chosen.fit, wide, one.fit, case, rules) for wide, case in pairs)
+    if contains(chosen, hypothesis):
+        pairs = differing(chosen.effects, hypothesis.effects)
+        return any(
+            _is_its_form(chosen.fit, law, hypothesis.fit, case, rules) for law, case in pairs
+        )
     return False
 
 
 def _may_vary_as_much(
     of_law: Fit, law: Candidate, of_case: Fit, case: Candidate, rules: Rules
 ) -> bool:
-    """Tell whether a line that a law adds may be as strong as its special case, by its interval."""
+    """Tell whether the interval of a line that a law adds reaches the strength of its special case.
+
+    ``of_law`` and ``of_case`` are the fits of both.
+    """
     place, strength = _place(of_law, law), _strength(of_case, case)
     for line in law.lines:
         pair = place.start + line
@@ -213,38 +228,38 @@ def _may_vary_as_much(
 
 
 def _is_its_form(of_law: Fit, law: Candidate, of_case: Fit, case: Candidate, rules: Rules) -> bool:
-    """Tell whether what a law has beyond its special case is a small part of that.
+    """Tell whether what a law adds to its special case is a small part of it.
 
-    Of a law that varies as lines do: whether these may be nothing. What else the law is free in, as
-    the width of a play where the input was locked, does not show that it varies.
+    For a law with lines: whether all lines may be zero. Its other unknowns, such as the width of a
+    play where the input was locked, do not show that it varies.
     """
     place = _place(of_law, law)
     if law.lines:
         return not varies(law, of_law.values[place], of_law.covariance[place, place], rules)
-    shared = {one.name for one in case.parameters}
-    further = [
+    shared = {parameter.name for parameter in case.parameters}
+    additions = [
         abs(value)
-        for one, value in zip(law.parameters, of_law.values[place], strict=True)
-        if one.lower <= 0.0 and one.name not in shared
+        for parameter, value in zip(law.parameters, of_law.values[place], strict=True)
+        if parameter.lower <= 0.0 and parameter.name not in shared
     ]
-    most = rules.form_share * _strength(of_case, case)
-    return bool(further) and max(further) <= most
+    limit = rules.form_share * _strength(of_case, case)
+    return bool(additions) and max(additions) <= limit
 
 
 def _place(fitted: Fit, candidate: Candidate) -> slice:
-    """Return where the values of a candidate stand in a fit."""
-    return next(place for one, place in fitted.places if one is candidate)
+    """Return the place of a candidate's values in a fit."""
+    return next(place for member, place in fitted.places if member is candidate)
 
 
 def _strength(fitted: Fit, candidate: Candidate) -> float:
-    """Return the fitted strength of an effect, the first of its unknowns."""
+    """Return the fitted strength of an effect, which is its first unknown."""
     return abs(float(fitted.values[_place(fitted, candidate).start]))
 
 
 def complete(search: Search, chosen: Hypothesis) -> None:
     """Fit the sets that may explain as much as a chosen one of several members by other laws.
 
-    Single effects need none: the best were fitted in other forms and from other starts.
+    Single effects need no such fits: the best were fitted in other forms and from other starts.
     """
     _with_other_parts(search, chosen)
     _with_other_laws(search, chosen)
@@ -252,66 +267,76 @@ def complete(search: Search, chosen: Hypothesis) -> None:
 
 
 def _with_other_parts(search: Search, chosen: Hypothesis) -> None:
-    """Fit the sets in which a part of a chosen one is another that comes near it by itself.
+    """Fit the chosen set with a part of it replaced by a set that does nearly as well by itself.
 
-    Only the better one was extended: a screening beside the other would find the same further
-    effects, and takes longest where a line beats with those of the error.
+    The search extended only the better of the two. A screening beside the other would find the same
+    further effects, and takes longest if a line beats with those of the error.
     """
     whole, rules = label_of(chosen.candidates), search.data.rules
-    for part in [one for one in search.found if label_of(one.candidates) < whole]:
-        kept = [each for each in chosen.candidates if each not in part.candidates]
-        for other in search.of_size(len(part.members)):
-            both = (*other.candidates, *kept)
-            near = leave_the_same(other, part, rules) or search.alike(other, part)
-            if other is not part and near and may_be_together(both):
-                start = chosen.values_of(kept)[len(search.base.values) :]
-                search.fitted(both, np.append(other.fit.values, start))
+    for part in [
+        hypothesis for hypothesis in search.hypotheses if label_of(hypothesis.candidates) < whole
+    ]:
+        remaining = [
+            candidate for candidate in chosen.candidates if candidate not in part.candidates
+        ]
+        for substitute in search.of_size(len(part.members)):
+            effects = (*substitute.candidates, *remaining)
+            close = leave_the_same(substitute, part, rules) or search.indistinguishable(
+                substitute, part
+            )
+            if substitute is not part and close and may_be_together(effects):
+                start = chosen.values_of(remaining)[len(search.base.values) :]
+                search.fitted(effects, np.append(substitute.fit.values, start))
 
 
 def _with_other_laws(search: Search, chosen: Hypothesis) -> None:
-    """Fit sets with another law at the port of a member in all forms of it, from all starts.
+    """Fit sets with another law at the port of a member, in all its forms and from all starts.
 
-    Beside other members only one form was tried, from one start: those that do most by themselves.
-    A second spring beyond a torsion was named a soft wind-up, since only a cubic one was tried
-    beside the drag. A drift was named a new zero, since its fit had ended where it settles at once.
-    Only where another form can take most of what such a set leaves, or all but noise: not for
-    machines whose laws have no known forms.
+    Beside other members the search tries one form from one start. A second spring beyond a torsion
+    was thus named a soft wind-up, since only a cubic one was tried beside the drag. A set is fitted
+    only if other forms can remove most of what it leaves, or leave only noise.
     """
-    for other in _rivals_at_its_ports(search, chosen):
-        if search.forms.rest_is_noise(other.fit) or search.leaves_forms(other):
-            best = other
-            for member, _ in differing(other.candidates, chosen.candidates):
+    for competitor in _competing_at_its_ports(search, chosen):
+        if search.forms.unexplained_is_noise(competitor.fit) or search.leaves_forms(competitor):
+            best = competitor
+            for member, _ in differing(competitor.candidates, chosen.candidates):
                 best = _from_all_starts(search, best, member)
 
 
-def _rivals_at_its_ports(search: Search, chosen: Hypothesis) -> list[Hypothesis]:
-    """Return the best set of each names that has other laws at the same ports, told from it so far.
+def _competing_at_its_ports(search: Search, chosen: Hypothesis) -> list[Hypothesis]:
+    """Return for other names at the same ports the best set that does not compete so far.
 
-    One that is not told from the chosen set is in its class already.
+    A set that the data do not separate from the chosen one is in its class already.
     """
     of_names: dict[frozenset[tuple[str, str]], Hypothesis] = {}
-    for one in search.of_size(len(chosen.members)):
-        if len(one.candidates) == len(chosen.candidates):
-            of_names.setdefault(one.names, one)
+    for hypothesis in search.of_size(len(chosen.members)):
+        if len(hypothesis.candidates) == len(chosen.candidates):
+            of_names.setdefault(hypothesis.names, hypothesis)
     of_names.pop(chosen.names, None)
     return [
-        one
-        for one in of_names.values()
-        if all(mine.beside(its) for mine, its in differing(one.candidates, chosen.candidates))
-        and not search.alike(one, chosen)
+        hypothesis
+        for hypothesis in of_names.values()
+        if all(
+            member.shares_port_with(replaced)
+            for member, replaced in differing(hypothesis.candidates, chosen.candidates)
+        )
+        and not search.indistinguishable(hypothesis, chosen)
     ]
 
 
-def _from_all_starts(search: Search, one: Hypothesis, member: Candidate) -> Hypothesis:
-    """Fit a set with each form of a member, from each start of it; return the best of them."""
-    found, base = [one], one.fit.values[: one.fit.n_base]
+def _from_all_starts(search: Search, hypothesis: Hypothesis, member: Candidate) -> Hypothesis:
+    """Return the best fit of a set with any form of a member, from any of its starts."""
+    hypotheses, base = [hypothesis], hypothesis.fit.values[: hypothesis.fit.n_base]
     forms = [form for form in search.candidates if form.is_form_of(member)]
     for law in (member, *forms):
-        effects = tuple(law if each is member else each for each in one.candidates)
+        effects = tuple(
+            law if candidate is member else candidate for candidate in hypothesis.candidates
+        )
         for start in law.starts if may_be_together(effects) else ():
             values = [
-                start if each is member else one.fit.values[place] for each, place in one.fit.places
+                start if candidate is member else hypothesis.fit.values[place]
+                for candidate, place in hypothesis.fit.places
             ]
             begin = np.concatenate([base, *values])
-            found.append(search.fitted(effects, begin, again=True, hopeless=search.hopeless))
-    return min(found, key=lambda each: each.bic)
+            hypotheses.append(search.fitted(effects, begin, again=True, hopeless=search.hopeless))
+    return min(hypotheses, key=lambda hypothesis: hypothesis.bic)

@@ -1,8 +1,8 @@
 """Chi-square beyond degrees of freedom, by record and part, and that of records kept out of fits.
 
-In a fit each part of the data is judged separately: the misfit of a sweep at rest may be a thousand
-times that of the transmission error, and an effect that explains only the one must not count as the
-cause of the other.
+Each part of the data is assessed separately. The misfit of a sweep at rest may be a thousand times
+that of the transmission error, and an effect that explains only one of them must not count as the
+cause of both.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ class Excess:
 
     @property
     def of_parts(self) -> NDArray[np.float64]:
-        """Of each part, shape (parts,)."""
+        """Excess of each part, summed over its records, shape (parts,)."""
         return np.asarray(self.chi_square.sum(axis=0))
 
     def significant(self, rules: Rules) -> NDArray[np.bool_]:
@@ -41,9 +41,9 @@ class Excess:
         return np.asarray(self.of_parts > self._most_noise(rules))
 
     def is_noise(self, rules: Rules) -> bool:
-        """Tell whether each part has as much as noise gives, neither more nor less.
+        """Tell whether the excess of each part is that of noise, neither more nor less.
 
-        Less does not show in a part with fewer than some thirty degrees of freedom.
+        Too little cannot be seen in a part with fewer than some thirty degrees of freedom.
         """
         return bool(np.all(np.abs(self.of_parts) <= self._most_noise(rules)))
 
@@ -58,7 +58,7 @@ class Excess:
         return np.where(several, np.argmax(self.chi_square, axis=0), -1)
 
     def without(self, rows: NDArray[np.int_]) -> Excess:
-        """Return it with one row left out of each part; -1 leaves a part as it is."""
+        """Return the excess without one row of each part; row -1 leaves a part as it is."""
         chi_square, degrees_of_freedom = self.chi_square.copy(), self.degrees_of_freedom.copy()
         parts = np.flatnonzero(rows >= 0)
         chi_square[rows[parts], parts] = degrees_of_freedom[rows[parts], parts] = 0.0
@@ -66,16 +66,16 @@ class Excess:
 
 
 @dataclass(frozen=True)
-class Vote:
-    """What records kept out of a fit say of a change of the model.
+class HeldOutTest:
+    """Test of a change of the model on records that were kept out of the fit.
 
     Attributes
     ----------
     before, after : float
-        Their chi-square without and with it.
+        Chi-square of these records without and with the change.
     change : float
-        Square of the change of their whitened prediction: what a true change removes of chi-square,
-        with a standard deviation of twice its root.
+        Squared norm of the change of their whitened prediction. A true change removes this much of
+        chi-square on average, with a standard deviation of twice its root.
     """
 
     before: float
@@ -87,14 +87,12 @@ class Vote:
         return self.change >= rules.vote_change
 
     def denies(self, rules: Rules, misfit: float) -> bool:
-        """Tell whether the change removes nothing of their error, or less than a true one would.
+        """Tell whether the change does not reduce their error as a true change would.
 
-        Of a change that is too small to be seen, whether their error grows by more than chance.
-
-        By chance a true one removes two standard deviations less, in units of what a fit's
-        residuals are beside their noise (``misfit``), and in another form of its law not all of it:
-        what stands for something else may remove next to nothing. A prediction that diverges, so
-        that its change has no size, is denied where it diverges with the change.
+        A true change may by chance remove two standard deviations less, in units of the fit's
+        ``misfit``, and in another form of its law only a share. For a change too small to be seen,
+        tell whether the error grows by more than chance. A change with which the prediction
+        diverges is denied.
         """
         removed = self.before - self.after
         if not np.isfinite(self.change):

@@ -1,4 +1,4 @@
-"""Sets of effects fitted jointly with the base: first so far as to rank them, then to the end."""
+"""Sets of effects fitted jointly with the base: first just enough to rank them, then to the end."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from pymoo_hdte.discrepancy._selection.excess import Excess
 from pymoo_hdte.discrepancy._selection.fitting import Evidence, Fit, Vector, fit
 from pymoo_hdte.discrepancy._selection.hypothesis import (
     Hypothesis,
-    alike,
     contains,
     down_to_noise,
     hypothesis_of,
+    indistinguishable,
     is_bounded,
     label_of,
     misfit_of,
@@ -29,21 +29,22 @@ Effects = tuple[Candidate, ...]
 
 
 class FittedSets:
-    """Sets of effects, what each explains, and whether their members are earned.
+    """Sets of effects, what each explains, and whether their members are significant.
 
     Parameters
     ----------
     data : Evidence
     base : Fit
-        Without any effect.
+        Fit without any effect.
 
     Attributes
     ----------
     forms : AnyForm
         What sets leave in any form of their laws.
     degrees_of_freedom : int
+        Degrees of freedom of the base.
     excess : float
-        Of the base, as of ``forms``.
+        Chi-square of the base beyond its degrees of freedom.
     """
 
     def __init__(self, data: Evidence, base: Fit) -> None:
@@ -58,126 +59,147 @@ class FittedSets:
         self._resumed = self._whole_only = False
 
     @property
-    def found(self) -> list[Hypothesis]:
-        """All sets fitted so far that are no others under another name, by rising BIC."""
-        known = [one for label, one in self._by_label.items() if label not in self._left_out]
+    def hypotheses(self) -> list[Hypothesis]:
+        """All sets fitted so far except those left out, by rising BIC."""
+        hypotheses = [
+            hypothesis
+            for label, hypothesis in self._by_label.items()
+            if label not in self._left_out
+        ]
         if self._whole_only:
-            known = [one for one in known if not self.lacks_evident(one)]
-        return sorted(known, key=lambda one: one.bic)
+            hypotheses = [
+                hypothesis for hypothesis in hypotheses if not self.lacks_evident(hypothesis)
+            ]
+        return sorted(hypotheses, key=lambda hypothesis: hypothesis.bic)
 
     def of_size(self, size: int) -> list[Hypothesis]:
-        """Return the sets of so many members, by rising BIC."""
-        return [one for one in self.found if len(one.members) == size]
+        """Return the sets with this number of members, by rising BIC."""
+        return [hypothesis for hypothesis in self.hypotheses if len(hypothesis.members) == size]
 
     @property
     def hopeless(self) -> float:
-        """Chi-square beyond which a fit will not come near a set that leaves no more than noise."""
-        best, rules = self.found[:1], self.data.rules
+        """Chi-square beyond which a fit cannot compete with a set that leaves only noise."""
+        best, rules = self.hypotheses[:1], self.data.rules
         if not (best and self.enough(best[0])):
             return np.inf
         share = rules.outdone_share * self.base.chi_square
         return max(rules.contradicting_chi_square * best[0].fit.chi_square, share)
 
-    def enough(self, one: Hypothesis) -> bool:
-        """Tell whether a set explains the data down to the noise, and has what is evident."""
-        return self.forms.leaves_noise(one) and not self.lacks_evident(one)
+    def enough(self, hypothesis: Hypothesis) -> bool:
+        """Tell whether a set explains the data down to the noise, with any evident effect."""
+        return self.forms.leaves_noise(hypothesis) and not self.lacks_evident(hypothesis)
 
-    def lacks_evident(self, one: Hypothesis) -> bool:
-        """Tell whether an effect is evident, and a set has none of those that it may be."""
+    def lacks_evident(self, hypothesis: Hypothesis) -> bool:
+        """Tell whether a set lacks an evident effect, that is, has none that it may be."""
         evident = self.data.evident
-        return bool(evident) and not any(each.name in evident for each in one.candidates)
+        return bool(evident) and not any(
+            candidate.name in evident for candidate in hypothesis.candidates
+        )
 
-    def add_evident(self, one: Hypothesis, others: Sequence[Candidate]) -> None:
-        """Fit a set that lacks what is evident with each of the others that it may be."""
-        for more in others if self.lacks_evident(one) else ():
-            for start in more.starts if more.name in self.data.evident else ():
-                self.fitted((*one.candidates, more), np.append(one.fit.values, start), again=True)
+    def add_evident(self, hypothesis: Hypothesis, candidates: Sequence[Candidate]) -> None:
+        """Fit a set that lacks an evident effect with each candidate that it may be."""
+        for candidate in candidates if self.lacks_evident(hypothesis) else ():
+            for start in candidate.starts if candidate.name in self.data.evident else ():
+                self.extended(hypothesis, candidate, start, again=True)
 
     def leave_out_lacking(self) -> None:
-        """Leave out all sets that lack what is evident, if any has it."""
-        self._whole_only = not all(map(self.lacks_evident, self.found))
+        """Leave out all sets that lack an evident effect, if any set has it."""
+        self._whole_only = not all(map(self.lacks_evident, self.hypotheses))
 
-    def could_count(self, one: Hypothesis) -> bool:
+    def could_count(self, hypothesis: Hypothesis) -> bool:
         """Tell whether a further effect could be justified.
 
-        One at a bound may stand for two, and so may a zero or gain far beyond what is stated.
+        An effect at a bound may stand for two, as may a zero or gain far beyond what is stated.
         """
-        if self.held_by_sensors(one) or self.lacks_evident(one):
+        if self.held_by_sensors(hypothesis) or self.lacks_evident(hypothesis):
             return True
-        if self.enough(one):
-            return is_bounded(one.fit)
-        return one.exact or bool(self.data.excess(one.fit).significant(self.data.rules).any())
+        if self.enough(hypothesis):
+            return is_bounded(hypothesis.fit)
+        return hypothesis.exact or bool(
+            self.data.excess(hypothesis.fit).significant(self.data.rules).any()
+        )
 
-    def leaves_forms(self, one: Hypothesis) -> bool:
-        """Tell whether most of what a set leaves is what other forms of its laws do, at first.
+    def leaves_forms(self, hypothesis: Hypothesis) -> bool:
+        """Tell whether other forms of its laws do most of what a set leaves, to first order.
 
-        Not where it leaves no more than noise with each of its laws within its listed form.
+        They do not if it leaves only noise and no unknown ended at a bound.
         """
-        if self.enough(one) and not is_bounded(one.fit):
+        if self.enough(hypothesis) and not is_bounded(hypothesis.fit):
             return False
-        rest, left = self.forms.rest(one.fit), one.fit.chi_square - self.degrees_of_freedom
-        most = 1.0 - self.data.rules.explained_part_share
-        return rest is not None and rest.excess <= most * left
+        unexplained = self.forms.unexplained(hypothesis.fit)
+        excess = hypothesis.fit.chi_square - self.degrees_of_freedom
+        limit = 1.0 - self.data.rules.explained_part_share
+        return unexplained is not None and unexplained.excess <= limit * excess
 
-    def leaves_form_of(self, one: Hypothesis, member: Candidate) -> bool:
-        """Tell whether another form may do better in the place of a member of a set.
+    def leaves_form_of(self, hypothesis: Hypothesis, member: Candidate) -> bool:
+        """Tell whether another form of a member may do better in a set.
 
-        Where forms are most of what it leaves. And where it leaves more than noise beside a law
-        with memory: a loop that forgets is no sum of springs that slip, not even to first order.
+        It may if forms are most of what the set leaves, or if a law with memory leaves more than
+        noise: a loop that forgets is no sum of springs that slip, not even to first order.
         """
-        return self.leaves_forms(one) or (member.remembers and not self.enough(one))
+        return self.leaves_forms(hypothesis) or (member.remembers and not self.enough(hypothesis))
 
-    def alike(self, one: Hypothesis, chosen: Hypothesis) -> bool:
-        """Tell whether the data do not tell a set from another: see `hypothesis.alike`."""
-        same_values = label_of(one.freed) == label_of(chosen.freed)
-        overlap = same_values and self.forms.known((*one.effects, *chosen.effects))
-        return alike(one, chosen, self.degrees_of_freedom, self.data.rules, overlap)
+    def indistinguishable(self, hypothesis: Hypothesis, chosen: Hypothesis) -> bool:
+        """Tell whether the data do not separate two sets, as the function of this name does."""
+        same_values = label_of(hypothesis.released) == label_of(chosen.released)
+        overlap = same_values and self.forms.forms_are_known((*hypothesis.effects, *chosen.effects))
+        return indistinguishable(
+            hypothesis, chosen, self.degrees_of_freedom, self.data.rules, overlap
+        )
 
-    def earned(self, one: Hypothesis) -> bool:
-        """Tell whether each member is earned: without it the rest explains clearly less."""
-        members = one.members
+    def is_significant(self, hypothesis: Hypothesis) -> bool:
+        """Tell whether each member is significant: without it a set explains clearly less."""
+        members = hypothesis.members
         if len(members) == 1:
             return True
-        return all(self._earns(one, member, self.without(one, member)) for member in members)
+        return all(
+            self._member_is_significant(hypothesis, member, self.without(hypothesis, member))
+            for member in members
+        )
 
-    def _earns(self, one: Hypothesis, member: Effects, rest: Hypothesis) -> bool:
-        """Tell whether a member is earned, as the listed laws go or in any form of the others.
+    def _member_is_significant(
+        self, hypothesis: Hypothesis, member: Effects, simpler: Hypothesis
+    ) -> bool:
+        """Tell whether a member is significant beside the others, as listed or in any form.
 
-        What is evident is.
+        An evident effect always is. ``simpler`` is the set without the member.
         """
-        if self.lacks_evident(rest) and not self.lacks_evident(one):
+        if self.lacks_evident(simpler) and not self.lacks_evident(hypothesis):
             return True
-        earned = is_earned(self.data, self.base, one, rest, member)
-        return earned or self.forms.earns(one, rest) or self._brings_sensors_back(one, rest)
+        return (
+            is_significant(self.data, self.base, hypothesis, simpler, member)
+            or self.forms.is_significant(hypothesis, simpler)
+            or self._brings_sensors_back(hypothesis, simpler)
+        )
 
-    def _brings_sensors_back(self, one: Hypothesis, rest: Hypothesis) -> bool:
-        """Tell whether sensors are as stated in a set, and in no form of the rest.
+    def _brings_sensors_back(self, hypothesis: Hypothesis, simpler: Hypothesis) -> bool:
+        """Tell whether sensors are as stated in a set, and in no form of the simpler set.
 
-        A friction that grows with the load is a gain of the torque sensor nearly as well.
+        Friction that grows with the load is nearly a gain of the torque sensor.
         """
-        least = self.data.rules.single_effect_gain * misfit_of(one, self.degrees_of_freedom)
-        clear = rest.fit.chi_square - one.fit.chi_square >= least
-        back = self.beyond_stated(rest.fit) > 0.0 and self.beyond_stated(one.fit) == 0.0
+        least = self.data.rules.single_effect_gain * misfit_of(hypothesis, self.degrees_of_freedom)
+        clear = simpler.fit.chi_square - hypothesis.fit.chi_square >= least
+        back = self.beyond_stated(simpler.fit) > 0.0 and self.beyond_stated(hypothesis.fit) == 0.0
         # A fit in a free form takes as long as several others.
-        return clear and back and self.beyond_stated(self.forms.in_free_form(rest.fit)) > 0.0
+        return clear and back and self.beyond_stated(self.forms.in_free_form(simpler.fit)) > 0.0
 
-    def held_by_sensors(self, one: Hypothesis) -> float:
-        """Return `beyond_stated` of a set that could be named plainly; 0 of others.
+    def held_by_sensors(self, hypothesis: Hypothesis) -> float:
+        """Return `beyond_stated` of a set that could be named without qualification, else 0.
 
-        Where more is left, sensors take a share of it whatever is missing.
+        If more is left, sensors absorb a share of it whatever is missing.
         """
-        left = misfit_of(one, self.degrees_of_freedom)
-        plain = left <= self.data.rules.contradicting_chi_square
-        return self.beyond_stated(one.fit) if plain else 0.0
+        misfit = misfit_of(hypothesis, self.degrees_of_freedom)
+        plain = misfit <= self.data.rules.contradicting_chi_square
+        return self.beyond_stated(hypothesis.fit) if plain else 0.0
 
     def beyond_stated(self, fitted: Fit) -> float:
-        """Return the chi-square of sensors' zeros and gains far beyond what is stated of them."""
+        """Return the chi-square of zeros and gains of sensors far from what is stated."""
         return float(beyond_stated(fitted, self.data.rules).sum())
 
-    def without(self, one: Hypothesis, member: Effects, again: bool = False) -> Hypothesis:
-        """Return a set without one of its members, fitted to the end; ``again`` as of `fitted`."""
-        kept = tuple(other for other in one.candidates if other not in member)
-        return self.finished(self.fitted(kept, one.values_of(kept), again))
+    def without(self, hypothesis: Hypothesis, member: Effects, again: bool = False) -> Hypothesis:
+        """Return a set without one member, fitted to the end; ``again`` as in `fitted`."""
+        effects = tuple(candidate for candidate in hypothesis.candidates if candidate not in member)
+        return self.finished(self.fitted(effects, hypothesis.values_of(effects), again))
 
     def fitted(
         self,
@@ -187,158 +209,179 @@ class FittedSets:
         steps: int | None = None,
         hopeless: float = np.inf,
     ) -> Hypothesis:
-        """Return a set fitted from a start so far as to rank it, in ``steps`` as of `fit`.
+        """Return a set fitted from a start just enough to rank it.
 
-        A set that is known already is fitted ``again`` only where that is asked for, at most until
-        it arrives at the known fit; the better of both is kept. ``hopeless`` is as of `fit`.
+        A known set is returned as it is, or fitted ``again`` until it arrives at the known fit; the
+        better of both is stored. ``steps`` and ``hopeless`` are as in `fit`.
         """
         label = label_of(effects)
         known = self._by_label.get(label)
         if known is None or again:
             ends = [known.fit] if known and known.candidates == effects else []
             settled = self.data.rules.trial_gain
-            found = fit(self.data, effects, start, steps, settled, ends, hopeless)
-            trial = hypothesis_of(found, self.excess)
+            fitted = fit(self.data, effects, start, steps, settled, ends, hopeless)
+            trial = hypothesis_of(fitted, self.excess)
             if known is None or trial.bic < known.bic:
                 self._by_label[label] = trial
                 self._finished.discard(label)
         return self._by_label[label]
 
+    def extended(
+        self,
+        hypothesis: Hypothesis,
+        candidate: Candidate,
+        start: Sequence[float],
+        again: bool = False,
+    ) -> Hypothesis:
+        """Return a set with one more effect, fitted from its values and a start of the effect."""
+        values = np.append(hypothesis.fit.values, start)
+        return self.fitted((*hypothesis.candidates, candidate), values, again)
+
     def from_other_starts(self, sets: Sequence[Hypothesis]) -> None:
         """Fit single effects from all their starts, each once."""
-        for one in sets:
-            starts = other_starts(one, self.base.values)
-            if starts and (label := label_of(one.candidates)) not in self._from_all_starts:
-                self.finished(one, *starts)
+        for hypothesis in sets:
+            starts = other_starts(hypothesis, self.base.values)
+            if starts and (label := label_of(hypothesis.candidates)) not in self._from_all_starts:
+                self.finished(hypothesis, *starts)
                 self._from_all_starts.add(label)
 
-    def finished(self, one: Hypothesis, *starts: Vector) -> Hypothesis:
+    def finished(self, hypothesis: Hypothesis, *starts: Vector) -> Hypothesis:
         """Return a set fitted to the end: from its values and, unless resumed, other starts."""
-        label = label_of(one.candidates)
+        label = label_of(hypothesis.candidates)
         if label not in self._finished or starts:
-            known = self._resumed or label in self._finished
+            fitted_before = self._resumed or label in self._finished
             if self._resumed:
-                best = fit(self.data, one.candidates, one.fit)
+                best = fit(self.data, hypothesis.candidates, hypothesis.fit)
             else:
-                self._finish_special_cases(one)
-                best = best_fit(self.data, one, starts, self._by_label.values())
+                self._finish_special_cases(hypothesis)
+                best = best_fit(self.data, hypothesis, starts, self._by_label.values())
             self._by_label[label] = hypothesis_of(best, self.excess)
             self._finished.add(label)
-            if not known:
+            if not fitted_before:
                 self._reopen(self._by_label[label])
         return self._by_label[label]
 
-    def _finish_special_cases(self, one: Hypothesis) -> None:
-        """Fit special cases to the end that may come as near as a set, for `best_fit` to know."""
-        for other in list(self._by_label.values()):
-            if is_special_case(other, one) and self.may_come_as_near(other, one):
-                self.finished(other)
+    def _finish_special_cases(self, hypothesis: Hypothesis) -> None:
+        """Fit to the end the special cases that may come as near as a set, for `best_fit`."""
+        for special in list(self._by_label.values()):
+            if is_special_case(special, hypothesis) and self.may_come_as_near(special, hypothesis):
+                self.finished(special)
 
     def _reopen(self, special: Hypothesis) -> None:
-        """Let laws be fitted to the end again that do no better than this special case of them."""
-        most = special.fit.chi_square - self.data.rules.evidence_distance
+        """Mark for another fit the laws that do no better than this special case of them."""
+        limit = special.fit.chi_square - self.data.rules.evidence_distance
         for label in list(self._finished):
             law = self._by_label[label]
-            if is_special_case(special, law) and law.fit.chi_square > most:
+            if is_special_case(special, law) and law.fit.chi_square > limit:
                 self._finished.discard(label)
 
-    def resume(self, known: Sequence[Hypothesis], go_on: bool = False) -> None:
-        """Fit sets from the values that another search has found on nearly the same data.
+    def resume(self, hypotheses: Sequence[Hypothesis], go_on: bool = False) -> None:
+        """Fit sets from the values that another search found on nearly the same data.
 
-        The chosen one first. Those that came nowhere near it are only evaluated.
-        Where the search is to ``go_on``, what it fits afterwards is fitted as in any search.
+        The first set is the chosen one. Sets that came nowhere near it are only evaluated. If the
+        search is to ``go_on``, all later fits are as in any search.
         """
         self._resumed = True
-        chosen = known[0]
-        rivals = [chosen, *(one for one in known[1:] if self.alike(one, chosen))]
-        for one in known:
-            # Measured from the chosen one: of the best one a member may not be earned.
-            hopeful = one in rivals or self.may_come_as_near(one, chosen)
-            self.fitted(one.candidates, one.fit.values, steps=None if hopeful else 0)
-        for one in rivals:
-            self.finished(self._by_label[label_of(one.candidates)])
-        for size in {len(one.members) for one in known}:
+        chosen, *others = hypotheses
+        competing = [
+            chosen,
+            *(rival for rival in others if self.indistinguishable(rival, chosen)),
+        ]
+        for hypothesis in hypotheses:
+            # Measured from the chosen set: in the best one a member may not be significant.
+            shortlisted = hypothesis in competing or self.may_come_as_near(hypothesis, chosen)
+            steps = None if shortlisted else 0
+            self.fitted(hypothesis.candidates, hypothesis.fit.values, steps=steps)
+        for hypothesis in competing:
+            self.finished(self._by_label[label_of(hypothesis.candidates)])
+        for size in {len(hypothesis.members) for hypothesis in hypotheses}:
             self.finish_near(size)
         self._resumed = not go_on
 
-    def leave_out(self, one: Hypothesis) -> None:
-        """Leave a set out of all that are compared: it is known under another name."""
-        self._left_out.add(label_of(one.candidates))
+    def leave_out(self, hypothesis: Hypothesis) -> None:
+        """Leave a set out of all comparisons: it is known under another name."""
+        self._left_out.add(label_of(hypothesis.candidates))
 
     def finish_near(self, size: int) -> None:
         """Fit the best sets of a size to the end, and those that may come as near.
 
-        If the best set leaves no more than noise (a single one with sensors as they are stated), or
-        the sets are known from another search, only those that may come as near.
+        Only the latter are fitted if the search was resumed, or if the best set leaves only noise
+        (and, for a single effect, all sensors are as stated).
         """
         for place in range(len(self.of_size(size))):
-            same = self.of_size(size)
-            best, one = same[0], same[place]
-            last = self.enough(best) and (size > 1 or not self.held_by_sensors(best))
-            alone = self._resumed or last
-            first = place < (1 if alone else self.data.rules.most_firsts)
-            if first or self.may_come_as_near(one, best):
-                self.finished(one)
+            ranked = self.of_size(size)
+            best, hypothesis = ranked[0], ranked[place]
+            complete = self.enough(best) and (size > 1 or not self.held_by_sensors(best))
+            only_near = self._resumed or complete
+            leading = place < (1 if only_near else self.data.rules.most_firsts)
+            if leading or self.may_come_as_near(hypothesis, best):
+                self.finished(hypothesis)
 
-    def may_come_as_near(self, one: Hypothesis, best: Hypothesis) -> bool:
+    def may_come_as_near(self, hypothesis: Hypothesis, best: Hypothesis) -> bool:
         """Tell whether a set may come as near as the best once both are fitted to the end."""
         rules = self.data.rules
-        near = rules.evidence_distance * misfit_of(best, self.degrees_of_freedom)
-        if len(one.members) == 1:
-            # Forms that leave the same are alike however far apart by evidence.
-            near = max(near, rules.form_share**2 * best.removed)
-        return one.bic - best.bic < rules.refit_margin * near
+        distance = rules.evidence_distance * misfit_of(best, self.degrees_of_freedom)
+        if len(hypothesis.members) == 1:
+            # Forms that leave about the same compete, however far apart by evidence.
+            distance = max(distance, rules.form_share**2 * best.removed)
+        return hypothesis.bic - best.bic < rules.refit_margin * distance
 
 
-def is_special_case(one: Hypothesis, law: Hypothesis) -> bool:
-    """Tell whether a law with more unknowns contains a set."""
-    return contains(law, one) and len(one.fit.values) < len(law.fit.values)
+def is_special_case(hypothesis: Hypothesis, law: Hypothesis) -> bool:
+    """Tell whether a set is a special case of a law that has more unknowns."""
+    return contains(law, hypothesis) and len(hypothesis.fit.values) < len(law.fit.values)
 
 
 def may_be_together(effects: Effects) -> bool:
-    """Tell whether a machine may have all these effects, none of them twice."""
+    """Tell whether a machine may have all these effects together, none of them twice."""
     twice = len(label_of(effects)) < len(effects)
-    return not twice and all(one.goes_with(other) for one, other in combinations(effects, 2))
+    return not twice and all(
+        effect.goes_with(partner) for effect, partner in combinations(effects, 2)
+    )
 
 
-def is_earned(
+def is_significant(
     data: Evidence,
     base: Fit,
-    one: Hypothesis,
-    rest: Hypothesis,
+    hypothesis: Hypothesis,
+    simpler: Hypothesis,
     member: Sequence[Candidate],
 ) -> bool:
-    """Tell whether a set explains most of what is left without one of its members.
+    """Tell whether a set explains most of what is left by the ``simpler`` set without a member.
 
-    Beside laws of exact form whatever leads from a misfit down to the noise is earned, if it is
-    most of what they leave.
-    What a law without exact form leaves may be an error of its form: unless the whole set
-    explains the data down to the noise, a member must also be large relative to the base's
-    excess at the port of another, and relative to the model's own error elsewhere.
+    Beside laws of exact form a member that leads down to the noise is significant if it removes
+    most of what they leave. What other laws leave may be an error of their form. Unless the set
+    explains the data down to the noise, the member must then also be large compared with the base's
+    excess, at the port of another member, or with the model's own error elsewhere.
     """
     rules, degrees_of_freedom = data.rules, len(base.residuals) - len(base.values)
-    if down_to_noise(rest.fit, degrees_of_freedom, rules):
+    if down_to_noise(simpler.fit, degrees_of_freedom, rules):
         return False
-    left = rest.fit.chi_square - degrees_of_freedom
-    removed = rest.fit.chi_square - one.fit.chi_square
-    if rest.exact:
-        to_noise = down_to_noise(one.fit, degrees_of_freedom, rules)
+    excess = simpler.fit.chi_square - degrees_of_freedom
+    removed = simpler.fit.chi_square - hypothesis.fit.chi_square
+    if simpler.exact:
+        to_noise = down_to_noise(hypothesis.fit, degrees_of_freedom, rules)
         share = rules.explained_part_share if to_noise else rules.explained_share
-        return left > 0.0 and removed >= share * left
-    per_degree = rest.fit.chi_square / degrees_of_freedom
-    if per_degree > rules.contradicting_chi_square and down_to_noise(
-        one.fit, degrees_of_freedom, rules
-    ):
+        return excess > 0.0 and removed >= share * excess
+    per_degree = simpler.fit.chi_square / degrees_of_freedom
+    contradicted = per_degree > rules.contradicting_chi_square
+    if contradicted and down_to_noise(hypothesis.fit, degrees_of_freedom, rules):
         return True
-    before, alone, both = (data.excess(each) for each in (base, rest.fit, one.fit))
-    parts = ill_explained(before, alone, rules)
+    before, between, final = (data.excess(fitted) for fitted in (base, simpler.fit, hypothesis.fit))
+    parts = ill_explained(before, between, rules)
     if not parts:
         return False
-    same_port = any(a.beside(b) for a in member for b in rest.candidates)
+    same_port = any(
+        candidate.shares_port_with(present)
+        for candidate in member
+        for present in simpler.candidates
+    )
     least = rules.second_form_share if same_port else data.remainder
     for part in (slice(None), parts[0]):
-        whole, residual, after = (np.sum(each.of_parts[part]) for each in (before, alone, both))
-        if residual - after >= max(rules.second_share * residual, least * whole):
+        whole, residual, remaining = (
+            np.sum(by_part.of_parts[part]) for by_part in (before, between, final)
+        )
+        if residual - remaining >= max(rules.second_share * residual, least * whole):
             return True
     return False
 
@@ -346,7 +389,7 @@ def is_earned(
 def ill_explained(before: Excess, after: Excess, rules: Rules) -> list[int]:
     """Return the parts of the data that contradict both a base and a fit, the worst first.
 
-    The worst one, and all others that the fit explains by no more than half.
+    They are the worst part and all others of which the fit explains less than half.
     """
     wrong = np.flatnonzero(before.significant(rules) & after.significant(rules))
     residual = after.of_parts[wrong] / before.of_parts[wrong]
@@ -355,9 +398,9 @@ def ill_explained(before: Excess, after: Excess, rules: Rules) -> list[int]:
 
 
 def beyond_stated(fitted: Fit, rules: Rules) -> NDArray[np.float64]:
-    """Return the chi-square by which zeros and gains of sensors are far beyond what is stated.
+    """Return by parameter the chi-square of values far beyond what is stated of them.
 
-    Of each parameter, shape (n_parameters,); zero where it is near or nothing is stated.
+    Shape (n_parameters,); zero where a value is near, or nothing is stated.
     """
     away = from_stated(fitted)
     return np.where(np.abs(away) > rules.false_alarm_deviations, away**2, 0.0)

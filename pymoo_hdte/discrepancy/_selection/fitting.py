@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pymoo_hdte.discrepancy._selection.candidate import Candidate, Layout
-from pymoo_hdte.discrepancy._selection.excess import Excess, Vote
+from pymoo_hdte.discrepancy._selection.excess import Excess, HeldOutTest
 from pymoo_hdte.discrepancy._selection.levenberg_marquardt import SETTLED_SHARE, Minimum, minimum
 from pymoo_hdte.discrepancy._selection.rules import Rules
 from pymoo_hdte.effects.unknowns import Parameter
@@ -228,7 +228,7 @@ class Evidence(Protocol):
         """
         ...
 
-    def held_out_vote(self, base: Fit, fitted: Fit) -> Vote | None:
+    def held_out_test(self, base: Fit, fitted: Fit) -> HeldOutTest | None:
         """Return what the records kept out of the fit say of two fits; None without any."""
         ...
 
@@ -250,7 +250,7 @@ class Unknowns:
     def __init__(self, base: Sequence[Parameter], candidates: Sequence[Candidate]) -> None:
         self.candidates = tuple(candidates)
         added = [parameter for candidate in candidates for parameter in candidate.parameters]
-        freed = {candidate.frees for candidate in candidates}
+        freed = {candidate.releases for candidate in candidates}
         kept = [_without_tolerance(one) if one.name in freed else one for one in base]
         self.parameters = (*kept, *added)
         layout = Layout(self.parameters)

@@ -1,7 +1,7 @@
 """Hypotheses: sets of effects fitted jointly with the base, and the misfit that each explains.
 
-An effect that explains only one part of the data must not count as the cause of the others: see
-`excess`.
+An effect that explains only one part of the data must not count as the cause of the others, so that
+the excess is compared by part.
 """
 
 from __future__ import annotations
@@ -28,11 +28,11 @@ class Hypothesis:
     ----------
     fit : Fit
     bic : float
-        Chi-square + parameters x ln(residuals).
+        Bayesian information criterion: chi-square + parameters x ln(residuals).
     explained : float
-        Share of the base's excess chi-square that it removes; 1 leaves nothing but noise.
+        Share of the base's excess chi-square that the set removes; at 1 only noise is left.
     removed : float
-        By how much its chi-square is less than the base's.
+        Difference of the base's chi-square and that of the set.
     """
 
     fit: Fit
@@ -42,54 +42,56 @@ class Hypothesis:
 
     @property
     def candidates(self) -> tuple[Candidate, ...]:
-        """The effects."""
+        """Effects and released base parameters of the set."""
         return self.fit.candidates
 
     @property
     def listed(self) -> bool:
-        """Whether a verdict may name all of them."""
+        """Whether a verdict may name all candidates."""
         return all(candidate.listed for candidate in self.candidates)
 
     @property
     def exact(self) -> bool:
-        """Whether the forms of all of them are known exactly."""
+        """Whether the forms of all candidates are known exactly."""
         return all(candidate.exact for candidate in self.candidates)
 
     @property
-    def freed(self) -> tuple[Candidate, ...]:
-        """The base parameters out of tolerance among them."""
-        return tuple(each for each in self.candidates if each.frees is not None)
+    def released(self) -> tuple[Candidate, ...]:
+        """Candidates that are base parameters released from their tolerance."""
+        return tuple(candidate for candidate in self.candidates if candidate.releases is not None)
 
     @property
     def effects(self) -> tuple[Candidate, ...]:
-        """The others."""
-        return tuple(each for each in self.candidates if each.frees is None)
+        """Candidates that are effects, not base parameters."""
+        return tuple(candidate for candidate in self.candidates if candidate.releases is None)
 
     @property
     def label(self) -> str:
-        """Their labels in one word."""
+        """Labels of all candidates, joined by plus signs."""
         return "+".join(candidate.label for candidate in self.candidates)
 
     @property
     def members(self) -> list[tuple[Candidate, ...]]:
-        """The effects one by one; base parameters out of tolerance are one member together."""
-        alone = [(each,) for each in self.effects]
-        return alone + ([self.freed] if self.freed else [])
+        """The effects one by one; released base parameters form one member together."""
+        members = [(candidate,) for candidate in self.effects]
+        return members + ([self.released] if self.released else [])
 
-    def values_of(self, kept: Sequence[Candidate]) -> NDArray[np.float64]:
-        """Return the fitted values of the base and of some of the effects, in their order here."""
-        parts = [self.fit.values[place] for one, place in self.fit.places if one in kept]
+    def values_of(self, effects: Sequence[Candidate]) -> NDArray[np.float64]:
+        """Return the fitted values of the base and of some of its effects, in the order of both."""
+        parts = [
+            self.fit.values[place] for candidate, place in self.fit.places if candidate in effects
+        ]
         return np.concatenate([self.fit.values[: self.fit.n_base], *parts])
 
     @cached_property
     def names(self) -> frozenset[tuple[str, str]]:
-        """Name and port of each; a value out of tolerance and the effect it stands for are one."""
-        return frozenset(candidate.says for candidate in self.candidates)
+        """Name and port of each candidate, where a released value has those of its effect."""
+        return frozenset(candidate.named_effect for candidate in self.candidates)
 
 
 def label_of(effects: Sequence[Candidate]) -> frozenset[str]:
-    """Return what tells a set of effects from others, whatever their order."""
-    return frozenset(one.label for one in effects)
+    """Return the labels of a set of effects, which identify it whatever their order."""
+    return frozenset(candidate.label for candidate in effects)
 
 
 def hypothesis_of(fitted: Fit, of_base: float) -> Hypothesis:
@@ -103,20 +105,20 @@ def hypothesis_of(fitted: Fit, of_base: float) -> Hypothesis:
 
 
 def adequate(degrees_of_freedom: int, rules: Rules) -> float:
-    """Return chi-square per degree of freedom up to which a model is adequate; 1.15 for 1400."""
+    """Return the largest chi-square per degree of freedom of an adequate model; 1.15 for 1400."""
     return float(1.0 + rules.false_alarm_deviations * np.sqrt(2.0 / degrees_of_freedom))
 
 
 def down_to_noise(fitted: Fit, degrees_of_freedom: int, rules: Rules) -> bool:
-    """Tell whether a fit is `adequate`."""
+    """Tell whether the chi-square of a fit is that of noise, as of `adequate`."""
     return fitted.chi_square <= adequate(degrees_of_freedom, rules) * degrees_of_freedom
 
 
-def unexplained(data: Evidence, base: Fit, fitted: Fit) -> NDArray[np.bool_]:
-    """Tell which parts of the data that contradict the base clearly contradict a fit, too.
+def contradicted_parts(data: Evidence, base: Fit, fitted: Fit) -> NDArray[np.bool_]:
+    """Tell which parts of the data contradict both the base and a fit, shape (parts,).
 
-    Shape (parts,), as `Excess` has them. If there are several records, the worst is left out: it
-    may be at a resonance, where no form is exact.
+    If there are several records, the worst of each part is left out: it may be at a resonance,
+    where no form is exact.
     """
     before, after, rules = data.excess(base), data.excess(fitted), data.rules
     worst = after.worst
@@ -130,10 +132,10 @@ def unexplained(data: Evidence, base: Fit, fitted: Fit) -> NDArray[np.bool_]:
 def bounded_unknowns(fitted: Fit) -> list[tuple[Candidate, dict[str, float]]]:
     """Return for each candidate of a fit its unknowns that ended at a bound, with their values.
 
-    A level that ended at zero is a part that the effect does not have, and a corner that ended as
-    sharp as points can resolve is a sharp corner.
+    A level of zero does not count, since the effect then lacks this part. Neither does a corner
+    that is as sharp as points can resolve.
     """
-    found = []
+    bounded = []
     for candidate, place in fitted.places:
         values = {}
         rows = range(place.start, place.stop)
@@ -142,8 +144,8 @@ def bounded_unknowns(fitted: Fit) -> list[tuple[Candidate, dict[str, float]]]:
             none = parameter.linear and parameter.lower == 0.0 and side < 0.0
             if parameter.limited_at(side) and not none:
                 values[parameter.name] = float(fitted.values[row])
-        found.append((candidate, values))
-    return found
+        bounded.append((candidate, values))
+    return bounded
 
 
 def is_bounded(fitted: Fit) -> bool:
@@ -152,11 +154,11 @@ def is_bounded(fitted: Fit) -> bool:
 
 
 def expected_values(fitted: Fit, rules: Rules) -> NDArray[np.float64]:
-    """Return the values to be expected by a fit and its bounds, those around which intervals lie.
+    """Return the expected values by a fit and its bounds, shape (n_parameters,).
 
-    A base parameter that no record determines ends anywhere between its bounds, often at one of
-    them: to be expected is the middle. What an effect has beyond it, as an inertia beyond the
-    believed one, moves along. Shape (n_parameters,).
+    Intervals lie around these. A base parameter that no record determines ends anywhere between its
+    bounds; its expectation is the middle. Correlated values, such as an inertia beyond the nominal
+    one, move along.
     """
     n, variance = fitted.n_base, np.diag(fitted.covariance)
     layout = Layout(fitted.parameters)
@@ -170,137 +172,156 @@ def expected_values(fitted: Fit, rules: Rules) -> NDArray[np.float64]:
     return np.asarray(np.clip(moved, lower, upper))
 
 
-def gains_enough(one: Hypothesis, base: Fit, rules: Rules) -> bool:
-    """Tell whether a set of effects reduces the criterion of the base enough for a name."""
-    unknowns = sum(candidate.unknowns for candidate in one.candidates)
-    gain = base.chi_square - one.fit.chi_square
+def gains_enough(hypothesis: Hypothesis, base: Fit, rules: Rules) -> bool:
+    """Tell whether a set of effects reduces the BIC of the base enough to be named."""
+    unknowns = sum(candidate.unknowns for candidate in hypothesis.candidates)
+    gain = base.chi_square - hypothesis.fit.chi_square
     return bool(gain - unknowns * np.log(len(base.residuals)) >= rules.bic_gain)
 
 
-def explains(data: Evidence, one: Hypothesis, base: Fit, degrees_of_freedom: int) -> bool:
+def explains(data: Evidence, hypothesis: Hypothesis, base: Fit, degrees_of_freedom: int) -> bool:
     """Tell whether a set of effects explains the misfit of the base, in all parts of the data."""
     rules, limit = data.rules, adequate(degrees_of_freedom, data.rules)
-    share = rules.exact_share if one.exact else rules.explained_share
-    limit = max(limit, rules.exact_chi_square) if one.exact else limit
-    if not gains_enough(one, base, rules):
+    share = rules.exact_share if hypothesis.exact else rules.explained_share
+    limit = max(limit, rules.exact_chi_square) if hypothesis.exact else limit
+    if not gains_enough(hypothesis, base, rules):
         return False
-    if one.fit.chi_square <= limit * degrees_of_freedom:
+    if hypothesis.fit.chi_square <= limit * degrees_of_freedom:
         return True
-    return one.explained >= share and not unexplained(data, base, one.fit).any()
+    return (
+        hypothesis.explained >= share and not contradicted_parts(data, base, hypothesis.fit).any()
+    )
 
 
-def misfit_of(one: Hypothesis, degrees_of_freedom: int) -> float:
-    """Return chi-square per degree of freedom that a set leaves, 1 at least: the unit of gains."""
-    return max(one.fit.chi_square / degrees_of_freedom, 1.0)
+def misfit_of(hypothesis: Hypothesis, degrees_of_freedom: int) -> float:
+    """Return the chi-square per degree of freedom of a set, at least 1: the unit of gains."""
+    return max(hypothesis.fit.chi_square / degrees_of_freedom, 1.0)
 
 
-def alike(
-    one: Hypothesis,
+def indistinguishable(
+    hypothesis: Hypothesis,
     chosen: Hypothesis,
     degrees_of_freedom: int,
     rules: Rules,
     overlap: bool = False,
 ) -> bool:
-    """Tell whether another hypothesis is indistinguishable from the chosen one with these data.
+    """Tell whether these data do not separate a hypothesis from the chosen one.
 
-    The true form of an effect may differ from the listed one. Two sets are therefore alike if what
-    one leaves beyond the other is no more than such forms leave, unless they differ by effects of
-    exact form only, or one is a special case of the other. Where even the chosen form leaves more
-    than noise, differences of chi-square are compared with this residual. Two laws at one port
-    ``overlap`` where other forms of both are known, beside the same values out of tolerance. Where
-    an effect of one stands for several base parameters of the other, the evidence alone tells. And
-    so it does where ``one`` has a form that only stands in for a listed one: the listed form is
-    compared as well, with room for its form.
+    The true form of an effect may differ from the listed one. Two sets therefore compete if one
+    leaves no more beyond the other than such forms do, unless they differ only by effects of exact
+    form or one is a special case of the other. If the chosen set leaves more than noise,
+    differences of chi-square are compared with what it leaves. The evidence alone decides if an
+    effect stands for several base parameters, or if the hypothesis has a form that only stands in
+    for a listed one. Two laws at one port ``overlap`` if other forms of both are known and the same
+    values are out of tolerance.
     """
-    if one.names == chosen.names:
+    if hypothesis.names == chosen.names:
         return False
     misfit = misfit_of(chosen, degrees_of_freedom)
-    near = near_by_evidence(one, chosen, degrees_of_freedom, rules)
-    if len(one.candidates) != len(chosen.candidates):
-        return near and _stands_for_parameters(one, chosen)
+    close = near_by_evidence(hypothesis, chosen, degrees_of_freedom, rules)
+    if len(hypothesis.candidates) != len(chosen.candidates):
+        return close and _stands_for_parameters(hypothesis, chosen)
     residual = chosen.fit.chi_square - degrees_of_freedom
-    if not (near or one.exact or chosen.exact or contains(one, chosen) or contains(chosen, one)):
-        further = one.fit.chi_square - chosen.fit.chi_square
-        pairs = differing(one.candidates, chosen.candidates)
-        if any(mine.only_as_form for mine, _ in pairs):
+    if not (
+        close
+        or hypothesis.exact
+        or chosen.exact
+        or contains(hypothesis, chosen)
+        or contains(chosen, hypothesis)
+    ):
+        increase = hypothesis.fit.chi_square - chosen.fit.chi_square
+        pairs = differing(hypothesis.candidates, chosen.candidates)
+        if any(member.only_as_form for member, _ in pairs):
             return False
-        same = all(mine.beside(other) for mine, other in pairs)
+        same = all(member.shares_port_with(counterpart) for member, counterpart in pairs)
         accuracy = rules.form_share if overlap and same else rules.form_accuracy
-        exact = all(mine.exact and other.exact for mine, other in pairs)
-        near = not exact and further < accuracy**2 * (chosen.removed + residual)
-    if near or misfit <= adequate(degrees_of_freedom, rules) or (one.exact and chosen.exact):
-        return near
-    return one.fit.chi_square - degrees_of_freedom < rules.form_ratio * residual
+        exact = all(member.exact and counterpart.exact for member, counterpart in pairs)
+        close = not exact and increase < accuracy**2 * (chosen.removed + residual)
+    if (
+        close
+        or misfit <= adequate(degrees_of_freedom, rules)
+        or (hypothesis.exact and chosen.exact)
+    ):
+        return close
+    return hypothesis.fit.chi_square - degrees_of_freedom < rules.form_ratio * residual
 
 
 def near_by_evidence(
-    one: Hypothesis, chosen: Hypothesis, degrees_of_freedom: int, rules: Rules
+    hypothesis: Hypothesis, chosen: Hypothesis, degrees_of_freedom: int, rules: Rules
 ) -> bool:
-    """Tell whether the evidence does not tell a set from the chosen one."""
+    """Tell whether the evidence does not separate a set from the chosen one."""
     misfit = misfit_of(chosen, degrees_of_freedom)
-    return one.fit.evidence - chosen.fit.evidence < rules.evidence_distance * misfit
+    return hypothesis.fit.evidence - chosen.fit.evidence < rules.evidence_distance * misfit
 
 
-def _stands_for_parameters(one: Hypothesis, other: Hypothesis) -> bool:
-    """Tell whether two sets with effects have as many members, and different effects.
+def _stands_for_parameters(hypothesis: Hypothesis, chosen: Hypothesis) -> bool:
+    """Tell whether two sets have equally many members, but different effects.
 
-    More or fewer parameters beside the same effects are no other answer.
+    Other numbers of parameters beside the same effects are no other answer.
     """
-    mine, theirs = label_of(one.effects), label_of(other.effects)
-    return bool(mine and theirs) and mine != theirs and len(one.members) == len(other.members)
+    effects, replaced = label_of(hypothesis.effects), label_of(chosen.effects)
+    return (
+        bool(effects and replaced)
+        and effects != replaced
+        and len(hypothesis.members) == len(chosen.members)
+    )
 
 
-def leave_the_same(one: Hypothesis, other: Hypothesis, rules: Rules) -> bool:
-    """Tell whether two sets explain the data so nearly alike that the same must be missing."""
-    difference = abs(one.fit.chi_square - other.fit.chi_square)
-    return difference <= rules.trial_gain * other.fit.chi_square
+def leave_the_same(hypothesis: Hypothesis, chosen: Hypothesis, rules: Rules) -> bool:
+    """Tell whether two sets leave so nearly the same that the same effect must be missing."""
+    difference = abs(hypothesis.fit.chi_square - chosen.fit.chi_square)
+    return difference <= rules.trial_gain * chosen.fit.chi_square
 
 
-def contains(one: Hypothesis, other: Hypothesis) -> bool:
-    """Tell whether a set is nested: it differs from another only by laws that contain the other's.
+def contains(hypothesis: Hypothesis, special: Hypothesis) -> bool:
+    """Tell whether a set contains another: it differs only by laws that contain the other's.
 
-    Stribeck's friction without its excess is Coulomb's: it always explains as much. Beside its law
-    a set may have further values out of tolerance; beside the same laws they are no other law.
+    Stribeck friction without its excess is Coulomb friction, so that it always explains as much.
+    Beside a law that contains the other's a set may release further values.
     """
-    own, others = label_of(one.freed), label_of(other.freed)
-    if len(one.effects) != len(other.effects):
+    released, special_released = label_of(hypothesis.released), label_of(special.released)
+    if len(hypothesis.effects) != len(special.effects):
         return False
-    pairs = differing(one.effects, other.effects)
-    wider = all(wide.port == special.port and wide.holds(special) for wide, special in pairs)
-    return wider and (own == others or (bool(pairs) and own > others > set()))
+    pairs = differing(hypothesis.effects, special.effects)
+    wider = all(law.port == case.port and law.holds(case) for law, case in pairs)
+    return wider and (
+        released == special_released or (bool(pairs) and released > special_released > set())
+    )
 
 
 def differing(
-    mine: Sequence[Candidate], theirs: Sequence[Candidate]
+    members: Sequence[Candidate], counterparts: Sequence[Candidate]
 ) -> list[tuple[Candidate, Candidate]]:
-    """Return in pairs the candidates by which two sets of one size differ, by their ports."""
-    shared = Counter(_places(mine)) & Counter(_places(theirs))
-    beyond = (_beyond(each, shared) for each in (mine, theirs))
-    own, other = (sorted(left, key=lambda each: each.port) for left in beyond)
-    return list(zip(own, other, strict=True))
+    """Return pairs of the candidates by which two sets of one size differ, ordered by port."""
+    shared = Counter(_places(members)) & Counter(_places(counterparts))
+    unshared = (_beyond(candidates, shared) for candidates in (members, counterparts))
+    by_port = (sorted(candidates, key=lambda candidate: candidate.port) for candidates in unshared)
+    return list(zip(*by_port, strict=True))
 
 
 def _places(candidates: Sequence[Candidate]) -> list[tuple[str, str]]:
-    return [(each.name, each.port) for each in candidates]
+    return [(candidate.name, candidate.port) for candidate in candidates]
 
 
 def _beyond(candidates: Sequence[Candidate], shared: Counter[tuple[str, str]]) -> list[Candidate]:
-    """Return the candidates beyond those that are shared; a set may have one name twice."""
-    left, rest = Counter(shared), []
-    for place, each in zip(_places(candidates), candidates, strict=True):
-        if left[place]:
-            left[place] -= 1
+    """Return the candidates beyond those that are shared; a set may hold a name twice."""
+    remaining, beyond = Counter(shared), []
+    for place, candidate in zip(_places(candidates), candidates, strict=True):
+        if remaining[place]:
+            remaining[place] -= 1
         else:
-            rest.append(each)
-    return rest
+            beyond.append(candidate)
+    return beyond
 
 
 def fit_all(
     data: Evidence, base: Fit, chosen: Sequence[Screened], excess: float
 ) -> list[Hypothesis]:
-    """Fit candidates, each jointly with the given effects; by rising BIC."""
-    found = []
-    for one in chosen:
-        fitted = fit(data, (*base.candidates, one.candidate), np.append(base.values, one.start))
-        found.append(hypothesis_of(fitted, excess))
-    return sorted(found, key=lambda one: one.bic)
+    """Return the fits of each candidate jointly with those of the base, by rising BIC."""
+    hypotheses = []
+    for effect in chosen:
+        fitted = fit(
+            data, (*base.candidates, effect.candidate), np.append(base.values, effect.start)
+        )
+        hypotheses.append(hypothesis_of(fitted, excess))
+    return sorted(hypotheses, key=lambda hypothesis: hypothesis.bic)

@@ -1,8 +1,8 @@
-"""How probable it is that a verdict is right: evidence over all compared sets, and experience.
+"""The probability that a verdict is right, from the evidence of all compared sets and experience.
 
-The evidence tells how much better a set explains the data than the others that were compared. It
-cannot tell how often the truth is in none of them, or no fit reached it: that share was counted on
-campaigns with a known truth, for each status.
+The evidence tells how much better a set explains the data than the other compared sets. It cannot
+tell how often the truth is in none of them, or was reached by no fit. That share was counted for
+each status on campaigns with a known truth.
 """
 
 from __future__ import annotations
@@ -20,22 +20,22 @@ def of_names(
     status: str,
     chosen: Hypothesis,
     equivalent: Sequence[Hypothesis],
-    found: Sequence[Hypothesis],
+    compared: Sequence[Hypothesis],
     degrees_of_freedom: int,
     rules: Rules,
 ) -> float | None:
-    """Return the probability that all names of a verdict, or one of its class, are true.
+    """Return the probability that all names of a verdict, or of a set of its class, are true.
 
-    Each set counts by its evidence, in units of what even the chosen one leaves. A set that
-    contains all names of another says that they are true, too.
+    Each set counts by its evidence, in units of the misfit of the chosen one. A set that contains
+    all names of another supports them.
 
     Parameters
     ----------
     status : str
     chosen : Hypothesis
     equivalent : sequence of Hypothesis
-        Others of its class.
-    found : sequence of Hypothesis
+        Other sets of its class.
+    compared : sequence of Hypothesis
         All compared sets.
     degrees_of_freedom : int
     rules : Rules
@@ -43,12 +43,12 @@ def of_names(
     Returns
     -------
     float or None
-        None for a status that names nothing.
+        Probability; None for a status that names nothing.
     """
     experience = experience_of(rules).get(status)
     if experience is None:
         return None
-    return experience * _share((chosen, *equivalent), found, degrees_of_freedom)
+    return experience * _share((chosen, *equivalent), compared, degrees_of_freedom)
 
 
 def experience_of(rules: Rules) -> dict[str, float]:
@@ -64,47 +64,45 @@ def experience_of(rules: Rules) -> dict[str, float]:
 def likelier(
     chosen: Hypothesis,
     equivalent: Sequence[Hypothesis],
-    found: Sequence[Hypothesis],
+    compared: Sequence[Hypothesis],
     degrees_of_freedom: int,
 ) -> list[Hypothesis]:
-    """Return sets that make names improbable: all of more evidence, if these have less than half.
+    """Return the sets of more evidence than the chosen one, if its class has less than half of it.
 
-    Of a plain name it must be more probable than not that it is true. Sets that contain the chosen
-    names, or those of an equivalent one, speak for them and do not count.
-
-    Parameters as of `of_names`.
+    An unqualified name must be more probable than not. Sets that contain the names of the class
+    support them and do not count. Parameters are those of `of_names`.
     """
     named = chosen, *equivalent
-    if _share(named, found, degrees_of_freedom) >= 0.5:
+    if _share(named, compared, degrees_of_freedom) >= 0.5:
         return []
-    others = (one for one in found if not _says(one, named))
-    return [one for one in others if one.fit.evidence < chosen.fit.evidence]
+    others = (hypothesis for hypothesis in compared if not _supports(hypothesis, named))
+    return [hypothesis for hypothesis in others if hypothesis.fit.evidence < chosen.fit.evidence]
 
 
 def _share(
-    named: Sequence[Hypothesis], found: Sequence[Hypothesis], degrees_of_freedom: int
+    named: Sequence[Hypothesis], compared: Sequence[Hypothesis], degrees_of_freedom: int
 ) -> float:
-    """Return the share of the evidence of all compared sets for a class, the chosen set first."""
+    """Return the share of the evidence that supports a class, whose first set is the chosen one."""
     misfit = misfit_of(named[0], degrees_of_freedom)
-    evidence = np.array([one.fit.evidence for one in found])
+    evidence = np.array([hypothesis.fit.evidence for hypothesis in compared])
     weights = np.exp(-(evidence - evidence.min()) / (2.0 * misfit))
-    says = [_says(one, named) for one in found]
-    return float(weights[says].sum() / weights.sum())
+    supporting = [_supports(hypothesis, named) for hypothesis in compared]
+    return float(weights[supporting].sum() / weights.sum())
 
 
-def _says(one: Hypothesis, named: Sequence[Hypothesis]) -> bool:
-    return any(each.names <= one.names for each in named)
+def _supports(hypothesis: Hypothesis, named: Sequence[Hypothesis]) -> bool:
+    return any(claim.names <= hypothesis.names for claim in named)
 
 
 def of_nothing(screened: Sequence[Screened], n_residuals: int, rules: Rules) -> float:
-    """Return the probability that nothing is missing, against every candidate that was screened.
+    """Return the probability that nothing is missing, against all screened candidates.
 
-    Each counts by the BIC that it would have to first order; all of them together were as likely
-    beforehand as nothing.
+    Each counts by the BIC that it would have to first order. Beforehand all of them together are as
+    probable as that nothing is missing.
     """
     if not screened:
         return rules.adequate_right
-    gains = np.array([one.reduction for one in screened])
-    unknowns = np.array([one.candidate.unknowns for one in screened])
+    gains = np.array([effect.reduction for effect in screened])
+    unknowns = np.array([effect.candidate.unknowns for effect in screened])
     odds = np.exp((gains - unknowns * np.log(n_residuals)) / 2.0).mean()
     return rules.adequate_right / float(1.0 + odds)

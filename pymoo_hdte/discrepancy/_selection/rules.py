@@ -1,6 +1,6 @@
 """All thresholds that decide a verdict: `Rules`, one line each.
 
-``rules.toml`` beside this file says of each what it decides, in which unit, and how it was derived.
+``rules_explained.toml`` beside this file says of each what it decides, its unit and its derivation.
 Steps of difference quotients, orders of filters and tolerances of solvers are no rules: finer ones
 change the digits of a result but not the criteria of a verdict. They stand beside the code that
 needs them.
@@ -235,7 +235,7 @@ class Rules:
 
     def explained(self) -> tuple[Rule, ...]:
         """Return every rule with its present value, in words."""
-        text = Path(__file__).with_suffix(".toml").read_text(encoding="utf-8")
+        text = Path(__file__).with_name("rules_explained.toml").read_text(encoding="utf-8")
         return tuple(
             Rule(name, getattr(self, name), **words) for name, words in tomllib.loads(text).items()
         )

@@ -1,10 +1,9 @@
 """Screening: which candidates could explain a misfit, by comparing their signatures with it.
 
-The signature of a candidate is the change of the features by a typical strength of it. The part
-that base parameters can imitate is projected out; the share of the misfit along the remainder is
-what the candidate could remove, to first order, with a free strength. This is wrong for strongly
-nonlinear effects only, so that several strengths are tried and the best candidates are then fitted
-without linearisation.
+The signature of a candidate is the change of the residuals by a typical strength of it. The part
+that base parameters can imitate is projected out. The misfit along the remainder is what the
+candidate could remove, to first order, with a free strength. Strongly nonlinear effects deviate
+from this: several strengths are tried, and the best candidates are fitted without linearisation.
 """
 
 from __future__ import annotations
@@ -22,9 +21,9 @@ from pymoo_hdte.discrepancy._selection.rules import Rules
 from pymoo_hdte.effects.unknowns import HARMONIC_NAMES
 
 _NONE = np.empty((0, 0))
-"""No signatures, and no moves."""
+"""Stands for no signatures, and for no moves."""
 _RANK = 1e-5
-"""Share of the largest singular value from which a direction counts."""
+"""Share of the largest singular value above which a direction counts."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,10 +34,11 @@ class Screened:
     ----------
     candidate : Candidate
     reduction : float
-        Of the whole chi-square.
+        Reduction of the whole chi-square, to first order.
     start : tuple of float
+        Values from which to fit it.
     by_part : tuple of float
-        The same for each part of the data alone, with parameters at bounds held there; empty for a
+        Reduction in each part of the data alone, with parameters at bounds held there; empty for a
         parameter out of tolerance.
     signatures : ndarray, shape (n_starts, n_residuals)
         Change of the residuals by each of its starts; empty for a parameter out of tolerance.
@@ -52,132 +52,134 @@ class Screened:
 
 
 def screen(data: Evidence, fitted: Fit, candidates: Sequence[Candidate]) -> list[Screened]:
-    """Return all candidates, the most promising first.
+    """Return all candidates as screened, by falling reduction.
 
-    Beside effects, parameters that ended at a bound may leave it inward: with an effect missing the
-    gain of a sensor goes to its bound, and comes back with the effect. Without effects they stay
-    there, so that noise alone removes no more than `Rules.single_effect_gain` says.
+    Beside effects, parameters that ended at a bound may move inward: the gain of a sensor goes to
+    its bound if an effect is missing, and comes back with the effect. Without effects they stay at
+    their bounds, so that noise alone removes no more than `Rules.single_effect_gain`.
 
     Parameters
     ----------
     data : Evidence
     fitted : Fit
-        The present model, perhaps with effects, whose misfit is to be explained.
+        Present model, perhaps with effects, whose misfit is to be explained.
     candidates : sequence of Candidate
     """
     orthonormal, residual = _beyond_parameters(fitted)
     response, parts = data.response(fitted), data.rows_of_parts()
     inward = _inward(fitted, orthonormal) if fitted.candidates else _NONE
-    found = []
+    screened = []
     for candidate in candidates:
-        if candidate.frees is not None:
-            found.append(_freed(candidate, fitted, orthonormal, residual))
+        if candidate.releases is not None:
+            screened.append(_released(candidate, fitted, orthonormal, residual))
             continue
         signatures = np.array([response(candidate.build(start)) for start in candidate.starts])
-        found.append(_screened(candidate, signatures, orthonormal, residual, parts, inward))
-    return sorted(found, key=lambda one: -one.reduction)
+        screened.append(_screened(candidate, signatures, orthonormal, residual, parts, inward))
+    return sorted(screened, key=lambda effect: -effect.reduction)
 
 
-def most_hopeful(
+def shortlist(
     data: Evidence,
     fitted: Fit,
-    others: Sequence[Candidate],
-    known: Sequence[Screened],
-    left: float,
+    candidates: Sequence[Candidate],
+    screened_before: Sequence[Screened],
+    excess: float,
     ill: Sequence[tuple[int, float]],
 ) -> list[Screened]:
     """Return the effects that may remove most of what a fit leaves, in total or in a part of it.
 
-    If to first order none does in total, the best one is tried where it is promising.
+    If none does in total to first order, the best one is returned if it removes enough.
 
     Parameters
     ----------
     data : Evidence
     fitted : Fit
-    others : sequence of Candidate
-        Effects.
-    known : sequence of Screened
-        The same, as screened beside another model of these data; or nothing.
-    left : float
+    candidates : sequence of Candidate
+        Effects that may be added.
+    screened_before : sequence of Screened
+        The same effects as screened beside another model of these data, or nothing.
+    excess : float
         Excess chi-square of the fit.
     ill : sequence of (int, float)
-        Parts of the data that it explains ill, and their excess.
+        Parts of the data that the fit explains badly, with their excess.
     """
     rules = data.rules
-    if known:
-        others = _not_far_behind(data, fitted, known, left, ill)
-    screened = screen(data, fitted, others) if others else []
-    chosen = _hopeful(screened, [one.reduction for one in screened], left, rules)
+    if screened_before:
+        candidates = _not_far_behind(data, fitted, screened_before, excess, ill)
+    screened = screen(data, fitted, candidates) if candidates else []
+    chosen = _shortlist(screened, [effect.reduction for effect in screened], excess, rules)
     if not chosen:
-        chosen = [one for one in screened[:1] if one.reduction >= rules.promising_share * left]
+        chosen = [
+            effect for effect in screened[:1] if effect.reduction >= rules.promising_share * excess
+        ]
     for part, of_part in ill:
-        reductions = [one.by_part[part] for one in screened]
-        more = _hopeful(screened, reductions, of_part, rules)
-        chosen += [one for one in more if one not in chosen]
+        reductions = [effect.by_part[part] for effect in screened]
+        further = _shortlist(screened, reductions, of_part, rules)
+        chosen += [effect for effect in further if effect not in chosen]
     return chosen
 
 
 def _not_far_behind(
     data: Evidence,
     fitted: Fit,
-    known: Sequence[Screened],
-    left: float,
+    screened_before: Sequence[Screened],
+    excess: float,
     ill: Sequence[tuple[int, float]],
 ) -> list[Candidate]:
     """Return the effects that are worth a screening, which takes a prediction for each start.
 
-    Their signatures beside another fit tell without any prediction. Effects that move a resonance
-    or take contact away change them, so that only candidates that stay far behind are left out.
+    Their signatures beside another fit take no prediction. Effects that move a resonance or take
+    contact away change them, so that only candidates far behind are left out.
     """
     share = data.rules.promising_share * data.rules.second_hope_share
     orthonormal, residual = _beyond_parameters(fitted)
     parts, inward = data.rows_of_parts(), _inward(fitted, orthonormal)
-    found = (
-        _screened(one.candidate, one.signatures, orthonormal, residual, parts, inward)
-        for one in known
+    rescreened = (
+        _screened(effect.candidate, effect.signatures, orthonormal, residual, parts, inward)
+        for effect in screened_before
     )
     return [
-        one.candidate
-        for one in found
-        if one.reduction >= share * left
-        or any(one.by_part[part] >= share * of_part for part, of_part in ill)
+        effect.candidate
+        for effect in rescreened
+        if effect.reduction >= share * excess
+        or any(effect.by_part[part] >= share * of_part for part, of_part in ill)
     ]
 
 
-def _hopeful(
-    screened: Sequence[Screened], reductions: Sequence[float], left: float, rules: Rules
+def _shortlist(
+    screened: Sequence[Screened], reductions: Sequence[float], excess: float, rules: Rules
 ) -> list[Screened]:
-    """Return the best candidates, to first order, if they remove enough of what is left."""
+    """Return the best candidates to first order, if they remove enough of an excess."""
     order = np.argsort([-reduction for reduction in reductions], kind="stable")
-    enough = [screened[k] for k in order if reductions[k] >= rules.second_hope_share * left]
+    enough = [screened[k] for k in order if reductions[k] >= rules.second_hope_share * excess]
     return varied(enough, 1)[: rules.most_seconds]
 
 
 def varied(screened: Sequence[Screened], most: int) -> list[Screened]:
     """Return at most the ``most`` best candidates of each name."""
-    names = [one.candidate.name for one in screened]
-    return [one for k, one in enumerate(screened) if names[:k].count(names[k]) < most]
+    names = [effect.candidate.name for effect in screened]
+    return [effect for k, effect in enumerate(screened) if names[:k].count(names[k]) < most]
 
 
 def reduced(
-    one: Screened, orthonormal: NDArray[np.float64], residual: NDArray[np.float64]
+    effect: Screened, orthonormal: NDArray[np.float64], residual: NDArray[np.float64]
 ) -> Screened:
-    """Return a known candidate with what it could remove of another residual (n,).
+    """Return a screened candidate with what it could remove of another residual (n,).
 
-    What is done by other directions, orthonormal (n, k), is projected out of its signatures.
+    Orthonormal directions (n, k) that others can do are projected out of its signatures.
     """
-    return _screened(one.candidate, one.signatures, orthonormal, residual, (), _NONE)
+    return _screened(effect.candidate, effect.signatures, orthonormal, residual, (), _NONE)
 
 
 def _beyond_parameters(fitted: Fit) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return what parameters can do, shape (n, k), orthonormal, and what they leave, (n,)."""
+    """Return an orthonormal basis of the parameters' changes (n, k), and what they leave (n,)."""
     # A parameter at its bound cannot move beyond it.
     orthonormal, _ = np.linalg.qr(fitted.jacobian[:, fitted.bound_sides == 0.0])
     return orthonormal, fitted.residuals - orthonormal @ (orthonormal.T @ fitted.residuals)
 
 
 def _inward(fitted: Fit, orthonormal: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return what parameters at bounds do beyond the others if they leave these, shape (k, n)."""
+    """Return the changes by parameters that leave their bounds, beyond the others, shape (k, n)."""
     bounded = fitted.bound_sides != 0.0
     moves = -(fitted.jacobian[:, bounded] * fitted.bound_sides[bounded])
     return np.asarray((moves - orthonormal @ (orthonormal.T @ moves)).T)
@@ -191,7 +193,7 @@ def _screened(
     parts: Sequence[NDArray[np.int_]],
     inward: NDArray[np.float64],
 ) -> Screened:
-    """Return what a candidate could remove, as a whole and in each part."""
+    """Return what a candidate could remove in total and in each part."""
     beyond = signatures - (signatures @ orthonormal) @ orthonormal.T
     by_part = tuple(
         _best_start(candidate, beyond[:, rows], residual[rows], _NONE).reduction for rows in parts
@@ -200,14 +202,14 @@ def _screened(
     return replace(best, by_part=by_part, signatures=signatures)
 
 
-def _freed(
+def _released(
     candidate: Candidate,
     fitted: Fit,
     orthonormal: NDArray[np.float64],
     residual: NDArray[np.float64],
 ) -> Screened:
-    """Return the reduction by a parameter at its bound if it could go beyond."""
-    place = [parameter.name for parameter in fitted.parameters].index(str(candidate.frees))
+    """Return the reduction by a parameter at its bound if it could move beyond it."""
+    place = [parameter.name for parameter in fitted.parameters].index(str(candidate.releases))
     signature = fitted.jacobian[:, place] * fitted.bound_sides[place]
     signature = signature - orthonormal @ (orthonormal.T @ signature)
     along, size = float(-signature @ residual), float(signature @ signature)
@@ -220,20 +222,22 @@ def _best_start(
     residual: NDArray[np.float64],
     inward: NDArray[np.float64],
 ) -> Screened:
-    """Return the reduction by the candidate, and the strengths that give it."""
+    """Return the largest reduction by a candidate, with the values that give it as start."""
     starts = np.array(candidate.starts)
     lower = np.array([parameter.lower for parameter in candidate.parameters])
     upper = np.array([parameter.upper for parameter in candidate.parameters])
     if candidate.linear:
-        found, reduction = _least_squares(signatures, residual, inward)
-        best = found @ starts
-        harmonic = [one.name.startswith(HARMONIC_NAMES[1:]) for one in candidate.parameters]
+        strengths, reduction = _least_squares(signatures, residual, inward)
+        best = strengths @ starts
+        harmonic = [
+            parameter.name.startswith(HARMONIC_NAMES[1:]) for parameter in candidate.parameters
+        ]
         lines = np.hypot(*best[harmonic].reshape(-1, 2).T)
         if lines.size and lines.max() > np.hypot(*best[:2]):
             # A line that is weaker than its harmonic is not the fundamental of that harmonic.
-            kept = np.flatnonzero(~np.array(harmonic))
-            found, reduction = _least_squares(signatures[kept], residual, inward)
-            best = found @ starts[kept]
+            fundamental = np.flatnonzero(~np.array(harmonic))
+            strengths, reduction = _least_squares(signatures[fundamental], residual, inward)
+            best = strengths @ starts[fundamental]
     else:
         # The first parameter is the strength; the others are shapes.
         positive = bool(lower[0] >= 0.0)
@@ -250,10 +254,13 @@ def _one_by_one(
     inward: NDArray[np.float64],
     positive: bool,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the strength of each signature (k, n) alone, and the reduction by it, (k,)."""
+    """Return the strength of each signature (k, n) alone, and its reduction, both (k,)."""
     if len(inward):
-        found = [_least_squares(one[None], residual, inward, positive) for one in signatures]
-        return np.array([one for (one,), _ in found]), np.array([gain for _, gain in found])
+        solutions = [
+            _least_squares(signature[None], residual, inward, positive) for signature in signatures
+        ]
+        gains = np.array([gain for _, gain in solutions])
+        return np.array([strength for (strength,), _ in solutions]), gains
     sizes = np.einsum("ij,ij->i", signatures, signatures)
     along = -signatures @ residual
     strengths = np.divide(along, sizes, out=np.zeros_like(along), where=sizes > 1e-12)
@@ -268,25 +275,28 @@ def _least_squares(
 ) -> tuple[NDArray[np.float64], float]:
     """Return the strengths of signatures (k, n) with the largest reduction, and that reduction.
 
-    Those of moves ``inward`` (m, n) are positive, of signatures only where they are ``positive``.
+    Strengths of moves ``inward`` (m, n) cannot be negative, nor can those of signatures if
+    ``positive``.
     """
     moves, columns = len(inward), signatures.T
     if moves:
         columns = np.concatenate([inward, signatures]).T
         sizes = np.maximum(np.linalg.norm(columns, axis=0), 1e-9)
-        left, right = np.linalg.qr(columns / sizes)
+        orthonormal, triangle = np.linalg.qr(columns / sizes)
         least = np.full(len(sizes), 0.0 if positive else -np.inf)
         least[:moves] = 0.0
-        found = lsq_linear(right, -left.T @ residual, (least, np.inf), "bvls").x / sizes
+        strengths = (
+            lsq_linear(triangle, -orthonormal.T @ residual, (least, np.inf), "bvls").x / sizes
+        )
     else:
-        found, *_ = np.linalg.lstsq(columns, -residual, rcond=1e-10)
-    rest = residual + columns @ found
-    return found[moves:], float(residual @ residual - rest @ rest)
+        strengths, *_ = np.linalg.lstsq(columns, -residual, rcond=1e-10)
+    unexplained = residual + columns @ strengths
+    return strengths[moves:], float(residual @ residual - unexplained @ unexplained)
 
 
 def basis_of(columns: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return an orthonormal basis of columns (n, m) that need not be independent, (n, k)."""
+    """Return an orthonormal basis (n, k) of columns (n, m), which may be dependent."""
     sizes = np.linalg.norm(columns, axis=0)
-    kept = sizes > 0.0
-    left, values, _ = np.linalg.svd(columns[:, kept] / sizes[kept], full_matrices=False)
-    return np.asarray(left[:, values > _RANK * values.max(initial=0.0)])
+    nonzero = sizes > 0.0
+    vectors, values, _ = np.linalg.svd(columns[:, nonzero] / sizes[nonzero], full_matrices=False)
+    return np.asarray(vectors[:, values > _RANK * values.max(initial=0.0)])

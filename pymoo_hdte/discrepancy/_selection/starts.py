@@ -20,9 +20,12 @@ Vector = NDArray[np.float64]
 
 
 def best_fit(
-    data: Evidence, one: Hypothesis, starts: Sequence[Vector], found: Collection[Hypothesis]
+    data: Evidence,
+    hypothesis: Hypothesis,
+    starts: Sequence[Vector],
+    hypotheses: Collection[Hypothesis],
 ) -> Fit:
-    """Return the best fit of a set from its values, the believed base and other starts.
+    """Return the best fit of a set from its values, the nominal base and other starts.
 
     A fit ends where it arrives at an earlier one.
 
@@ -30,13 +33,13 @@ def best_fit(
     ----------
     data : Evidence
     one : Hypothesis
-        The set, fitted at least so far as to rank it.
+        Set, fitted at least well enough to rank it.
     starts : sequence of ndarray, shape (n_parameters,)
-        In addition to its own values and those with the believed base.
-    found : collection of Hypothesis
-        Sets that it may contain: where it does no better than one of them, other shapes are tried.
+        Starts in addition to its own values and those with the nominal base.
+    hypotheses : collection of Hypothesis
+        Sets that it may contain. If it does no better than one of them, other shapes are tried.
     """
-    fits = [fit(data, one.candidates, one.fit)]
+    fits = [fit(data, hypothesis.candidates, hypothesis.fit)]
 
     def follow(further: Iterable[Vector]) -> Fit:
         for start in further:
@@ -44,24 +47,23 @@ def best_fit(
                 fits.append(again)
         return _least(fits)
 
-    best = follow((_from_believed(data.base, fits[0]), *starts))
-    best = follow(_other_shapes(best, _no_better(best, one, found, data.rules)))
-    return follow(_other_ends(best, _no_better(best, one, found, data.rules)))
+    best = follow((_from_nominal(data.base, fits[0]), *starts))
+    best = follow(_other_shapes(best, _no_better(best, hypothesis, hypotheses, data.rules)))
+    return follow(_other_ends(best, _no_better(best, hypothesis, hypotheses, data.rules)))
 
 
 def _least(fits: Sequence[Fit]) -> Fit:
-    return min(fits, key=lambda each: each.chi_square)
+    return min(fits, key=lambda fitted: fitted.chi_square)
 
 
 def _fit_from(data: Evidence, fits: Sequence[Fit], start: Vector) -> Fit | None:
-    """Return a fit from a start; None where it is not expected to end lower than the best one.
+    """Return a fit from a start; None if it is not expected to end lower than the best one.
 
-    The derivatives of the best one serve for the first steps where they foretell the residuals at
-    the start: where what else changes there is no larger, or counts for nothing. So a start that
-    leads back costs a few evaluations, and one beyond a kink of a law, as of a friction whose load
-    changes sign, ends lower. Where effects have other values, what their own unknowns do counts: a
-    law that has vanished foretells nothing of a new shape. From there a fit takes its own
-    derivatives, unless what is not foretold could remove nothing of what the best one leaves.
+    Derivatives of the best fit serve for the first steps if they predict the residuals at the start
+    well, so that a start that leads back costs few evaluations. If effects have other values,
+    the prediction by their own unknowns counts, since a law that has vanished predicts nothing of a
+    new shape. Otherwise the fit computes its own derivatives, unless the part that is not predicted
+    could remove nothing of what the best fit leaves.
     """
     best = _least(fits)
     problem = data.objective(best.candidates)
@@ -80,9 +82,9 @@ def _fit_from(data: Evidence, fits: Sequence[Fit], start: Vector) -> Fit | None:
 
 
 def _could_remove(best: Fit, change: Vector) -> bool:
-    """Tell whether a change of residuals, in any strength, could leave less than a fit does.
+    """Tell whether a change of residuals, in any strength, could improve a fit by more than `SAME`.
 
-    By more than `SAME`, beside the unknowns that are at no bound. What is not finite may.
+    Unknowns at no bound are fitted beside it. A change that is not finite could always.
     """
     if not np.isfinite(change).all():
         return True
@@ -91,38 +93,39 @@ def _could_remove(best: Fit, change: Vector) -> bool:
     return bool((beside @ best.residuals) ** 2 > SAME * best.misfit * (beside @ beside))
 
 
-def other_starts(one: Hypothesis, base: Vector) -> list[Vector]:
-    """Return starts of a single effect from all its own ones, beside fitted values of the base.
+def other_starts(hypothesis: Hypothesis, base: Vector) -> list[Vector]:
+    """Return all starts of a single effect, each beside the fitted values of the base.
 
-    An inertia that is larger by half moves a resonance past lines, so that chi-square does not
-    decrease steadily on the way there; and values of the base that hide an effect lie far off.
+    An inertia larger by half moves a resonance past lines, so that chi-square does not decrease
+    steadily on the way there. Values of the base that hide an effect are far off as well.
     """
-    (*others, last) = one.candidates
-    if others or len(last.starts) == 1 or last.linear:
+    (*others, effect) = hypothesis.candidates
+    if others or len(effect.starts) == 1 or effect.linear:
         return []
-    return [np.append(base, start) for start in last.starts]
+    return [np.append(base, start) for start in effect.starts]
 
 
-def _from_believed(base: Sequence[Parameter], fitted: Fit) -> Vector:
-    """Return the believed values of the base with the fitted ones of a set's effects."""
-    believed = np.array([parameter.start for parameter in base])
-    return np.append(believed, fitted.values[len(believed) :])
+def _from_nominal(base: Sequence[Parameter], fitted: Fit) -> Vector:
+    """Return the nominal values of the base with the fitted values of a set's effects."""
+    nominal = np.array([parameter.start for parameter in base])
+    return np.append(nominal, fitted.values[len(nominal) :])
 
 
 def _no_better(
-    best: Fit, one: Hypothesis, found: Iterable[Hypothesis], rules: Rules
+    best: Fit, hypothesis: Hypothesis, hypotheses: Iterable[Hypothesis], rules: Rules
 ) -> list[tuple[Candidate, slice]]:
     """Return the laws by which a set does no better than a special case of it.
 
-    Those with starts of several shapes, and the places of all their values but the strength.
+    Only laws with starts of several shapes are returned, each with the place of its shape, that is
+    of all values but the strength.
     """
     special = {
         name
-        for other in found
-        if one.names != other.names
-        and contains(one, other)
-        and other.fit.chi_square - best.chi_square < rules.evidence_distance
-        for name in other.names
+        for special_case in hypotheses
+        if hypothesis.names != special_case.names
+        and contains(hypothesis, special_case)
+        and special_case.fit.chi_square - best.chi_square < rules.evidence_distance
+        for name in special_case.names
     }
     return [
         (member, slice(place.start + 1, place.stop))
@@ -134,7 +137,7 @@ def _no_better(
 
 
 def _other_shapes(best: Fit, laws: Iterable[tuple[Candidate, slice]]) -> list[Vector]:
-    """Return starts with the shapes of all starts of laws that do no better than a special case.
+    """Return starts with all shapes of laws that do no better than a special case.
 
     A part of a law that has vanished during a fit has no shape that could lead it back.
     """
@@ -148,19 +151,18 @@ def _other_shapes(best: Fit, laws: Iterable[tuple[Candidate, slice]]) -> list[Ve
 
 
 def _other_ends(best: Fit, laws: Iterable[tuple[Candidate, slice]]) -> list[Vector]:
-    """Return starts at the other bound of shapes of such laws that ended at one.
+    """Return starts at the opposite bound of shapes of such laws that ended at a bound.
 
-    What a law adds to its special case at one bound of a shape differs from what it adds at the
-    other, and no slope leads across where it vanishes between them: an excess of friction that
-    fades at once, or nowhere. A shape is what the starts of a law differ in. What else ended at a
-    bound may have vanished, and begins as in the first of them.
+    What a law adds to its special case may vanish between the bounds of a shape, so that no slope
+    leads across: excess friction may fade at once or nowhere. A value counts as a shape if the
+    starts of the law differ in it; other values at a bound begin as in the first start.
     """
     starts = []
     for member, place in laws:
         layout, sides = Layout(member.parameters[1:]), best.bound_sides[place]
-        first, *others = np.array(member.starts)[:, 1:]
-        moved = sides * np.any(others != first, axis=0)
-        ends = [layout.array("upper"), layout.array("lower"), first]
+        first_shape, *other_shapes = np.array(member.starts)[:, 1:]
+        moved = sides * np.any(other_shapes != first_shape, axis=0)
+        ends = [layout.array("upper"), layout.array("lower"), first_shape]
         start = best.values.copy()
         start[place] = np.select([moved < 0.0, moved > 0.0, sides != 0.0], ends, start[place])
         if moved.any():

@@ -29,7 +29,7 @@ from pymoo_hdte.discrepancy._selection.equivalents import (
     complete,
     distinct,
 )
-from pymoo_hdte.discrepancy._selection.excess import Vote
+from pymoo_hdte.discrepancy._selection.excess import HeldOutTest
 from pymoo_hdte.discrepancy._selection.fitted_sets import beyond_stated
 from pymoo_hdte.discrepancy._selection.fitting import Evidence, Fit, fit
 from pymoo_hdte.discrepancy._selection.hypothesis import Hypothesis, down_to_noise
@@ -149,7 +149,7 @@ class Verdict:
 
     def proven(
         self,
-        vote: Vote | None = None,
+        vote: HeldOutTest | None = None,
         worse: Mapping[str, float] | None = None,
         condemned: bool = False,
     ) -> Verdict:
@@ -157,7 +157,7 @@ class Verdict:
 
         Parameters
         ----------
-        vote : Vote, optional
+        vote : HeldOutTest, optional
             Theirs on the named effects, where it has not been heard yet.
         worse : mapping of str to float, optional
             Prediction errors that grow with the named effects, after over before: see `grows`.
@@ -252,7 +252,7 @@ def _renewed_search(search: Search) -> Search:
     effect beside which sensors are far from what is stated is not all, and a base that needs no
     effect with that noise says nothing of this one.
     """
-    data, first = search.data, search.found[0]
+    data, first = search.data, search.hypotheses[0]
     explained = first.listed and first.explained >= data.rules.explained_share
     renewed = data.with_noise_of(first.fit) if explained and not search.enough(first) else None
     if renewed is None or not _is_all(renewed, fit(renewed, first.candidates, first.fit.values)):
@@ -261,8 +261,8 @@ def _renewed_search(search: Search) -> Search:
     if down_to_noise(base, search.degrees_of_freedom, data.rules):
         return search
     again = Search(renewed, base, candidates, screen(renewed, base, candidates), search.forms_only)
-    again.resume(search.found, go_on=True)
-    found = again.found[0]
+    again.resume(search.hypotheses, go_on=True)
+    found = again.hypotheses[0]
     same = found.label == first.label and _is_all(renewed, found.fit)
     return again if same and not again.held_by_sensors(found) else search
 
@@ -279,7 +279,7 @@ def _verdict(search: Search, answer: Answer) -> Verdict:
     data, rules, degrees_of_freedom = search.data, search.data.rules, search.degrees_of_freedom
     chosen, told, certain, foreign, in_part = answer
     equivalent = list(told)
-    vote = data.held_out_vote(search.base, chosen.fit)
+    vote = data.held_out_test(search.base, chosen.fit)
     shown = vote is None or vote.counts(rules)
     reasons = reasons_of(search, chosen, vote) + other_forms(search, chosen)
     if in_part:
@@ -288,25 +288,27 @@ def _verdict(search: Search, answer: Answer) -> Verdict:
     if (certain and not foreign) or in_part:
         # The rules of earning may pass over a set for which the evidence speaks: both are told.
         equivalent += in_one_law(search, chosen)
-        equivalent += probability.likelier(chosen, equivalent, search.found, degrees_of_freedom)
+        equivalent += probability.likelier(
+            chosen, equivalent, search.hypotheses, degrees_of_freedom
+        )
     equivalent = distinct(chosen, equivalent)
     known = (certain or in_part) and not search.lacks_evident(chosen)
     verdict = Verdict(
         search.base,
         chosen,
         known,
-        tuple(one for one in search.found if one is not chosen),
+        tuple(one for one in search.hypotheses if one is not chosen),
         tuple(equivalent),
         degrees_of_freedom,
         rules,
         tuple(reasons),
         shown,
-        in_another_form=search.forms.share_in_another(chosen) if foreign else None,
+        in_another_form=search.forms.share_in_another_form(chosen) if foreign else None,
     )
     if verdict.status == "unlisted":
         verdict = replace(verdict, equivalent=())
     others = verdict.equivalent
-    compared = (chosen, *others) if foreign else search.found
+    compared = (chosen, *others) if foreign else search.hypotheses
     # A class that is not all is no more certain than a name in part.
     like = "partial" if in_part and others else verdict.status
     sure = probability.of_names(like, chosen, others, compared, degrees_of_freedom, rules)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from pymoo_hdte.discrepancy._evidence.force_balances.evidence import MeasuredData
 from pymoo_hdte.discrepancy._evidence.force_balances.unexplained import fitted_values
-from pymoo_hdte.discrepancy._selection.excess import Vote
+from pymoo_hdte.discrepancy._selection.excess import HeldOutTest
 from pymoo_hdte.discrepancy._selection.fitting import Fit
 from pymoo_hdte.discrepancy._selection.verdict import Verdict
 from pymoo_hdte.discrepancy._verdicts.windows import Reach, Windows, reach_of, windows_of
@@ -222,7 +222,7 @@ def voted(verdict: Verdict, simulated: Sequence[SimulatedRecord]) -> Verdict:
     return verdict.proven(_vote(simulated))
 
 
-def _vote(simulated: Sequence[SimulatedRecord]) -> Vote:
+def _vote(simulated: Sequence[SimulatedRecord]) -> HeldOutTest:
     """Return the vote of simulated positions, in units of what was to be expected.
 
     A window of a free coordinate gives one independent value, since its error builds up.
@@ -235,10 +235,10 @@ def _vote(simulated: Sequence[SimulatedRecord]) -> Vote:
             if diverges.any():
                 # Where both diverge, nothing is said.
                 after, change = np.inf if diverges[1] else 0.0, 0.0 if diverges.all() else np.inf
-                return Vote(1.0, after, change)
+                return HeldOutTest(1.0, after, change)
             values = one.extent.windows * one.independent
             sums += values * powers / (expected + one.noise[name] ** 2)
-    return Vote(*sums.tolist())
+    return HeldOutTest(*sums.tolist())
 
 
 def fitted_mechanism(mechanism: Mechanism, fitted: Fit) -> Mechanism:

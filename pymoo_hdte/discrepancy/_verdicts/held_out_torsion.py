@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pymoo_hdte.discrepancy._evidence.force_balances.evidence import MeasuredData, measured_data
-from pymoo_hdte.discrepancy._selection.excess import Vote
+from pymoo_hdte.discrepancy._selection.excess import HeldOutTest
 from pymoo_hdte.discrepancy._selection.fitting import Fit
 from pymoo_hdte.discrepancy._selection.hypothesis import bounded_unknowns, label_of
 from pymoo_hdte.discrepancy._selection.verdict import Verdict
@@ -165,7 +165,7 @@ def voted(finding: MechanismFinding, gaps: Sequence[MeasuredGap]) -> Verdict:
         change = float(np.mean((gap.predicted_after - gap.predicted_before) ** 2))
         powers = np.array([gap.before**2, gap.after**2, change])
         sums += _independent(finding, gap.time) * powers / gap.expected**2
-    return verdict.proven(Vote(*sums.tolist()), grown(gaps))
+    return verdict.proven(HeldOutTest(*sums.tolist()), grown(gaps))
 
 
 def without_unproved_lines(verdict: Verdict, fitted: Fit, gaps: Sequence[MeasuredGap]) -> Verdict:

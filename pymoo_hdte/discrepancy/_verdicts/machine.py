@@ -10,6 +10,7 @@ import numpy as np
 
 from pymoo_hdte.checks import InvalidInput, one_of
 from pymoo_hdte.discrepancy._evidence.model_evidence import ModelEvidence
+from pymoo_hdte.discrepancy._evidence.predicted_records import PredictedRecords
 from pymoo_hdte.discrepancy._selection.fitting import fit
 from pymoo_hdte.discrepancy._selection.rules import RULES, Rules
 from pymoo_hdte.discrepancy._selection.verdict import Verdict, judge
@@ -31,7 +32,17 @@ class Machine(Protocol):
         ...
 
     def evidence(self, records: Sequence[Any]) -> ModelEvidence:
-        """Return some of the records as evidence."""
+        """Return some of the records beside the predictions of the model.
+
+        Parameters
+        ----------
+        records : sequence
+            Of `records`, those of one role.
+
+        Returns
+        -------
+        ModelEvidence
+        """
         ...
 
 
@@ -44,7 +55,7 @@ class MachineFinding:
     title : str
     names, held_out_names : tuple of str
         Of the training records, and of those that were held out.
-    data : ModelEvidence
+    data : PredictedRecords
         Training records; those held out are its ``held_out``.
     verdict : Verdict
     """
@@ -52,7 +63,7 @@ class MachineFinding:
     title: str
     names: tuple[str, ...]
     held_out_names: tuple[str, ...]
-    data: ModelEvidence
+    data: PredictedRecords
     verdict: Verdict
 
 
@@ -107,12 +118,10 @@ def examine_machine(machine: Machine, rules: Rules = RULES) -> MachineFinding:
     )
     if not train:
         raise InvalidInput("number of train records", 0, "at least 1")
-    data = _checked(machine.evidence(train))
-    data.rules = rules
-    if held_out:
-        data.held_out = _checked(machine.evidence(held_out))
+    kept_out = PredictedRecords(machine.evidence(held_out), rules=rules) if held_out else None
+    data = PredictedRecords(machine.evidence(train), kept_out, rules)
     base = fit(data)
-    verdict = judge(data, base, data.candidates(base))
+    verdict = judge(data, base, data.model.candidates(base))
     title = str(getattr(machine, "title", type(machine).__name__))
     names, held_out_names = (
         tuple(record.name for record in records) for records in (train, held_out)
@@ -123,12 +132,6 @@ def examine_machine(machine: Machine, rules: Rules = RULES) -> MachineFinding:
         return finding
     verdict = verdict.proven(worse=errors.growths, condemned=errors.overall.worse)
     return replace(finding, verdict=verdict)
-
-
-def _checked(data: ModelEvidence) -> ModelEvidence:
-    """Return evidence of a user, refused here where its residuals are none."""
-    data.check()
-    return data
 
 
 def held_out_errors(finding: MachineFinding) -> HeldOutErrors | None:

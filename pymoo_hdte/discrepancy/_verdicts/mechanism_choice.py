@@ -18,10 +18,10 @@ from pymoo_hdte.discrepancy._selection.hypothesis import (
     Hypothesis,
     bounded_unknowns,
     contains,
+    contradicted_parts,
     down_to_noise,
     hypothesis_of,
     label_of,
-    unexplained,
 )
 from pymoo_hdte.discrepancy._selection.reason import (
     AT_TOLERANCE,
@@ -64,7 +64,7 @@ def judged(
         quiet = np.all(before <= rules.noise_power_ratio * noise)
         return verdict if quiet else _as_unlisted(verdict, None)
     removed = share_removed(sensors, data, base, verdict.chosen.fit)
-    freed = [one.frees for one in verdict.chosen.candidates]
+    freed = [one.releases for one in verdict.chosen.candidates]
     out = any(one in verdict.chosen.fit.at_bounds for one in freed if one)
     least = rules.explained_share if verdict.status == "parameter" else rules.main_share
     if removed < least or out:
@@ -137,10 +137,10 @@ def _mostly_explained(sensors: MeasuredData, data: MeasuredData, verdict: Verdic
     chosen, rules = verdict.chosen, data.rules
     if chosen is None or verdict.status != "unlisted" or not chosen.listed:
         return verdict
-    if chosen.freed:
+    if chosen.released:
         return verdict
     removed = share_removed(sensors, data, verdict.base, chosen.fit)
-    if removed < rules.partial_share or unexplained(data, verdict.base, chosen.fit).any():
+    if removed < rules.partial_share or contradicted_parts(data, verdict.base, chosen.fit).any():
         return verdict
     rivals = [
         one
@@ -169,7 +169,7 @@ def _simplest(data: MeasuredData, verdict: Verdict) -> Verdict:
     near = [
         one
         for one in verdict.alternatives
-        if all(candidate.frees is None for candidate in one.candidates)
+        if all(candidate.releases is None for candidate in one.candidates)
         and _unknowns(one) < _unknowns(chosen)
         and _does_as_well(data, one.fit, chosen.fit)
     ]
@@ -206,7 +206,7 @@ def _within_bounds(sensors: MeasuredData, data: MeasuredData, verdict: Verdict) 
         and contains(chosen, one)
         and not _bounded(one.fit)
         and share_removed(sensors, data, verdict.base, one.fit) >= data.rules.main_share
-        and not unexplained(data, verdict.base, one.fit).any()
+        and not contradicted_parts(data, verdict.base, one.fit).any()
     ]
     if not simpler:
         return verdict

@@ -232,9 +232,9 @@ def chance_of(expected: float, change: float, values: float) -> float:
 def rests_told(finding: MechanismFinding) -> list[str]:
     """Return a sentence for each training record of which rows at rest are left out."""
     return [
-        f"Rows of {one.record.name} at rest: {one.left_out}. They are left out, as dry friction, "
-        "which is known to act, may have any force up to its breakaway there. What acts only there "
-        "or right beside it, such as friction that falls at the slowest speeds, is not judged."
+        f"{one.left_out} rows of {one.record.name} at rest are left out, because dry friction may "
+        "have any force up to its breakaway there. Effects that act only at or near rest, such as "
+        "friction that falls at the slowest speeds, cannot be seen."
         for one in finding.data.spectra
         if one.left_out
     ]

@@ -33,15 +33,15 @@ class DriveSizes(Sizes):
     error : float
         Typical size of a line of the transmission error that may be missing, rad.
     largest_error : float
-        The largest, rad.
+        Largest size of such a line, rad.
     believed_orders : tuple of float
-        Of the lines of the static error that are believed to be there.
+        Orders of the nominal lines of the static error.
     ratio : float
         Transmission ratio N.
     inertia : float
-        Of the load, kg.m2: the size of an inertia that may be missing.
+        Inertia of the load, kg.m2: the size of an inertia that may be missing.
     duration : float
-        Of the session, s.
+        Duration of the session, s.
     changes : tuple of float
         Times of the session between records, at which a reading may have changed at once, s.
     """
@@ -64,7 +64,7 @@ class DriveSizes(Sizes):
 
     def believes(self, order: float) -> bool:
         """Tell whether the static error is believed to have a line of an order."""
-        return any(abs(order - one) < 1e-6 for one in self.believed_orders)
+        return any(abs(order - believed) < 1e-6 for believed in self.believed_orders)
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,7 +103,7 @@ class DriveEffect:
     """
 
     name: ClassVar[str]
-    """Of the effect, in model files and verdicts."""
+    """Name of the effect, in model files and verdicts."""
 
     def apply(self, coefficients: Coefficients) -> Coefficients:
         """Return the coefficients with this effect added."""
@@ -136,7 +136,7 @@ class DriveEffect:
         Parameters
         ----------
         records : Session
-            Of r records, each with m lines.
+            r records, each with m lines.
 
         Returns
         -------
@@ -163,12 +163,12 @@ class DriveEffect:
         Parameters
         ----------
         other : DriveEffect
-            Of the same type.
+            An effect of the same type.
 
         Raises
         ------
         InvalidInput
-            Where a model cannot take the two.
+            If a model cannot take the two.
         """
         raise InvalidInput("effects", self.name, "each effect once, at each port and order")
 
@@ -184,11 +184,11 @@ class LawAtPort(DriveEffect):
     Attributes
     ----------
     name : str
-        Of the effect, in model files and verdicts, e.g. ``"coulomb_friction"``.
+        Name of the effect, in model files and verdicts, e.g. ``"coulomb_friction"``.
     port : str
         ``"input"``, ``"output"`` or ``"mesh"``, where the law may be.
     law : Law
-        Of the type that belongs to the name; its numbers are in SI.
+        A law of the type that belongs to the name; its numbers are in SI.
 
     Raises
     ------
@@ -228,13 +228,13 @@ class LawAtPort(DriveEffect):
 
 
 def _law_effect(name: str) -> Effect:
-    laws = [one.name for one in drive_effects() if one.change is None]
+    laws = [effect.name for effect in drive_effects() if effect.change is None]
     return effect_named(one_of("effect.name", name, laws))
 
 
 def drive_effects() -> list[Effect]:
     """Return the effects that a drive model may have."""
-    return [one for one in known_effects() if one.ports]
+    return [effect for effect in known_effects() if effect.ports]
 
 
 def effect_from_fields(table: Fields) -> DriveEffect:
@@ -245,12 +245,12 @@ def effect_from_fields(table: Fields) -> DriveEffect:
     InvalidInput
         For an unknown name, or a wrong, missing or superfluous field.
     """
-    effect = effect_named(table.choice("name", [one.name for one in drive_effects()]))
-    found: DriveEffect
+    effect = effect_named(table.choice("name", [known.name for known in drive_effects()]))
+    built: DriveEffect
     if effect.change is None:
         port = table.choice("port", effect.ports)
-        found = LawAtPort(effect.name, port, effect.from_fields(table))
+        built = LawAtPort(effect.name, port, effect.from_fields(table))
     else:
-        found = effect.from_fields(table)
+        built = effect.from_fields(table)
     table.finish()
-    return found
+    return built

@@ -79,13 +79,13 @@ class Eccentricity(DriveEffect):
         Parameters
         ----------
         records : Session
-            Of r records, each with m lines.
+            r records, each with m lines.
         """
-        found = np.zeros((len(records.elapsed), len(records.orders)), dtype=complex)
+        lines = np.zeros((len(records.elapsed), len(records.orders)), dtype=complex)
         # theta_out is theta_in / N except for the transmission error, a part in 10^3.
         line = np.isclose(records.orders, self.order / records.ratio)
-        found[:, line] = self.amplitude * np.exp(1j * self.phase)
-        return np.zeros(len(found)), found
+        lines[:, line] = self.amplitude * np.exp(1j * self.phase)
+        return np.zeros(len(lines)), lines
 
 
 _CLOSED = 1e-6
@@ -94,12 +94,12 @@ _CLOSED = 1e-6
 
 def _off_centre(sizes: DriveSizes) -> list[Guess]:
     """Guess a disc off centre, and errors of its scale wherever whole cycles per turn are seen."""
-    found = [_turning(sizes, 1.0)]
+    guesses = [_turning(sizes, 1.0)]
     for order in sizes.further().seen:
         turns = order * sizes.slower
         if turns > 1.5 and abs(turns - round(turns)) < _CLOSED:
-            found.append(_turning(sizes, float(round(turns))))
-    return found
+            guesses.append(_turning(sizes, float(round(turns))))
+    return guesses
 
 
 def _turning(sizes: DriveSizes, turns: float) -> Guess:

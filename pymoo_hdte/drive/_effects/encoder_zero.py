@@ -26,7 +26,7 @@ class ThermalDrift(DriveEffect):
     name, port : str
         ``"thermal_drift"`` and ``"sensor"``, in model files and verdicts.
     rate : float
-        At the start of the session, rad/s.
+        Rate at the start of the session, rad/s.
     time : float
         Time constant, s; infinite for a steady drift, rate t.
 
@@ -100,10 +100,10 @@ class ThermalDrift(DriveEffect):
         Parameters
         ----------
         records : Session
-            Of r records, each with m lines.
+            r records, each with m lines.
         """
-        left = np.einsum("kr,rkm->rm", self.bends(records.elapsed), records.bends)
-        return self.after(records.elapsed) + left[:, 0].real, left[:, 1:]
+        bending = np.einsum("kr,rkm->rm", self.bends(records.elapsed), records.bends)
+        return self.after(records.elapsed) + bending[:, 0].real, bending[:, 1:]
 
 
 def _drift(sizes: DriveSizes) -> list[Guess]:
@@ -194,10 +194,10 @@ class NewZero(DriveEffect):
         Parameters
         ----------
         records : Session
-            Of r records, each with m lines; none of them is taken during the change.
+            r records, each with m lines; none of them is taken during the change.
         """
-        found = np.zeros((len(records.elapsed), len(records.orders)), dtype=complex)
-        return np.where(records.elapsed >= self.after, self.size, 0.0), found
+        lines = np.zeros((len(records.elapsed), len(records.orders)), dtype=complex)
+        return np.where(records.elapsed >= self.after, self.size, 0.0), lines
 
 
 def _new_zero(sizes: DriveSizes) -> list[Guess]:

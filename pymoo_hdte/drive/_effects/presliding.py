@@ -25,9 +25,9 @@ class PreslidingFriction(CoulombFriction):
     level : float
         N.m.
     torsion : float
-        Way after which all contacts slip, rad.
+        Torsion beyond which all contacts slip, rad.
     spread : float
-        Of their slip torsions, see `MaxwellSlip`; dimensionless.
+        Spread of their slip torsions, dimensionless: see `MaxwellSlip`.
 
     Raises
     ------

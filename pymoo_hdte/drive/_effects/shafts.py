@@ -107,7 +107,7 @@ class CoupledInertia(DriveEffect):
         return replace(coefficients, coupled=coupled)
 
 
-_IN_A_CLUTCH = "There is more inertia on the {port} than believed, behind a clutch or damper."
+_IN_A_CLUTCH = "There is more inertia on the {port} than stated, behind a clutch or damper."
 
 
 def _inertia(sizes: DriveSizes) -> list[Guess]:
@@ -156,7 +156,7 @@ register(
         None,
         ("output",),
         {"inertia": "inertia"},
-        "There is more inertia on the {port} than believed.",
+        "There is more inertia on the {port} than stated.",
         _inertia,
         change=LoadInertia,
         of_fit={"time": "time"},
@@ -241,7 +241,7 @@ register(
         None,
         ("mesh",),
         {"factor": ""},
-        "The damping of the torsion is referred to another shaft than believed.",
+        "The damping of the torsion is referred to another shaft than stated.",
         _damping,
         change=DampingReference,
         forms="growing_damping",

@@ -73,7 +73,7 @@ class KinematicErrorLine(DriveEffect):
 class KinematicTorsion(PeriodicTorque):
     """The torque K amplitude cos(order angle + phase) of an error in rad, added to the torsion.
 
-    Of a port between the encoders of input and output, of which it is no driving torque.
+    It acts at a port between the encoders of input and output, and is no driving torque there.
     """
 
     drives: ClassVar[bool] = False
@@ -84,7 +84,7 @@ class KinematicTorsion(PeriodicTorque):
 
     @property
     def driving(self) -> complex:
-        """None: it is an angle."""
+        """Zero: the error is an angle, not a force."""
         return 0.0
 
 
@@ -148,7 +148,7 @@ register(
         PeriodicTorque,
         ("mesh",),
         {"order": "", "amplitude": "angle", "phase": "angle"},
-        "A line of the static error at order {order} that the model does not hold.",
+        "A line of the static error at order {order} that the model lacks.",
         _lines,
         change=KinematicErrorLine,
         exact=True,

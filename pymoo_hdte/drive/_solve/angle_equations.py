@@ -32,7 +32,7 @@ _BY_ROW = (
     "speed", "load", "output_inertia", "output_damping", "static", "_static_slope", "_stiffness",
     "_backward", "_share_of_mesh", "rate", "input_operator",
 )  # fmt: skip
-"""What `AngleEquations` has by row, the last three once they are asked for."""
+"""Attributes of `AngleEquations` with a row per case; the last three are computed on demand."""
 
 Values = NDArray[np.float64]
 
@@ -75,8 +75,8 @@ class AngleEquations:
         self.coefficients, self.motor, self.torus = coefficients, motor, torus
         self.speed, self.load = speed[:, None], load[:, None]
         self.output_inertia, self.output_damping = (
-            np.broadcast_to(np.reshape(one, (-1, 1)), self.speed.shape)
-            for one in (coefficients.output_inertia, coefficients.output_damping)
+            np.broadcast_to(np.reshape(value, (-1, 1)), self.speed.shape)
+            for value in (coefficients.output_inertia, coefficients.output_damping)
         )
         self.static = np.zeros((len(speed), len(torus.orders)), dtype=complex)
         for order, phasor in zip(
@@ -102,15 +102,15 @@ class AngleEquations:
         """Return the mean torsion, shape (n,), that holds load and bearing friction at rest."""
         stiffness = self.coefficients.stiffness
         torque = self.coefficients.torque_at(self.speed[:, 0], self.load[:, 0])
-        found = torque / stiffness
+        torsion = torque / stiffness
         if not any(port == "mesh" for port, _ in self.coefficients.laws):
-            return found
-        still = np.zeros((len(found), self.torus.size))
+            return torsion
+        still = np.zeros((len(torsion), self.torus.size))
         for _ in range(_STATIC_STEPS):
-            position = np.broadcast_to(found[:, None], still.shape)
+            position = np.broadcast_to(torsion[:, None], still.shape)
             added = mean(self._laws("mesh", position, still).torque)[:, 0]
-            found = found + (torque - stiffness * found - added) / stiffness
-        return found
+            torsion = torsion + (torque - stiffness * torsion - added) / stiffness
+        return torsion
 
     def motion(self, torsion: Phasors, energy: Phasors) -> TorsionMotion:
         """Evaluate torsion and E on the grid, with the resulting torques.
@@ -120,9 +120,9 @@ class AngleEquations:
         torus, coefficients = self.torus, self.coefficients
         slope, error = torus.derivative(torsion), self.static + torsion
         curvature = torus.derivative(torus.derivative(error))
-        each = (energy, torus.derivative(energy), torsion, slope, curvature)
+        phasors = (energy, torus.derivative(energy), torsion, slope, curvature)
         # In one call: most of the time of a small one goes by before it begins.
-        signals = torus.signal(np.concatenate(each)).reshape(len(each), -1, torus.size)
+        signals = torus.signal(np.concatenate(phasors)).reshape(len(phasors), -1, torus.size)
         energy_there, energy_slope, position, slope_there, error_curvature = signals
         angular_speed = np.copysign(np.sqrt(2.0 * np.maximum(energy_there, 1e-12)), self.speed)
         faster = self.speed * mean(1.0 / angular_speed)
@@ -170,11 +170,11 @@ class AngleEquations:
         around = (self._path, self._back)
         state = PortState(position, speed, phase, stiffness, *around, load, warmth, recurs=True)
         total, *others = (law.respond(state) for law in laws)
-        for one in others:
+        for response in others:
             total = Response(
-                total.torque + one.torque,
-                total.slope + one.slope,
-                total.damping + one.damping,
+                total.torque + response.torque,
+                total.slope + response.slope,
+                total.damping + response.damping,
             )
         return total
 
@@ -197,14 +197,14 @@ class AngleEquations:
     def recollection(self, torsion: Phasors) -> Recollection:
         """Return how the mesh torque depends on the torsion elsewhere, by laws with memory.
 
-        To be added to what ``mesh_slope`` gives.
+        It is added to the torque by ``mesh_slope``.
         """
         memories = [cast(Memory, law) for _, law in self.coefficients.laws if law.states]
         along = self._path(self.torus.signal(torsion))
         every = np.tile(np.arange(self.torus.size, dtype=float), (len(along), 1))
         places = self._path(every)[:, : self.torus.size].astype(int)
-        kept, gained = zip(*(law.recall(along) for law in memories), strict=True)
-        return Recollection(np.concatenate(kept), np.concatenate(gained), places)
+        retained, gained = zip(*(law.recall(along) for law in memories), strict=True)
+        return Recollection(np.concatenate(retained), np.concatenate(gained), places)
 
     def residuals(
         self, motion: TorsionMotion, *others: Values
@@ -223,11 +223,13 @@ class AngleEquations:
             - motion.mesh_torque
         )
         slower = self.speed / motion.angular_speed
-        each = (self._of_input(motion, delivered), of_load, slower, *others)
+        signals = (self._of_input(motion, delivered), of_load, slower, *others)
         # In one call, as in `motion`.
-        found = self.torus.phasors(np.concatenate(each)).reshape(len(each), *self.static.shape)
-        lead = -self.torus.integral(found[2])
-        return found[0] + self.motor.integral * lead, found[1], lead, list(found[3:])
+        phasors = self.torus.phasors(np.concatenate(signals)).reshape(
+            len(signals), *self.static.shape
+        )
+        lead = -self.torus.integral(phasors[2])
+        return phasors[0] + self.motor.integral * lead, phasors[1], lead, list(phasors[3:])
 
     def of_loose_loads(self, motion: TorsionMotion) -> Values | float:
         """Return the torque of loads that are not rigidly coupled, beyond that of the inertia.
@@ -303,7 +305,7 @@ class AngleEquations:
 
     @cached_property
     def _of_inertia(self) -> tuple[Phasors, Phasors]:
-        """What the inertia adds to P (before it is shared) and to C of `impedance`."""
+        """Contributions of the inertia to P (before it is shared) and to C of `impedance`."""
         frequency = self.torus.orders * self.speed
         rates = self.coefficients.load_rates
         inertia = self.output_inertia + self.coefficients.inertia_in_clutches(frequency)

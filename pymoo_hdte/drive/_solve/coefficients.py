@@ -61,7 +61,7 @@ class Coefficients:
         Share of the mesh torque's reaction on the input through the slope of theta_s: 0 in
         Eq. (9), 1 by the principle of virtual work; dimensionless.
     temperature : float or ndarray, shape (n,)
-        Of the drive in kelvin; NaN where it is not known.
+        Temperature of the drive in kelvin; NaN where it is not known.
     load_rates : tuple of (int, float)
         What a load that is not rigidly on the output adds to its inertia: numbers k with sizes s,
         each a torque of s times the k-th time derivative of the output's acceleration, s in
@@ -155,10 +155,10 @@ class Coefficients:
         ndarray of complex, shape (...)
             kg.m2; without clutches one 0, of shape ().
         """
-        found = np.zeros((), dtype=complex)
+        total = np.zeros((), dtype=complex)
         for inertia, time in self.coupled:
-            found = found + inertia / (1.0 + 1j * frequency * time)
-        return found
+            total = total + inertia / (1.0 + 1j * frequency * time)
+        return total
 
     @property
     def stiffness_variations(self) -> tuple[PeriodicStiffness, ...]:

@@ -82,7 +82,7 @@ def harmonic_balance(
     Parameters
     ----------
     coefficients : Coefficients
-        Of n designs.
+        Coefficients of n designs.
     input_speed, load_torque : ndarray, shape (n,), optional
         An operating condition for each row, rad/s and N.m, in place of that of ``coefficients``. A
         negative speed is the reverse direction; a load keeps its sense in space.
@@ -129,8 +129,8 @@ def harmonic_balance(
     if start is not None and not np.array_equal(start.torus.orders, torus.orders):
         start = None
     solvers = []
-    for first in range(0, max(n, 1), _ROWS_AT_ONCE):
-        rows = slice(first, first + _ROWS_AT_ONCE)
+    for begin in range(0, max(n, 1), _ROWS_AT_ONCE):
+        rows = slice(begin, begin + _ROWS_AT_ONCE)
         equations = AngleEquations(coefficients.rows(rows), speed[rows], load[rows], motor, torus)
         solver = _Solver(equations, None if start is None else start.rows(rows))
         # A row that diverges is marked as not converged; its values are meaningless.
@@ -139,8 +139,8 @@ def harmonic_balance(
         solvers.append(solver)
     parts = [solver.result() for solver in solvers]
     values = [np.concatenate([getattr(part, name) for part in parts]) for name in BY_CASE]
-    kept = Tangents(_Solved(solvers).systems, np.arange(n)) if tangents else None
-    return SteadyMotion(torus, *values, tangents=kept)
+    solved_tangents = Tangents(_Solved(solvers).systems, np.arange(n)) if tangents else None
+    return SteadyMotion(torus, *values, tangents=solved_tangents)
 
 
 def _systems(start: SteadyMotion | None, rows: slice, count: int) -> list[LinearSystem | None]:
@@ -148,8 +148,8 @@ def _systems(start: SteadyMotion | None, rows: slice, count: int) -> list[Linear
     if start is None or start.tangents is None:
         return [None] * count
     ended = start.converged[rows]
-    found = iter(start.tangents.rows(rows).rows(ended).systems())
-    return [next(found) if good else None for good in ended]
+    known_systems = iter(start.tangents.rows(rows).rows(ended).systems())
+    return [next(known_systems) if good else None for good in ended]
 
 
 def continued_from_neighbours(coefficients: Coefficients, motion: SteadyMotion) -> SteadyMotion:
@@ -161,17 +161,17 @@ def continued_from_neighbours(coefficients: Coefficients, motion: SteadyMotion) 
     Parameters
     ----------
     coefficients : Coefficients
-        Of n designs.
+        Coefficients of n designs.
     motion : SteadyMotion
         What `harmonic_balance` found for them.
     """
-    lost, kept = np.flatnonzero(~motion.converged), np.flatnonzero(motion.converged)
-    if not (lost.size and kept.size):
+    lost, converged_rows = np.flatnonzero(~motion.converged), np.flatnonzero(motion.converged)
+    if not (lost.size and converged_rows.size):
         return motion
     sizes = np.abs(coefficients.error_phasors).sum(axis=1)
     parts = (coefficients.stiffness, coefficients.input_inertia, coefficients.damping, sizes)
     places = np.log(np.maximum(np.column_stack(parts), 1e-300))
-    nearest = kept[scipy.spatial.cKDTree(places[kept]).query(places[lost])[1]]
+    nearest = converged_rows[scipy.spatial.cKDTree(places[converged_rows]).query(places[lost])[1]]
     again = harmonic_balance(
         coefficients.rows(lost), torus=motion.torus, start=motion.rows(nearest)
     )
@@ -185,59 +185,59 @@ def continued_from_neighbours(coefficients: Coefficients, motion: SteadyMotion) 
 class _Solver:
     """Newton's iteration for one block of rows."""
 
-    def __init__(self, equations: AngleEquations, near: SteadyMotion | None) -> None:
+    def __init__(self, equations: AngleEquations, neighbour: SteadyMotion | None) -> None:
         """Begin from nearby cases that have converged, elsewhere from rest under load."""
         self.equations = equations
         self.converged = np.zeros(len(equations.speed), dtype=bool)
-        if near is not None and np.all(near.converged):
-            self.torsion, self.energy = near.torsion.copy(), near.energy.copy()
+        if neighbour is not None and np.all(neighbour.converged):
+            self.torsion, self.energy = neighbour.torsion.copy(), neighbour.energy.copy()
         else:
             self.torsion = np.zeros_like(equations.static)
             self.torsion[:, 0] = equations.static_torsion()
             self.energy = np.zeros_like(equations.static)
             self.energy[:, :1] = equations.speed**2 / 2.0
-            if near is not None:
-                kept = near.converged[:, None]
-                self.torsion = np.where(kept, near.torsion, self.torsion)
-                self.energy = np.where(kept, near.energy, self.energy)
+            if neighbour is not None:
+                known = neighbour.converged[:, None]
+                self.torsion = np.where(known, neighbour.torsion, self.torsion)
+                self.energy = np.where(known, neighbour.energy, self.energy)
 
     def solve(self, tolerance: float, steps: int, systems: list[LinearSystem | None]) -> None:
         """Iterate until the torsion converges; rows that do not are marked.
 
         Steps are taken with the ``systems`` of nearby cases as long as they shrink fast.
         """
-        equations, left = self.equations, np.arange(len(self.torsion))
+        equations, open_rows = self.equations, np.arange(len(self.torsion))
         size = np.abs(self.torsion[:, :1]) + np.abs(equations.static).sum(axis=1)[:, None] + 1e-9
         at = Place(equations, self.torsion, self.energy)
-        before, least = np.full(len(left), np.inf), np.full(len(left), np.inf)
-        distance, waited = at.distance[:, 0], np.zeros(len(left), dtype=int)
+        before, least = np.full(len(open_rows), np.inf), np.full(len(open_rows), np.inf)
+        distance, waited = at.distance[:, 0], np.zeros(len(open_rows), dtype=int)
         for _ in range(steps):
-            own = np.array([one is None for one in systems], dtype=bool)
+            own = np.array([system is None for system in systems], dtype=bool)
             missing = np.flatnonzero(own)
-            for row, one in zip(missing, at.systems(missing), strict=True):
-                systems[row] = one
+            for row, system in zip(missing, at.systems(missing), strict=True):
+                systems[row] = system
             # A friction may wind up the drive by many times what holds it at the start.
-            most = np.maximum(size[left], np.abs(at.torsion[:, :1]))
+            most = np.maximum(size[open_rows], np.abs(at.torsion[:, :1]))
             change, energy_change = at.newton_step(most, systems)
             longest = np.abs(change).max(axis=1)
             shrinks = longest <= _SHRINKS * before
             # With the system of another place a short step alone does not tell that it has arrived.
-            settled = (longest <= tolerance * size[left, 0]) & (shrinks | own)
+            settled = (longest <= tolerance * size[open_rows, 0]) & (shrinks | own)
             # The speed may answer more than the torsion, as to a strong ripple at a low speed.
             slower = np.abs(energy_change).max(axis=1)
             settled &= slower <= tolerance * np.abs(at.energy[:, 0])
-            self.converged[left] = settled
+            self.converged[open_rows] = settled
             if np.all(settled):
-                self.torsion[left] = at.torsion + change
-                self.energy[left] = at.energy + energy_change
+                self.torsion[open_rows] = at.torsion + change
+                self.energy[open_rows] = at.energy + energy_change
                 break
             at = nearer(at, change, energy_change, settled)
-            self.torsion[left], self.energy[left] = at.torsion, at.energy
+            self.torsion[open_rows], self.energy[open_rows] = at.torsion, at.energy
             before = longest
             distance, was = at.distance[:, 0], distance
             nearer_by_far = distance <= _SHRINKS * was
             serves = np.where(own, nearer_by_far, shrinks)
-            systems = [one if ok else None for one, ok in zip(systems, serves, strict=True)]
+            systems = [system if ok else None for system, ok in zip(systems, serves, strict=True)]
             halved = distance <= least / 2.0
             least = np.where(halved, distance, least)
             waited = np.where(halved, 0, waited + 1)
@@ -246,12 +246,16 @@ class _Solver:
                 break
             # A lost row leaves at once, so that none is found for the company that it is in. Once
             # half of the rows have settled, only the others are iterated further.
-            if np.any(lost) or 2 * np.sum(settled) >= len(left):
-                kept = np.flatnonzero(~(settled | lost))
-                left, before, systems = left[kept], before[kept], [systems[one] for one in kept]
-                least, waited, distance = least[kept], waited[kept], distance[kept]
-                equations = self.equations.rows(left)
-                at = at.rows(equations, kept)
+            if np.any(lost) or 2 * np.sum(settled) >= len(open_rows):
+                indices = np.flatnonzero(~(settled | lost))
+                open_rows, before, systems = (
+                    open_rows[indices],
+                    before[indices],
+                    [systems[index] for index in indices],
+                )
+                least, waited, distance = least[indices], waited[indices], distance[indices]
+                equations = self.equations.rows(open_rows)
+                at = at.rows(equations, indices)
 
     def systems(self, rows: NDArray[np.int_]) -> list[LinearSystem | None]:
         """Return the linear systems of Newton's method of some rows as they are now."""
@@ -293,10 +297,10 @@ class _Solved:
     def systems(self, places: NDArray[np.int_]) -> Sequence[LinearSystem | None]:
         """Return the linear systems at some rows, in rising order."""
         of_blocks = places // _ROWS_AT_ONCE
-        found = [
-            one
+        systems = [
+            system
             for block, solver in enumerate(self.solvers)
             if np.any(of_blocks == block)
-            for one in solver.systems(places[of_blocks == block] % _ROWS_AT_ONCE)
+            for system in solver.systems(places[of_blocks == block] % _ROWS_AT_ONCE)
         ]
-        return [None] * len(places) if None in found else found
+        return [None] * len(places) if None in systems else systems

@@ -36,7 +36,7 @@ def transfer_function(
     Parameters
     ----------
     coefficients : Coefficients
-        Of n designs; laws at ports and the variation of the stiffness are left out.
+        Coefficients of n designs; laws at ports and a varying stiffness are left out.
     orders : ndarray, shape (n_orders,)
         Cycles per input turn; w is their multiple of the input speed.
 
@@ -67,7 +67,7 @@ def hill_steady_state(coefficients: Coefficients) -> OrderSpectrum:
     Parameters
     ----------
     coefficients : Coefficients
-        Of n designs, a row of the spectrum each.
+        Coefficients of n designs, a row of the spectrum each.
 
     Returns
     -------
@@ -90,10 +90,10 @@ def hill_steady_state(coefficients: Coefficients) -> OrderSpectrum:
     86.7 arcsec
     """
     require_stable(coefficients)
-    found, spectrum = _solved(coefficients)
-    lost = int(np.sum(~found))
+    solved, spectrum = _solved(coefficients)
+    lost = int(np.sum(~solved))
     if lost:
-        raise ArithmeticError(f"no steady state found for {lost} of {len(found)}")
+        raise ArithmeticError(f"no steady state found for {lost} of {len(solved)}")
     return spectrum
 
 
@@ -107,11 +107,11 @@ def found_steady_states(coefficients: Coefficients) -> tuple[NDArray[np.bool_], 
     ArithmeticError
         If the harmonics of a deeply varying stiffness do not die out.
     """
-    found = stable_rows(coefficients)
-    rows = np.flatnonzero(found)
+    has_state = stable_rows(coefficients)
+    rows = np.flatnonzero(has_state)
     solved, spectrum = _solved(coefficients.rows(rows))
-    found[rows] = solved
-    return found, OrderSpectrum(spectrum.orders, spectrum.phasors[solved])
+    has_state[rows] = solved
+    return has_state, OrderSpectrum(spectrum.orders, spectrum.phasors[solved])
 
 
 def _solved(coefficients: Coefficients) -> tuple[NDArray[np.bool_], OrderSpectrum]:
@@ -132,8 +132,8 @@ def _solved(coefficients: Coefficients) -> tuple[NDArray[np.bool_], OrderSpectru
     orders = np.concatenate([coefficients.error_orders, [0.0]])
     firsts, family = np.unique(np.round(np.mod(orders, 2.0), 9) % 2.0, return_inverse=True)
     parts = [
-        _family(coefficients, float(first), np.flatnonzero(family[:-1] == number))
-        for number, first in enumerate(firsts)
+        _family(coefficients, float(lowest), np.flatnonzero(family[:-1] == number))
+        for number, lowest in enumerate(firsts)
     ]
     return everywhere, OrderSpectrum(
         np.concatenate([orders for orders, _ in parts]),
@@ -142,9 +142,9 @@ def _solved(coefficients: Coefficients) -> tuple[NDArray[np.bool_], OrderSpectru
 
 
 def _family(
-    coefficients: Coefficients, first: float, lines: NDArray[np.int_]
+    coefficients: Coefficients, lowest: float, lines: NDArray[np.int_]
 ) -> tuple[NDArray[np.float64], NDArray[np.complex128]]:
-    """Return all orders ``first + 2 m`` that matter, and their theta_d.
+    """Return all orders ``lowest + 2 m`` that matter, and their theta_d.
 
     ``lines`` are the error lines of this family.
 
@@ -153,10 +153,10 @@ def _family(
     ArithmeticError
         If the harmonics do not die out within the largest number kept.
     """
-    places = np.rint((coefficients.error_orders[lines] - first) / 2.0).astype(int)
+    places = np.rint((coefficients.error_orders[lines] - lowest) / 2.0).astype(int)
     highest = int(places.max(initial=0))
     for reach in _COUPLINGS:
-        orders = first + 2.0 * np.arange(-reach, highest + reach + 1, dtype=np.float64)
+        orders = lowest + 2.0 * np.arange(-reach, highest + reach + 1, dtype=np.float64)
         static = np.zeros((len(coefficients.stiffness), len(orders)), dtype=complex)
         # Several error lines of one order add up, hence no plain assignment.
         for place, phasor in zip(places, coefficients.error_phasors.T[lines], strict=True):

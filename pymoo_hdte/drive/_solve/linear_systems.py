@@ -20,11 +20,11 @@ Phasors = NDArray[np.complex128]
 Matrix = NDArray[np.float64]
 Vector = NDArray[np.float64]
 
-_LEFT = 1e-5
+_RESIDUAL = 1e-5
 """Share of the right side that an iteration may leave: so steps shrink faster than they have to to
 go on with the system of another place (to a tenth)."""
 _MOST = (40, 5)
-"""Directions kept by an iteration until it begins anew, and how often it does."""
+"""Directions kept by an iteration until it restarts, and the largest number of restarts."""
 
 
 class LinearSystem(Protocol):
@@ -44,8 +44,8 @@ class Factored:
 
     def solve(self, right: Vector) -> Vector:
         """Return the unknowns (2 H,) for a right side (2 H,)."""
-        found: Vector = scipy.linalg.lapack.dgetrs(self.triangles, self.pivots, right)[0]
-        return found
+        unknowns: Vector = scipy.linalg.lapack.dgetrs(self.triangles, self.pivots, right)[0]
+        return unknowns
 
 
 def factored(matrix: Matrix) -> Factored:
@@ -61,9 +61,9 @@ class Linearised(NamedTuple):
     ----------
     torus : Torus
     slope : ndarray, shape (n, G)
-        Of the torque by the torsion on the grid.
+        Slope of the torque by the torsion on the grid.
     viscous : ndarray of complex, shape (n, H)
-        By which each harmonic is multiplied besides.
+        Factor by which each harmonic is multiplied besides.
     recollection : Recollection, optional
         How the torque depends on the torsion elsewhere.
     """
@@ -84,14 +84,14 @@ class Linearised(NamedTuple):
         return matrix
 
     def core(self) -> Linearised:
-        """Return the same among the harmonics of one beat at a time."""
+        """Return the linearisation among the harmonics of one beat at a time."""
         viscous = self.viscous[:, self.torus.of_core]
         return Linearised(self.torus.core, self.slope, viscous, self.recollection)
 
     def row(self, row: int) -> Linearised:
         """Return one of the rows."""
-        at, kept = slice(row, row + 1), self.recollection
-        memory = None if kept is None else kept.rows(at)
+        at, recollection = slice(row, row + 1), self.recollection
+        memory = None if recollection is None else recollection.rows(at)
         return Linearised(self.torus, self.slope[at], self.viscous[at], memory)
 
 
@@ -119,12 +119,14 @@ class Iterated:
         if not np.isfinite(np.linalg.norm(right)):
             return np.full_like(right, np.nan)
         if self._whole is None:
-            size, (kept, most) = len(right), _MOST
+            size, (restart, most) = len(right), _MOST
             whole = LinearOperator((size, size), matvec=self._times, dtype=float)
-            near = LinearOperator((size, size), matvec=self._near, dtype=float)
-            found, failed = gmres(whole, right, rtol=_LEFT, restart=kept, maxiter=most, M=near)
+            preconditioner = LinearOperator((size, size), matvec=self._precondition, dtype=float)
+            unknowns, failed = gmres(
+                whole, right, rtol=_RESIDUAL, restart=restart, maxiter=most, M=preconditioner
+            )
             if not failed:
-                return np.asarray(found)
+                return np.asarray(unknowns)
             self._whole = factored(self._row.matrix()[0])
         return self._whole.solve(right)
 
@@ -138,11 +140,11 @@ class Iterated:
             torque += row.recollection.of_signals(signal.T).T
         return stacked(torus.phasors(torque) + row.viscous * phasors)[0]
 
-    def _near(self, values: Vector) -> Vector:
-        """Return about what `solve` returns."""
-        found = stacked(unstacked(values) / self._alone)
-        found[self._core_places] = self._core.solve(values[self._core_places])
-        return found
+    def _precondition(self, values: Vector) -> Vector:
+        """Return an approximation of `solve`."""
+        unknowns = stacked(unstacked(values) / self._alone)
+        unknowns[self._core_places] = self._core.solve(values[self._core_places])
+        return unknowns
 
 
 def stacked(phasors: Phasors) -> NDArray[np.float64]:

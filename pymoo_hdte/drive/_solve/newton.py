@@ -37,7 +37,7 @@ _PARTS = 0.5 ** np.arange(1, 5)
 
 
 _BY_ROW = (
-    "torsion", "energy", "distance", "_mesh_slope", "_impedance", "_energy_change", "_left",
+    "torsion", "energy", "distance", "_mesh_slope", "_impedance", "_energy_change", "_residual",
     "_viscous", "_level",
 )  # fmt: skip
 
@@ -65,10 +65,10 @@ class Place:
         missing, of_output, *_ = equations.residuals(motion)
         self._energy_change = -ratio * missing / operator
         self._energy_change[:, 0] = 0.0
-        self._left = (of_output + coupling * self._energy_change) / share
+        self._residual = (of_output + coupling * self._energy_change) / share
         self._viscous = equations.rate * mean(motion.mesh_damping) - self._impedance
         self._level = mean(motion.mesh_slope)
-        of_each = self._left / (np.abs(self._level) + np.abs(self._viscous))
+        of_each = self._residual / (np.abs(self._level) + np.abs(self._viscous))
         distance = np.linalg.norm(of_each, axis=1, keepdims=True)
         # A row that has diverged is farther away than any other place.
         self.distance = np.where(np.isnan(distance), np.inf, distance)
@@ -81,14 +81,16 @@ class Place:
             setattr(some, name, getattr(self, name)[rows])
         return some
 
-    def replaced(self, rows: NDArray[np.int_], other: Place, others: NDArray[np.int_]) -> Place:
-        """Return the place with other rows, of another place, in place of some rows."""
-        both = copy(self)
+    def replaced(
+        self, rows: NDArray[np.int_], source: Place, source_rows: NDArray[np.int_]
+    ) -> Place:
+        """Return this place with some rows taken over from another place."""
+        merged = copy(self)
         for name in _BY_ROW:
             values = getattr(self, name).copy()
-            values[rows] = getattr(other, name)[others]
-            setattr(both, name, values)
-        return both
+            values[rows] = getattr(source, name)[source_rows]
+            setattr(merged, name, values)
+        return merged
 
     def moved(self, change: Phasors, energy_change: Phasors) -> Place:
         """Return the place after a change, at the wanted speed."""
@@ -108,7 +110,7 @@ class Place:
         change *= np.minimum(1.0, size / np.maximum(longest, 1e-300))
         energy_change = self._energy_change.copy()
         operator = self.equations.input_operator
-        energy_change[:, 1:] -= ((self._left + self._impedance * change) / operator)[:, 1:]
+        energy_change[:, 1:] -= ((self._residual + self._impedance * change) / operator)[:, 1:]
         # Nor may the speed come near zero on the way.
         largest = np.abs(energy_change).sum(axis=1, keepdims=True)
         slowest = 0.5 * self.energy[:, :1].real
@@ -117,14 +119,14 @@ class Place:
 
     def _torsion_change(self, systems: Sequence[LinearSystem | None]) -> Phasors:
         """Return the change of the torsion by the linearised mesh, its memory included."""
-        found = stacked(self._left / (self._level + self._viscous))
-        real = stacked(self._left)
+        change = stacked(self._residual / (self._level + self._viscous))
+        real = stacked(self._residual)
         # The mean has no imaginary part.
-        real[:, self._left.shape[1]] = 0.0
-        for row, one in enumerate(systems):
-            if one is not None:
-                found[row] = one.solve(real[row])
-        return unstacked(found)
+        real[:, self._residual.shape[1]] = 0.0
+        for row, system in enumerate(systems):
+            if system is not None:
+                change[row] = system.solve(real[row])
+        return unstacked(change)
 
     def systems(self, rows: NDArray[np.int_]) -> list[LinearSystem | None]:
         """Return the linear systems of steps of some rows; None where there is none.
@@ -144,9 +146,9 @@ class Place:
         torus = equations.torus
         linearised = Linearised(torus, slope, self._viscous[rows], recollection)
         if len(torus.orders) <= _OF_A_MATRIX or len(torus.of_core) == len(torus.orders):
-            return [factored(one) for one in linearised.matrix()]
+            return [factored(matrix) for matrix in linearised.matrix()]
         cores = linearised.core().matrix()
-        return [Iterated(linearised.row(n), factored(one)) for n, one in enumerate(cores)]
+        return [Iterated(linearised.row(n), factored(core)) for n, core in enumerate(cores)]
 
 
 def nearer(at: Place, change: Phasors, energy_change: Phasors, settled: NDArray[np.bool_]) -> Place:
@@ -165,6 +167,6 @@ def nearer(at: Place, change: Phasors, energy_change: Phasors, settled: NDArray[
     distance = tried.distance.reshape(len(_PARTS), -1)
     less = distance < at.distance[short, 0]
     choice = np.where(less.any(axis=0), less.argmax(axis=0), distance.argmin(axis=0))
-    each = np.arange(short.size)
-    taken = less.any(axis=0) | (distance[choice, each] < there.distance[short, 0])
-    return there.replaced(short[taken], tried, (choice * short.size + each)[taken])
+    indices = np.arange(short.size)
+    taken = less.any(axis=0) | (distance[choice, indices] < there.distance[short, 0])
+    return there.replaced(short[taken], tried, (choice * short.size + indices)[taken])

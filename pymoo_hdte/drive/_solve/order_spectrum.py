@@ -190,13 +190,13 @@ def _highest(
     points = max(POINTS_PER_TURN, int(np.ceil(_POINTS_PER_CYCLE * np.max(np.abs(orders)))))
     step = 2.0 * np.pi / points
     end = 2.0 * np.pi * turns
-    last = int(np.floor(turns * points))
+    last_point = int(np.floor(turns * points))
     grid = _Grid(orders, phasors, points)
     rise = np.abs(phasors) @ orders**2 * step**2 / 8.0
     # Interpolation error of a parabola, for the one that errs low and the one that errs high.
     doubt = 2.0 * np.abs(phasors) @ np.abs(orders) ** 3 * step**3 / (9.0 * 3.0**0.5)
 
-    rows, columns = _high_points(grid, rise, last)
+    rows, columns = _high_points(grid, rise, last_point)
     here = grid.values(rows, columns)
     before, after = grid.values(rows, columns - 1), grid.values(rows, columns + 1)
     slope = (after - before) / 2.0
@@ -204,8 +204,8 @@ def _highest(
     vertex = np.divide(slope, curvature, out=np.zeros_like(here), where=curvature > 0.0)
     shift = np.clip(vertex, np.maximum(-1.0, -columns), np.minimum(1.0, end / step - columns))
     height = here + shift * (slope - shift * curvature / 2.0)
-    first = np.searchsorted(rows, np.arange(len(phasors)))
-    highest = np.maximum.reduceat(height, first)
+    starts = np.searchsorted(rows, np.arange(len(phasors)))
+    highest = np.maximum.reduceat(height, starts)
     close = height >= (highest - doubt)[rows]
     rows, start = rows[close], step * (columns + shift)[close]
     values = _climb(orders, phasors[rows], start, step, end)
@@ -215,14 +215,14 @@ def _highest(
 
 
 def _high_points(
-    grid: _Grid, rise: NDArray[np.float64], last: int
+    grid: _Grid, rise: NDArray[np.float64], last_point: int
 ) -> tuple[NDArray[np.int_], NDArray[np.int_]]:
     """Return rows and columns, by row, of all grid points within ``rise`` of their row's highest.
 
     Only points within the turn whose envelope could reach that high are followed over all turns.
     """
     envelope = grid.envelope()
-    turn_starts = np.arange(0, last + 1, grid.points)
+    turn_starts = np.arange(0, last_point + 1, grid.points)
     every_row = np.arange(len(envelope))
 
     def over_turns(
@@ -230,7 +230,7 @@ def _high_points(
     ) -> tuple[NDArray[np.int_], NDArray[np.float64]]:
         columns = points[:, None] + turn_starts
         values = grid.values(rows[:, None], columns)
-        return columns, np.where(columns <= last, values, -np.inf)
+        return columns, np.where(columns <= last_point, values, -np.inf)
 
     highest_there = np.argmax(envelope, axis=1)
     _, values = over_turns(every_row, highest_there)
@@ -238,8 +238,8 @@ def _high_points(
     reached = np.minimum(values.max(axis=1), envelope[every_row, highest_there])
     rows, points = np.nonzero(envelope >= (reached - rise)[:, None])
     columns, values = over_turns(rows, points)
-    first = np.searchsorted(rows, every_row)
-    highest = np.maximum.reduceat(values.max(axis=1), first)
+    starts = np.searchsorted(rows, every_row)
+    highest = np.maximum.reduceat(values.max(axis=1), starts)
     pair, turn = np.nonzero(values >= (highest - rise)[rows][:, None])
     return rows[pair], columns[pair, turn]
 

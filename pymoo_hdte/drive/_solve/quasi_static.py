@@ -108,7 +108,7 @@ def _means(leg: _Leg) -> Values:
     return np.asarray(low + steady)
 
 
-class _AskedForTheWay(Exception):
+class _PathNeeded(Exception):
     """A law depends on where the torsion was before."""
 
 
@@ -122,12 +122,12 @@ class _Mesh:
     def respond(self, torsion: Values, turns: Values | None) -> Response:
         """Return the torque at torsions (n, m) that each follow the turning points (n, k).
 
-        Without these a law that asks for the way raises `_AskedForTheWay`.
+        Without these a law that depends on the path raises `_PathNeeded`.
         """
 
         def path(values: Values) -> Values:
             if turns is None:
-                raise _AskedForTheWay
+                raise _PathNeeded
             return np.column_stack([np.repeat(turns, torsion.shape[1], axis=0), values.ravel()])
 
         def back(values: Values) -> Values:
@@ -137,8 +137,8 @@ class _Mesh:
         state = PortState(torsion, still, periodic_phase(0.0), self.stiffness, path, back)
         torque, slope = self.stiffness * torsion, self.stiffness + still
         for law in self.laws:
-            one = law.respond(state)
-            torque, slope = torque + one.torque, slope + one.slope
+            response = law.respond(state)
+            torque, slope = torque + response.torque, slope + response.slope
         return Response(torque, slope)
 
     def torsion_at(
@@ -158,8 +158,8 @@ class _Mesh:
             return direction * (response.torque - held), np.asarray(response.slope)
 
         low = np.zeros((len(before), len(held)))
-        first = beyond(low)[0]
-        high = np.maximum(np.abs(first) / self.stiffness, _LEAST_WAY)
+        excess_at_rest = beyond(low)[0]
+        high = np.maximum(np.abs(excess_at_rest) / self.stiffness, _LEAST_WAY)
         excess, slope = beyond(high)
         for _ in range(_DOUBLINGS):
             short = excess < 0.0
@@ -169,7 +169,7 @@ class _Mesh:
             excess, slope = beyond(high)
         tolerance = _TOLERANCE * high
         # Within a clearance a torque of zero is carried from the start.
-        way, excess = (np.where(first == 0.0, 0.0, one) for one in (high, excess))
+        way, excess = (np.where(excess_at_rest == 0.0, 0.0, values) for values in (high, excess))
         for _ in range(_STEPS):
             low, high = np.where(excess < 0.0, way, low), np.where(excess < 0.0, high, way)
             step = np.divide(excess, slope, out=np.full_like(way, np.inf), where=slope > 0.0)
@@ -185,7 +185,7 @@ class _Mesh:
     def whole(self, steps: Values, held: Values) -> _Leg:
         """Return the path as one leg: of each torque the torsion nearest to zero that carries it.
 
-        Raises `_AskedForTheWay` where a law depends on more.
+        Raises `_PathNeeded` where a law depends on more.
         """
         before = np.zeros((len(self.stiffness), 1))
         # A law may make a torque without any torsion.
@@ -240,7 +240,7 @@ def _by_legs(
     steps = np.diff(torque, prepend=0.0)
     try:
         return of_leg(mesh.whole(steps, held))
-    except _AskedForTheWay:
+    except _PathNeeded:
         return np.hstack([*map(of_leg, mesh.legs(steps, held))])
 
 
@@ -249,7 +249,7 @@ def _play(torque: Values, breakaway: float) -> Values:
     if breakaway == 0.0:
         return torque
     held = np.empty_like(torque)
-    last = 0.0
+    current = 0.0
     for sample, load in enumerate(torque):
-        held[sample] = last = min(max(last, load - breakaway), load + breakaway)
+        held[sample] = current = min(max(current, load - breakaway), load + breakaway)
     return held

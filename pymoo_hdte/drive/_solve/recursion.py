@@ -18,30 +18,32 @@ class Recollection(NamedTuple):
 
     Attributes
     ----------
-    kept, gained : ndarray, shape (k, n, 2 G)
-        Of each of k parts, at each step of two passages.
+    retained, gained : ndarray, shape (k, n, 2 G)
+        Retained share and gain of each of k parts, at each step of two passages.
     places : ndarray of int, shape (n, G)
         Points of a passage in its order.
     """
 
-    kept: Values
+    retained: Values
     gained: Values
     places: Places
 
     def rows(self, rows: slice) -> Recollection:
-        """Return those of some of the rows."""
-        return Recollection(self.kept[:, rows], self.gained[:, rows], self.places[rows])
+        """Return the recollection of some of the rows."""
+        return Recollection(self.retained[:, rows], self.gained[:, rows], self.places[rows])
 
     def of_signals(self, signals: Values, row: int = 0) -> Values:
         """Return the forces (G, m) of a row by each of m signals (G, m), as of `recall`."""
-        found = np.zeros(signals.shape)
-        recall(self.kept[:, row], self.gained[:, row], self.places[row], signals, found)
-        return found
+        forces = np.zeros(signals.shape)
+        recall(self.retained[:, row], self.gained[:, row], self.places[row], signals, forces)
+        return forces
 
 
 @compiled
-def recall(kept: Values, gained: Values, places: Places, signals: Values, found: Values) -> None:
-    """Add to ``found`` how the forces on a path that recurs depend on signals at other points.
+def recall(
+    retained: Values, gained: Values, places: Places, signals: Values, forces: Values
+) -> None:
+    """Add to ``forces`` how the forces on a path that recurs depend on signals at other points.
 
     A part keeps a share of itself at each step and gains a multiple of the way of the signal since
     the step before. Once settled it is the same in each passage; one that keeps all of itself goes
@@ -50,43 +52,43 @@ def recall(kept: Values, gained: Values, places: Places, signals: Values, found:
 
     Parameters
     ----------
-    kept, gained : ndarray, shape (k, 2 G)
-        Of each part at each step of two passages.
+    retained, gained : ndarray, shape (k, 2 G)
+        Retained share and gain of each part at each step of two passages.
     places : ndarray of int, shape (G,)
         Points of a passage in its order.
     signals : ndarray, shape (G, m)
-        At each point.
-    found : ndarray, shape (G, m)
+        Signals at each point.
+    forces : ndarray, shape (G, m)
     """
     size = len(places)
     force = np.empty(signals.shape[1])
-    for part in range(len(kept)):
-        of_passage = np.prod(kept[part, size:])
+    for part in range(len(retained)):
+        of_passage = np.prod(retained[part, size:])
         fades = of_passage < 1.0
         begin = size if fades else 0
         end = 2 * size if fades else size
         for step in range(begin, end):
             # It has forgotten all before.
-            if kept[part, step] == 0.0:
+            if retained[part, step] == 0.0:
                 begin = step
         force[:] = 0.0
         for step in range(begin, end):
-            _step(kept[part, step], gained[part, step], places, step, signals, force)
+            _step(retained[part, step], gained[part, step], places, step, signals, force)
         if fades:
             force /= 1.0 - of_passage
         for step in range(size, 2 * size):
-            _step(kept[part, step], gained[part, step], places, step, signals, force)
+            _step(retained[part, step], gained[part, step], places, step, signals, force)
             place = places[step - size]
-            for one in range(len(force)):
-                found[place, one] += force[one] - gained[part, step] * signals[place, one]
+            for column in range(len(force)):
+                forces[place, column] += force[column] - gained[part, step] * signals[place, column]
 
 
 @compiled
 def _step(
-    kept: float, gained: float, places: Places, step: int, signals: Values, force: Values
+    retained: float, gained: float, places: Places, step: int, signals: Values, force: Values
 ) -> None:
     """Let the force by each signal take a step of the path."""
     place, before = places[step % len(places)], places[(step - 1) % len(places)]
-    for one in range(len(force)):
-        came_from = signals[before, one] if step > 0 else 0.0
-        force[one] = kept * force[one] + gained * (signals[place, one] - came_from)
+    for column in range(len(force)):
+        came_from = signals[before, column] if step > 0 else 0.0
+        force[column] = retained * force[column] + gained * (signals[place, column] - came_from)

@@ -15,7 +15,7 @@ from pymoo_hdte.drive._solve.coefficients import Coefficients
 
 _LEAST_STEPS = 64
 _MOST_STEPS = 4096
-"""Of each cycle of the fastest variation."""
+"""Largest number of steps in a cycle of the fastest variation."""
 _LARGEST_DENOMINATOR = 1000
 _PHASE_PER_STEP = 1.0
 """Radians of the fastest torsional vibration that one step may span."""
@@ -23,7 +23,7 @@ _ROUNDING = 1e-9
 _IN_MOTION = (
     "stiffness", "damping", "input_inertia", "input_damping", "output_inertia", "output_damping",
 )  # fmt: skip
-"""What the free motion of a design depends on, beside the variation of its stiffness."""
+"""Coefficients that determine the free motion, beside the variation of the stiffness."""
 
 
 class UnstableDrive(ArithmeticError):
@@ -58,7 +58,7 @@ def floquet_multipliers(coefficients: Coefficients) -> NDArray[np.complex128]:
     Parameters
     ----------
     coefficients : Coefficients
-        Of n designs.
+        Coefficients of n designs.
 
     Returns
     -------

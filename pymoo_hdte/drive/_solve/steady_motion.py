@@ -53,9 +53,9 @@ class Tangents:
     Attributes
     ----------
     solved : callable
-        From places (m,) of solved cases to the linear system of each; None where a step needs none.
+        Maps places (m,) of solved cases to their linear systems; None where a step needs none.
     places : ndarray of int, shape (n,)
-        Of each row among the solved cases.
+        Place of each row among the solved cases.
     """
 
     solved: Callable[[NDArray[np.int_]], Sequence[LinearSystem | None]]
@@ -63,7 +63,7 @@ class Tangents:
     _known: dict[int, LinearSystem | None] = field(default_factory=dict)
 
     def rows(self, rows: NDArray[np.int_] | NDArray[np.bool_] | slice) -> Tangents:
-        """Return those of some of the rows, which share what is computed."""
+        """Return the tangents of some of the rows; they share the computed systems."""
         return Tangents(self.solved, self.places[rows], self._known)
 
     def systems(self) -> list[LinearSystem | None]:
@@ -80,22 +80,22 @@ class Tangents:
         Parameters
         ----------
         parts : sequence of Tangents
-            Of n_1, n_2, ... rows.
+            Parts of n_1, n_2, ... rows.
 
         Returns
         -------
         Tangents
-            Of n_1 + n_2 + ... rows; each part computes its own systems.
+            Tangents of n_1 + n_2 + ... rows; each part computes its own systems.
         """
         ends = np.cumsum([0, *(len(part.places) for part in parts)])
 
         def solved(places: NDArray[np.int_]) -> list[LinearSystem | None]:
-            """Ask each part for its own; places rise."""
-            found: list[LinearSystem | None] = []
-            for part, first, last in zip(parts, ends[:-1], ends[1:], strict=True):
-                own = places[(first <= places) & (places < last)] - first
-                found += part.rows(own).systems()
-            return found
+            """Return the systems of each part in turn; places rise."""
+            systems: list[LinearSystem | None] = []
+            for part, start, stop in zip(parts, ends[:-1], ends[1:], strict=True):
+                own = places[(start <= places) & (places < stop)] - start
+                systems += part.rows(own).systems()
+            return systems
 
         return cls(solved, np.arange(ends[-1]))
 

@@ -100,7 +100,7 @@ def equations_of_motion(
     remembering = memories(coefficients)
     places = np.cumsum([4, *(law.states for law in remembering)])
     *of_laws, of_clutches = places.tolist()
-    left = _holding_torque(coefficients) - holding - losses(speed)
+    excess = _holding_torque(coefficients) - holding - losses(speed)
 
     def right_hand_side(time: float, state: NDArray[np.float64]) -> list[float]:
         input_angle, input_speed, error, error_rate = state[:4].tolist()
@@ -119,11 +119,11 @@ def equations_of_motion(
         varying = 1.0 + depth * math.cos(2.0 * position + phase)
         mesh_torque = stiffness * varying * torsion + damping * torsion_rate
         mesh_torque += laws("mesh", torsion, torsion_rate, position)
-        kept = np.split(state[:of_clutches], of_laws)[1:] if remembering else []
+        memory_states = np.split(state[:of_clutches], of_laws)[1:] if remembering else []
         slips = state[of_clutches:].tolist()
-        for law, states in zip(remembering, kept, strict=True):
+        for law, states in zip(remembering, memory_states, strict=True):
             mesh_torque += law.torque(states)
-        input_torque = accelerating * envelope_rate + (holding + left) * envelope
+        input_torque = accelerating * envelope_rate + (holding + excess) * envelope
         input_torque += losses(speed * envelope)
         output_speed = input_speed / ratio - error_rate
         output_angle = position / ratio
@@ -136,7 +136,7 @@ def equations_of_motion(
         lever = 1.0 / ratio - reaction * envelope * slope
         acceleration = (input_torque - resisting - mesh_torque * lever) / inertia_in
         rates = [input_speed, acceleration, error_rate, acceleration / ratio - output_acceleration]
-        for law, states in zip(remembering, kept, strict=True):
+        for law, states in zip(remembering, memory_states, strict=True):
             rates += law.rates(torsion_rate, states).tolist()
         for (_, late), slip in zip(clutches, slips, strict=True):
             rates.append(output_acceleration - slip / late)

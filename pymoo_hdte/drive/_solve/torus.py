@@ -149,10 +149,10 @@ class Torus:
 
     def place(self, order: float) -> tuple[int, bool]:
         """Return the index of an order among the harmonics, and whether it is there as -o."""
-        found = self.find(order)
-        if found is None:
+        place = self.find(order)
+        if place is None:
             raise InvalidInput("order", order, f"within {self.highest} times {self.fundamentals}")
-        return found
+        return place
 
     def find(self, order: float) -> tuple[int, bool] | None:
         """Return the same as `place`, or None for an order that is not kept."""
@@ -198,9 +198,9 @@ class Torus:
         n = len(values)
         of_turns = self._to_turns @ values.reshape(n, self._shape[0], self._points)
         whole = of_turns.reshape(n * self._turns, 2 * self._points) @ self._to_beats
-        found = whole.view(complex).reshape(n, self._turns * self._beats)[:, self._missing :]
-        found[:, 0] *= 0.5
-        return found
+        harmonics = whole.view(complex).reshape(n, self._turns * self._beats)[:, self._missing :]
+        harmonics[:, 0] *= 0.5
+        return harmonics
 
     def derivative(self, phasors: NDArray[np.complex128]) -> NDArray[np.complex128]:
         """Return the harmonics of the derivative by the input angle."""
@@ -233,14 +233,14 @@ class Torus:
     def recall_matrix(self, recollection: Recollection) -> NDArray[np.float64]:
         """Return the real matrices by which forces depend on the signal elsewhere.
 
-        Of n rows, along a `path`. Matrices act as those of `product_matrix`.
+        There is one for each of n rows, along a `path`; it acts as those of `product_matrix`.
         """
         n, size = len(recollection.places), 2 * len(self.orders)
-        found = np.empty((n, size, size))
+        matrices = np.empty((n, size, size))
         for row in range(n):
             elsewhere = recollection.of_signals(self._synthesis, row)
-            found[row] = self._stacked_harmonics(elsewhere)
-        return found
+            matrices[row] = self._stacked_harmonics(elsewhere)
+        return matrices
 
     def _stacked_harmonics(self, columns: Matrices) -> Matrices:
         """Return the harmonics (2 H, m), real parts first, of m signals on the grid, (G, m)."""

@@ -25,7 +25,7 @@ Array = NDArray[np.float64]
 
 _WIDE, _NARROW = 0.25, 0.03
 _CENTRE = 0.85
-"""Widths of the two valleys of the last two problems, and the centre of the narrow one."""
+"""Widths of the two valleys of problems 3 and 4, and the centre of the narrow valley."""
 _NODES, _WEIGHTS = leggauss(32)
 _LEVELS = 401
 _COARSE, _FINE = 33, 13
@@ -33,7 +33,7 @@ _COARSE, _FINE = 33, 13
 
 
 class DebGupta(ClosedFormProblem):
-    """What the four have in common.
+    """Base of the four problems of Deb and Gupta.
 
     Parameters
     ----------
@@ -53,10 +53,10 @@ class DebGupta(ClosedFormProblem):
         self.deltas = deltas
         super().__init__(designs, [Mean(response="f1"), Mean(response="f2")])
 
-    def _on_curve(self, first: Array, second: Array | float = 0.0) -> Array:
+    def _on_curve(self, x1: Array, x2: Array | float = 0.0) -> Array:
         """Return designs with these x1 and x2, and 0 in all others."""
-        designs = np.zeros((len(first), self.n_var))
-        designs[:, 0], designs[:, 1] = first, second
+        designs = np.zeros((len(x1), self.n_var))
+        designs[:, 0], designs[:, 1] = x1, x2
         return designs
 
 
@@ -92,29 +92,29 @@ class DebGupta12(DebGupta):
 
     def simulator(self, **inputs: Array) -> dict[str, Array]:
         """Return f1 and f2, shape (n,) each, at x1, x2, .., shape (n,) each."""
-        first, *others = inputs.values()
+        x1, *others = inputs.values()
         g = sum(10.0 + x**2 - 10.0 * np.cos(4.0 * np.pi * x) for x in others)
-        slope = 1.0 / (0.2 + first) + self.beta * first**2
-        return {"f1": first, "f2": 1.0 - first**2 + g * slope}
+        slope = 1.0 / (0.2 + x1) + self.beta * x1**2
+        return {"f1": x1, "f2": 1.0 - x1**2 + g * slope}
 
     def closed_form(self, designs: Array) -> tuple[Array, Array]:
         """Return the mean effective objectives, shape (n, 2), and no constraints."""
-        first, others = designs[:, 0], designs[:, 1:]
-        delta, far = self.deltas[0], self.deltas[1]
-        faded = np.sinc(4.0 * far)
-        g = np.sum(10.0 + _square(others, far) - 10.0 * faded * np.cos(4.0 * np.pi * others), 1)
-        inverse = np.log((0.2 + first + delta) / (0.2 + first - delta)) / (2.0 * delta)
-        square = _square(first, delta)
-        second = 1.0 - square + g * (inverse + self.beta * square)
-        return np.column_stack([first, second]), unconstrained(len(designs))
+        x1, others = designs[:, 0], designs[:, 1:]
+        delta, delta2 = self.deltas[0], self.deltas[1]
+        faded = np.sinc(4.0 * delta2)
+        g = np.sum(10.0 + _square(others, delta2) - 10.0 * faded * np.cos(4.0 * np.pi * others), 1)
+        inverse = np.log((0.2 + x1 + delta) / (0.2 + x1 - delta)) / (2.0 * delta)
+        square = _square(x1, delta)
+        f2 = 1.0 - square + g * (inverse + self.beta * square)
+        return np.column_stack([x1, f2]), unconstrained(len(designs))
 
     def _calc_pareto_set(self) -> Array:
         """Return the designs of the front: all others are 0, as g has its minimum there."""
 
-        def second(first: Array) -> Array:
-            return self.closed_form(self._on_curve(first))[0][:, 1]
+        def f2(x1: Array) -> Array:
+            return self.closed_form(self._on_curve(x1))[0][:, 1]
 
-        places = falling_points(second, float(self.xl[0]), float(self.xu[0]), FRONT_POINTS)
+        places = falling_points(f2, float(self.xl[0]), float(self.xu[0]), FRONT_POINTS)
         return self._on_curve(places)
 
 
@@ -149,28 +149,28 @@ class DebGupta3(DebGupta):
 
     def simulator(self, **inputs: Array) -> dict[str, Array]:
         """Return f1 and f2, shape (n,) each, at x1, x2, .., shape (n,) each."""
-        first, second, *others = inputs.values()
-        g = 50.0 * sum((x**2 for x in others), np.zeros_like(first))
-        return {"f1": first, "f2": self._height(first, second) * (g + 1.0 - np.sqrt(first))}
+        x1, x2, *others = inputs.values()
+        g = 50.0 * sum((x**2 for x in others), np.zeros_like(x1))
+        return {"f1": x1, "f2": self._height(x1, x2) * (g + 1.0 - np.sqrt(x1))}
 
-    def _height(self, first: Array, second: Array) -> Array:
-        return 2.0 - _valleys(second)
+    def _height(self, x1: Array, x2: Array) -> Array:
+        return 2.0 - _valleys(x2)
 
     def closed_form(self, designs: Array) -> tuple[Array, Array]:
         """Return the mean effective objectives, shape (n, 2), and no constraints."""
         g = 50.0 * np.sum(_square(designs[:, 2:], self.deltas[-1]), axis=1)
-        second = self._second(designs[:, 0], designs[:, 1], g)
-        return np.column_stack([designs[:, 0], second]), unconstrained(len(designs))
+        f2 = self._second(designs[:, 0], designs[:, 1], g)
+        return np.column_stack([designs[:, 0], f2]), unconstrained(len(designs))
 
-    def _second(self, first: Array, second: Array, g: Array | float) -> Array:
+    def _second(self, x1: Array, x2: Array, g: Array | float) -> Array:
         delta = self.deltas[0]
-        roots = (first + delta) ** 1.5 - np.maximum(first - delta, 0.0) ** 1.5
-        return (2.0 - _mean_valleys(second, delta)) * (g + 1.0 - roots / (3.0 * delta))
+        roots = (x1 + delta) ** 1.5 - np.maximum(x1 - delta, 0.0) ** 1.5
+        return (2.0 - _mean_valleys(x2, delta)) * (g + 1.0 - roots / (3.0 * delta))
 
     def _calc_pareto_set(self) -> Array:
         """Return the designs of the front: x2 is the deepest point of the averaged valleys."""
         places = falling_points(
-            lambda first: self._second(first, self._best(first), self._least_g()),
+            lambda x1: self._second(x1, self._best(x1), self._least_g()),
             float(self.xl[0]),
             float(self.xu[0]),
             FRONT_POINTS,
@@ -181,22 +181,22 @@ class DebGupta3(DebGupta):
     def _least_g(self) -> float:
         return float(50.0 * (self.n_var - 2) * _square(np.zeros(1), self.deltas[-1])[0])
 
-    def _best(self, first: Array) -> Array:
-        """Return the x2 that is best for each x1, shape (n,)."""
+    def _best(self, x1: Array) -> Array:
+        """Return the best x2 for each x1, shape (n,)."""
         low, high = float(self.xl[1]), float(self.xu[1])
         coarse = np.linspace(low, high, _COARSE)
-        near = np.linspace(-2.0, 2.0, _FINE)[:, None] * _NARROW + self._narrow_valley(first)
-        tried = np.vstack([np.tile(coarse[:, None], len(first)), np.clip(near, low, high)])
+        valley = np.linspace(-2.0, 2.0, _FINE)[:, None] * _NARROW + self._narrow_valley(x1)
+        tried = np.vstack([np.tile(coarse[:, None], len(x1)), np.clip(valley, low, high)])
         g = self._least_g()
-        lowest = np.array([self._second(first, x, g) for x in tried]).argmin(axis=0)
+        lowest = np.array([self._second(x1, x, g) for x in tried]).argmin(axis=0)
         reach = np.where(lowest < _COARSE, coarse[1] - coarse[0], 4.0 * _NARROW / (_FINE - 1))
-        best = tried[lowest, np.arange(len(first))]
+        best = tried[lowest, np.arange(len(x1))]
         ends = np.clip([best - reach, best + reach], low, high)
-        return least_between(lambda second: self._second(first, second, g), *ends)
+        return least_between(lambda x2: self._second(x1, x2, g), *ends)
 
-    def _narrow_valley(self, first: Array) -> Array:
+    def _narrow_valley(self, x1: Array) -> Array:
         """Return the x2 at the centre of the narrow valley, shape (n,)."""
-        return np.full_like(first, _CENTRE)
+        return np.full_like(x1, _CENTRE)
 
 
 class DebGupta4(DebGupta3):
@@ -227,19 +227,19 @@ class DebGupta4(DebGupta3):
     def __init__(self, delta: float = 0.03, n_var: int = 5) -> None:
         super().__init__(real_number("delta", delta, at_least=self.smallest, at_most=0.1), n_var)
 
-    def _height(self, first: Array, second: Array) -> Array:
-        return 2.0 - first - _valleys(first + second)
+    def _height(self, x1: Array, x2: Array) -> Array:
+        return 2.0 - x1 - _valleys(x1 + x2)
 
-    def _narrow_valley(self, first: Array) -> Array:
-        return _CENTRE - first
+    def _narrow_valley(self, x1: Array) -> Array:
+        return _CENTRE - x1
 
-    def _second(self, first: Array, second: Array, g: Array | float) -> Array:
+    def _second(self, x1: Array, x2: Array, g: Array | float) -> Array:
         delta = self.deltas[0]
         # With the root as the variable the integrand is smooth down to x1 = 0.
-        ends = np.sqrt(np.maximum(first + np.array([[-delta], [delta]]), 0.0))
+        ends = np.sqrt(np.maximum(x1 + np.array([[-delta], [delta]]), 0.0))
         half = 0.5 * (ends[1] - ends[0])
         root = 0.5 * (ends[0] + ends[1]) + half * _NODES[:, None]
-        height = 2.0 - root**2 - _mean_valleys(root**2 + second, delta)
+        height = 2.0 - root**2 - _mean_valleys(root**2 + x2, delta)
         inner = height * (g + 1.0 - root) * 2.0 * root
         return half * (_WEIGHTS @ inner) / (2.0 * delta)
 

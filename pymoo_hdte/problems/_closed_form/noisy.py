@@ -86,7 +86,7 @@ class ExponentialNoise(ClosedFormProblem):
     n_var : int
         1 or more.
     limit : float
-        Of the CVaR; None for what cuts off a quarter of the front, at the side of the mean.
+        Limit of the CVaR; None cuts off a quarter of the front, at the side of the mean.
 
     Raises
     ------
@@ -115,9 +115,9 @@ class ExponentialNoise(ClosedFormProblem):
         return {"y": self._statistic(e, np.column_stack(x))}
 
     def _statistic(self, factor: Array | float, x: Array) -> Array:
-        """Return y where the noise has a value, or a statistic of which that is the noise's."""
-        far, near = (np.sum((x - place) ** 2, axis=1) for place in (self._a, self._b))
-        return far + (0.2 + near) * factor
+        """Return y for a value of the noise, or its statistic for that of the noise."""
+        from_a, from_b = (np.sum((x - place) ** 2, axis=1) for place in (self._a, self._b))
+        return from_a + (0.2 + from_b) * factor
 
     def closed_form(self, designs: Array) -> tuple[Array, Array]:
         """Return mean and quantile, shape (n, 2), and CVaR less its limit, shape (n, 1)."""
@@ -199,8 +199,10 @@ class BeamReliability(ClosedFormProblem):
             return float(self.closed_form(np.array([[h / 4.0, h]]))[1][0, 0])
 
         top = float(self.xu[1])
-        first = float(scipy.optimize.brentq(excess, float(self.xl[1]), top, xtol=1e-16, rtol=1e-15))
-        heights = np.linspace(first, top, FRONT_POINTS // 2)
+        shortest = float(
+            scipy.optimize.brentq(excess, float(self.xl[1]), top, xtol=1e-16, rtol=1e-15)
+        )
+        heights = np.linspace(shortest, top, FRONT_POINTS // 2)
         widths = np.linspace(top / 4.0, float(self.xu[0]), FRONT_POINTS // 2)
         slender = np.column_stack([heights / 4.0, heights])
         return np.vstack([slender, np.column_stack([widths, np.full(len(widths), top)])[1:]])
@@ -244,7 +246,7 @@ class Portfolio(ClosedFormProblem):
         return np.column_stack([designs, 1.0 - designs.sum(axis=1)])
 
     def closed_form(self, designs: Array) -> tuple[Array, Array]:
-        """Return mean loss and CVaR, shape (n, 2), and what is invested too much, shape (n, 1)."""
+        """Return mean loss and CVaR, shape (n, 2), and the excess of investment, shape (n, 1)."""
         shares = self._shares(designs)
         loss = -shares @ self._returns
         std = np.sqrt(np.einsum("ni,ij,nj->n", shares, self.covariance, shares))
@@ -262,13 +264,15 @@ class Portfolio(ClosedFormProblem):
             shares = self._efficient(t)
             return float(np.sqrt(shares @ self.covariance @ shares) - self._tail * t)
 
-        first = float(scipy.optimize.brentq(slope, 0.0, 1.0, xtol=1e-16, rtol=1e-15))
+        start_price = float(scipy.optimize.brentq(slope, 0.0, 1.0, xtol=1e-16, rtol=1e-15))
         richest = np.eye(4)[np.argmax(self._returns)]
         gaps = self.covariance @ richest
-        rest = np.flatnonzero(richest == 0.0)
+        others = np.flatnonzero(richest == 0.0)
         # Optimality of the one asset: r_4 t - C_44 >= r_j t - C_4j for all j.
-        last = float(np.max((gaps[3] - gaps[rest]) / (self._returns[3] - self._returns[rest])))
-        places = np.linspace(last, first, FRONT_POINTS)
+        end_price = float(
+            np.max((gaps[3] - gaps[others]) / (self._returns[3] - self._returns[others]))
+        )
+        places = np.linspace(end_price, start_price, FRONT_POINTS)
         return np.array([self._efficient(float(t)) for t in places])[:, :3]
 
     def _efficient(self, t: float) -> Array:

@@ -85,13 +85,13 @@ def falling_points(
     pieces, level = [], np.inf
     for start, stop in zip(starts, stops - 1, strict=True):
         around = places[[max(stop - 1, 0), min(stop + 1, grid - 1)]]
-        last = float(least_between(function, around[:1], around[1:])[0])
-        first = low
+        end = float(least_between(function, around[:1], around[1:])[0])
+        begin = low
         if start:
-            first = first_below(function, places[start - 1], places[start], level)
-        pieces.append((first, last))
-        level = float(function(np.array([last]))[0])
-    lengths = np.array([last - first for first, last in pieces])
+            begin = first_below(function, places[start - 1], places[start], level)
+        pieces.append((begin, end))
+        level = float(function(np.array([end]))[0])
+    lengths = np.array([end - begin for begin, end in pieces])
     # A function that rises from the first place on has one piece without a length.
     shares = lengths / max(lengths.sum(), np.finfo(float).tiny)
     counts = np.maximum(2, np.ceil(count * shares).astype(int))

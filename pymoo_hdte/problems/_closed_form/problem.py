@@ -28,9 +28,9 @@ class ClosedFormProblem(Problem):
     designs : mapping of str to Design
         Design variables with bounds and scatter. X has their order.
     objectives : sequence of Statistic
-        To be minimised.
+        Objectives to be minimised.
     constraints : sequence of RobustConstraint
-        To be met.
+        Constraints to be met.
 
     Attributes
     ----------
@@ -54,7 +54,7 @@ class ClosedFormProblem(Problem):
     ) -> None:
         self.designs = dict(designs)
         self.objectives, self.constraints = tuple(objectives), tuple(constraints)
-        bounds = np.array([(one.lower, one.upper) for one in self.designs.values()])
+        bounds = np.array([(design.lower, design.upper) for design in self.designs.values()])
         self._box = Box(tuple(self.designs), *bounds.T)
         super().__init__(
             n_var=len(bounds),
@@ -64,7 +64,7 @@ class ClosedFormProblem(Problem):
             xu=bounds[:, 1].copy(),
         )
         self.var_names = self._box.names
-        self.obj_names = tuple(one.name for one in self.objectives)
+        self.obj_names = tuple(statistic.name for statistic in self.objectives)
 
     @property
     def settings(self) -> dict[str, Any]:

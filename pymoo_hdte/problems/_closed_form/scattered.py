@@ -57,7 +57,7 @@ class WorstCaseSchaffer(ClosedFormProblem):
     def closed_form(self, designs: Array) -> tuple[Array, Array]:
         """Return the largest f1 and f2 in the box, shape (n, 2), and no constraints."""
         reach = [np.abs(designs - place) + self.deviation for place in (0.0, self.target)]
-        worst = np.column_stack([np.sum(far**2, axis=1) for far in reach])
+        worst = np.column_stack([np.sum(distance**2, axis=1) for distance in reach])
         return worst, unconstrained(len(designs))
 
     def _calc_pareto_set(self) -> Array:
@@ -111,9 +111,9 @@ class MeanDTLZ2(ClosedFormProblem):
     def _calc_pareto_set(self) -> Array:
         """Return designs with 0.5 from x3 on, over a grid of x1 and x2."""
         side = np.linspace(self.delta, 1.0 - self.delta, int(np.sqrt(FRONT_POINTS)) + 1)
-        first, second = np.meshgrid(side, side, indexing="ij")
-        designs = np.full((first.size, self.n_var), 0.5)
-        designs[:, 0], designs[:, 1] = first.ravel(), second.ravel()
+        x1, x2 = np.meshgrid(side, side, indexing="ij")
+        designs = np.full((x1.size, self.n_var), 0.5)
+        designs[:, 0], designs[:, 1] = x1.ravel(), x2.ravel()
         return designs
 
 
@@ -171,8 +171,8 @@ class RobustSrinivas(ClosedFormProblem):
         # The foot of the perpendicular from (2, 1), where f1 is least, on x1 = 3 x2 - shift.
         start = 1.0 + 0.3 * (shift - 1.0)
         along_line = np.linspace(start, (shift - 2.5) / 3.0, FRONT_POINTS // 3)
-        last = self._least_on_circle()
-        along_circle = np.linspace(-2.5, last, FRONT_POINTS // 3)
+        end = self._least_on_circle()
+        along_circle = np.linspace(-2.5, end, FRONT_POINTS // 3)
         heights = np.array([self._circle(x1) for x1 in along_circle])
         inside = np.linspace(along_line[-1], heights[0], FRONT_POINTS // 3 + 1)
         parts = [

@@ -33,7 +33,7 @@ class CommonSamples:
     ----------
     moments : SparseMoments
     seed : int
-        Of the scrambling.
+        Seed of the scrambling.
 
     Attributes
     ----------
@@ -46,7 +46,8 @@ class CommonSamples:
         axes = moments.axes
         seeds = np.random.default_rng(seed).spawn(PARTS)
         shares = [
-            scipy.stats.qmc.Sobol(len(axes), rng=one).random(SAMPLES // PARTS) for one in seeds
+            scipy.stats.qmc.Sobol(len(axes), rng=child_seed).random(SAMPLES // PARTS)
+            for child_seed in seeds
         ]
         p = np.concatenate(shares)
         self.scatter = np.column_stack([axis.sample(p[:, j]) for j, axis in enumerate(axes)])
@@ -85,9 +86,9 @@ class Around:
     ----------
     common : CommonSamples
     expansion : ndarray, shape (n, q)
-        Of the response, from `SparseMoments.expansion`.
+        Expansion of the response, from `SparseMoments.expansion`.
     part : slice
-        Which of the samples to use.
+        The samples to use.
     """
 
     def __init__(self, common: CommonSamples, expansion: Array, part: slice = slice(None)) -> None:
@@ -119,7 +120,7 @@ class Around:
         """
         points, basis = self._common.starts
         best = np.argmax(side * self.expansion @ basis.T, axis=1)
-        found = points[best]
+        optima = points[best]
         ends = self._common.ends
         moving = np.flatnonzero(ends[:, 0] < ends[:, 1])
         line = 0.5 - 0.5 * np.cos(np.pi * np.arange(_LINE) / (_LINE - 1))
@@ -129,21 +130,21 @@ class Around:
                 # The first sweep looks along the whole line, later ones ever nearer.
                 steps = (line - 0.5) * 2.0 * 0.25**sweep * width[j]
                 if not sweep:
-                    tried = np.tile(ends[j, 0] + line * width[j], (len(found), 1))
-                    tried = np.column_stack([tried, found[:, j]])
+                    tried = np.tile(ends[j, 0] + line * width[j], (len(optima), 1))
+                    tried = np.column_stack([tried, optima[:, j]])
                 else:
-                    tried = np.clip(found[:, j, None] + steps, *ends[j])
-                found = self._best_on_line(found, j, tried, side)
-        at = self._common.moments.basis(found)
+                    tried = np.clip(optima[:, j, None] + steps, *ends[j])
+                optima = self._best_on_line(optima, j, tried, side)
+        at = self._common.moments.basis(optima)
         return np.einsum("nq,nq->n", self.expansion, at), at
 
-    def _best_on_line(self, found: Array, axis: int, tried: Array, side: float) -> Array:
+    def _best_on_line(self, optima: Array, axis: int, tried: Array, side: float) -> Array:
         moments = self._common.moments
         count = tried.shape[1]
-        points = np.repeat(found, count, axis=0)
+        points = np.repeat(optima, count, axis=0)
         points[:, axis] = tried.reshape(-1)
-        values = moments.basis(points).reshape(len(found), count, -1)
+        values = moments.basis(points).reshape(len(optima), count, -1)
         best = np.argmax(side * np.einsum("nkq,nq->nk", values, self.expansion), axis=1)
-        found = found.copy()
-        found[:, axis] = tried[np.arange(len(found)), best]
-        return found
+        optima = optima.copy()
+        optima[:, axis] = tried[np.arange(len(optima)), best]
+        return optima

@@ -31,26 +31,26 @@ def receive(stream: IO[bytes]) -> bytes:
 
 
 def serve() -> None:
-    """Make calls until nobody asks any more."""
+    """Make calls until the requests end."""
     # What a simulator prints or reads must not mix with the messages.
-    asked, answers = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
+    requests, answers = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
     os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
     os.dup2(2, 1)
     calls: SimpleQueue[bytes] = SimpleQueue()
-    Thread(target=_read, args=(asked, calls), daemon=True).start()
+    Thread(target=_read, args=(requests, calls), daemon=True).start()
     sys.path[:] = pickle.loads(calls.get())
-    # Whoever asked may be gone before the answer.
+    # Whoever requested it may be gone before the answer.
     with suppress(BrokenPipeError):
         while True:
             _answer(calls.get(), answers)
 
 
-def _read(asked: IO[bytes], calls: SimpleQueue[bytes]) -> None:
+def _read(requests: IO[bytes], calls: SimpleQueue[bytes]) -> None:
     try:
         while True:
-            calls.put(receive(asked))
+            calls.put(receive(requests))
     except (EOFError, OSError):
-        # Whoever asked is gone: programs that the simulator started end with it, if they can be.
+        # Whoever requested it is gone: programs that the simulator started end too, if possible.
         if hasattr(os, "killpg"):
             os.killpg(0, signal.SIGKILL)
         os._exit(1)
@@ -63,16 +63,16 @@ def _answer(call: bytes, answers: IO[bytes]) -> None:
         send(answers, b"")
     except Exception as error:
         send(answers, b"")
-        send(answers, pickle.dumps((False, _told(error))))
+        send(answers, pickle.dumps((False, _text_of(error))))
         return
     try:
         answer = pickle.dumps((True, function(*arguments)))
     except BaseException as error:  # A simulator may also end Python.
-        answer = pickle.dumps((False, _told(error)))
+        answer = pickle.dumps((False, _text_of(error)))
     send(answers, answer)
 
 
-def _told(error: BaseException) -> str:
+def _text_of(error: BaseException) -> str:
     return f"{type(error).__name__}: {error}"
 
 

@@ -21,12 +21,12 @@ from pymoo_hdte.problems._simulator.child import receive, send
 
 RAISED, NOT_A_NUMBER = "raised", "not a number"
 TOO_LONG, LOST = "over the time limit", "worker lost"
-"""What becomes of evaluations that give nothing."""
+"""Kinds of failures of evaluations that give no result."""
 
 
 @dataclass(frozen=True)
 class Failure:
-    """What stands in the place of a result: the kind, one of four, what was said, and by what."""
+    """A failed evaluation in place of a result: its kind, one of four, its text and its error."""
 
     kind: str
     text: str
@@ -34,14 +34,16 @@ class Failure:
 
 
 def over_the_limit(seconds: float) -> Failure:
-    """Return what stands in the place of a result that did not come within a time limit."""
+    """Return the failure of an evaluation that exceeded a time limit."""
     return Failure(TOO_LONG, f"no result within {seconds!r} s")
 
 
 def limit_in(text: str) -> float | None:
-    """Return the time limit in seconds that a failure's text tells; None for other failures."""
-    told = re.fullmatch(rf"(?:{TOO_LONG}: )?no result within (\d+(?:\.\d*)?(?:e[-+]?\d+)?) s", text)
-    return float(told[1]) if told else None
+    """Return the time limit in seconds that a failure's text names; None for other failures."""
+    match = re.fullmatch(
+        rf"(?:{TOO_LONG}: )?no result within (\d+(?:\.\d*)?(?:e[-+]?\d+)?) s", text
+    )
+    return float(match[1]) if match else None
 
 
 def parcel(function: Callable[..., Any], *arguments: Any) -> bytes:
@@ -67,12 +69,12 @@ def parcel(function: Callable[..., Any], *arguments: Any) -> bytes:
 
 
 class Children:
-    """Processes that make one call at a time each, started when there is none to spare."""
+    """Processes that make one call at a time each; one is started when all are busy."""
 
     def __init__(self) -> None:
         self._lock = RLock()
         self._idle: list[subprocess.Popen[bytes]] = []
-        self._all: set[subprocess.Popen[bytes]] = set()
+        self._subprocesses: set[subprocess.Popen[bytes]] = set()
         self._process = os.getpid()
         self.round = 0
 
@@ -142,7 +144,7 @@ class Children:
                 stdout=subprocess.PIPE,
                 start_new_session=True,
             )
-            self._all.add(child)
+            self._subprocesses.add(child)
         assert child.stdin is not None
         # If it was ended meanwhile, the call will notice.
         with suppress(OSError):
@@ -151,7 +153,7 @@ class Children:
 
     def _drop(self, child: subprocess.Popen[bytes]) -> None:
         with self._lock:
-            self._all.discard(child)
+            self._subprocesses.discard(child)
         _kill(child)
         for stream in (child.stdin, child.stdout):
             # What could not be sent to a process that is gone.
@@ -166,7 +168,7 @@ class Children:
         with self._lock:
             self.round += 1
             idle, self._idle = self._idle, []
-            busy = self._all - set(idle)
+            busy = self._subprocesses - set(idle)
         for child in busy:
             _kill(child)
         for child in idle:

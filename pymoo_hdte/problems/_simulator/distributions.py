@@ -30,7 +30,7 @@ def joint_distribution(field: str, given: Any, count: int) -> Any:
     Parameters
     ----------
     field : str
-        What to call it in an error.
+        Name of the distribution in an error.
     given : object
         A joint distribution of `chaospy`, or a frozen ``multivariate_normal`` of `scipy.stats`.
     count : int
@@ -52,10 +52,10 @@ def joint_distribution(field: str, given: Any, count: int) -> Any:
     if np.any(given.interpret_as_integer):
         raise InvalidInput(field, given, allowed)
     try:
-        found = np.asarray(given.inv(np.full((count, 1), 0.5)))
+        medians = np.asarray(given.inv(np.full((count, 1), 0.5)))
     except Exception as error:
         raise InvalidInput(field, given, f"{allowed} ({error})") from error
-    if not np.all(np.isfinite(found)):
+    if not np.all(np.isfinite(medians)):
         raise InvalidInput(field, given, allowed + " with finite medians")
     return given
 
@@ -76,7 +76,7 @@ def described(field: str, given: Any) -> dict[str, Any]:
     Parameters
     ----------
     field : str
-        What to call it in an error.
+        Name of the distribution in an error.
     given : object
         A distribution of `chaospy`, of several variables too, a frozen one of `scipy.stats`, or a
         `TruncatedNormal`.
@@ -89,23 +89,23 @@ def described(field: str, given: Any) -> dict[str, Any]:
     """
     allowed = "a distribution that its class and numbers make anew: others cannot be saved"
     try:
-        found: dict[str, Any]
+        description: dict[str, Any]
         given = _as_chaospy(given)
         if isinstance(given, TruncatedNormal):
-            found = {"truncated_normal": [given.mean, given.std, given.cut]}
+            description = {"truncated_normal": [given.mean, given.std, given.cut]}
         elif hasattr(given, "kwds"):
-            numbers = [_number(one) for one in given.args]
-            named = {name: _number(one) for name, one in given.kwds.items()}
-            found = {"scipy": [given.dist.name, numbers, named]}
+            numbers = [_number(number) for number in given.args]
+            named = {name: _number(number) for name, number in given.kwds.items()}
+            description = {"scipy": [given.dist.name, numbers, named]}
         else:
-            found = {"chaospy": repr(given)}
-        again = rebuilt(field, found)
+            description = {"chaospy": repr(given)}
+        again = rebuilt(field, description)
         same = np.array_equal(_quantiles(given), _quantiles(again))
     except Exception:  # Libraries raise anything for what they cannot ask.
         same = False
     if not same:
         raise InvalidInput(field, given, allowed)
-    return found
+    return description
 
 
 def rebuilt(field: str, described: Any) -> Any:
@@ -143,27 +143,27 @@ def _table(named: dict[str, Any]) -> dict[str, float | int]:
 
 
 def _of_scipy(name: str) -> Callable[..., Any]:
-    found = getattr(scipy.stats, name, None)
-    if not isinstance(found, scipy.stats.rv_continuous):
+    distribution = getattr(scipy.stats, name, None)
+    if not isinstance(distribution, scipy.stats.rv_continuous):
         raise ValueError(f"{name!r} is no continuous distribution of scipy.stats")
-    return found
+    return distribution
 
 
 def _of_chaospy(text: str) -> Any:
-    found = _value(ast.parse(text, mode="eval").body)
-    if not hasattr(found, "inv"):
+    distribution = _value(ast.parse(text, mode="eval").body)
+    if not hasattr(distribution, "inv"):
         raise ValueError(f"{text!r} is no distribution of chaospy")
-    return found
+    return distribution
 
 
 def _value(node: ast.expr) -> Any:
     """Return what a part of chaospy's text stands for: a number, a list or a distribution."""
     if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
-        arguments = [_value(one) for one in node.args]
-        named = {str(one.arg): _value(one.value) for one in node.keywords}
+        arguments = [_value(argument) for argument in node.args]
+        named = {str(keyword.arg): _value(keyword.value) for keyword in node.keywords}
         return _class(node.func.id)(*arguments, **named)
     if isinstance(node, ast.List | ast.Tuple):
-        return [_value(one) for one in node.elts]
+        return [_value(element) for element in node.elts]
     if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub):
         return -_value(node.operand)
     if isinstance(node, ast.Constant) and isinstance(node.value, int | float):
@@ -174,10 +174,10 @@ def _value(node: ast.expr) -> Any:
 def _class(name: str) -> Callable[..., Any]:
     import chaospy  # Takes longer to load than a study without a file.
 
-    found = getattr(chaospy, name, None)
-    if not (isinstance(found, type) and issubclass(found, chaospy.Distribution)):
+    kind = getattr(chaospy, name, None)
+    if not (isinstance(kind, type) and issubclass(kind, chaospy.Distribution)):
         raise ValueError(f"{name!r} is no distribution of chaospy")
-    return found
+    return kind
 
 
 def _quantiles(distribution: Any) -> np.ndarray:

@@ -28,10 +28,10 @@ class _Responses:
 
     def __call__(self, **variables: Array) -> dict[str, Array]:
         X = np.column_stack(list(variables.values()))
-        found = self.problem.evaluate(X, return_as_dictionary=True)
-        columns = dict(zip(self.objectives, np.atleast_2d(found["F"]).T, strict=True))
+        outputs = self.problem.evaluate(X, return_as_dictionary=True)
+        columns = dict(zip(self.objectives, np.atleast_2d(outputs["F"]).T, strict=True))
         if self.constraints:
-            columns |= dict(zip(self.constraints, np.atleast_2d(found["G"]).T, strict=True))
+            columns |= dict(zip(self.constraints, np.atleast_2d(outputs["G"]).T, strict=True))
         return columns
 
 
@@ -51,7 +51,7 @@ def Robust(
     Parameters
     ----------
     problem : pymoo.core.problem.Problem
-        With real variables and finite bounds, without equality constraints. Objectives are called
+        It has real variables, finite bounds and no equality constraints. Objectives are called
         ``F1``, ``F2``, .., constraints ``G1``, .., variables ``x1``, ..
     scatter : float, sequence or mapping
         Absolute deviation of each variable in its unit: a number d stands for uniform in -d..d, a

@@ -1,4 +1,4 @@
-"""What tells a simulator from others: its state, what it reads beside its inputs, and sources."""
+"""What identifies a simulator: its state, what it reads beside its inputs, and sources."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from typing import Any
 
 
 def identity(simulator: Callable[..., Any]) -> str | None:
-    """Return what tells a simulator from others.
+    """Return a digest that identifies a simulator.
 
     That is its state; globals, closures and defaults of its functions, and of those of the same
     file that they call; that file, and those of the modules named there. Files that it reads while
@@ -37,14 +37,14 @@ def identity(simulator: Callable[..., Any]) -> str | None:
     # A user's object may raise anything when it is pickled.
     try:
         values, modules = _surroundings(inner)
-        contents = [pickle.dumps(one, protocol=4) for one in (simulator, *values)]
+        contents = [pickle.dumps(value, protocol=4) for value in (simulator, *values)]
         contents.append(
             Path(str(inspect.getsourcefile(sys.modules[inner.__module__]))).read_bytes()
         )
         contents += map(_source, modules)
     except Exception:
         return None
-    digests = [hashlib.sha256(one).digest() for one in contents]
+    digests = [hashlib.sha256(content).digest() for content in contents]
     return hashlib.sha256(b"".join(digests)).hexdigest()
 
 
@@ -79,7 +79,12 @@ def _functions(simulator: Any) -> list[FunctionType]:
     kind = type(simulator.__self__ if isinstance(simulator, MethodType) else simulator)
     # What pymoo's own classes read cannot be pickled, and they do not compute the responses.
     bases = [base for base in kind.__mro__ if not base.__module__.startswith("pymoo.core.")]
-    return [one for base in bases for one in vars(base).values() if isinstance(one, FunctionType)]
+    return [
+        member
+        for base in bases
+        for member in vars(base).values()
+        if isinstance(member, FunctionType)
+    ]
 
 
 def _read(function: FunctionType) -> Iterator[tuple[str, Any]]:
@@ -95,11 +100,11 @@ def _read(function: FunctionType) -> Iterator[tuple[str, Any]]:
 
 def _names(code: CodeType) -> list[str]:
     """Return the names in a function and in those within it; some are of attributes."""
-    inside = [one for one in code.co_consts if isinstance(one, CodeType)]
-    found = dict.fromkeys(code.co_names)
-    for one in inside:
-        found |= dict.fromkeys(_names(one))
-    return list(found)
+    inside = [constant for constant in code.co_consts if isinstance(constant, CodeType)]
+    names = dict.fromkeys(code.co_names)
+    for function_code in inside:
+        names |= dict.fromkeys(_names(function_code))
+    return list(names)
 
 
 def _source(module: ModuleType) -> bytes:

@@ -82,7 +82,7 @@ class Design:
         Parameters
         ----------
         name : str
-            Of the variable.
+            Name of the variable.
 
         Returns
         -------
@@ -137,7 +137,7 @@ class Inputs:
     axes : list of Axis
         The designs first, in their order.
     names : tuple of str
-        Of the simulator's inputs, in the order of the axes.
+        Names of the simulator's inputs, in the order of the axes.
 
     Raises
     ------
@@ -170,17 +170,17 @@ class Inputs:
             raise InvalidInput("names of the inputs", tuple(names), allowed)
         self.names = tuple(names)
 
-    def _add_noise(self, group: Sequence[str], given: Any, first: int) -> None:
+    def _add_noise(self, group: Sequence[str], given: Any, start: int) -> None:
         if len(group) == 1:
             self.axes.append(noise_axis(group[0], _noise(group[0], given)))
             return
         given = joint_distribution(f"noise[{group!r}]", given, len(group))
         if not given.stochastic_dependent:
             for place, name in enumerate(group):
-                self._add_noise((name,), given[place], first + place)
+                self._add_noise((name,), given[place], start + place)
             return
         self.axes += [Axis(name, standard_normal()) for name in group]
-        self._joint.append((first, given))
+        self._joint.append((start, given))
 
     @property
     def designed(self) -> tuple[str, ...]:
@@ -190,8 +190,8 @@ class Inputs:
     def values(self, cube: Array) -> Array:
         """Return the simulator's inputs in their units at points of -1..1, both shape (n, d)."""
         columns = [axis.physical(z) for axis, z in zip(self.axes, cube.T, strict=True)]
-        for first, joint in self._joint:
-            place = slice(first, first + len(joint))
+        for start, joint in self._joint:
+            place = slice(start, start + len(joint))
             columns[place] = list(
                 np.asarray(joint.inv(scipy.special.ndtr(np.array(columns[place]))))
             )
@@ -200,11 +200,11 @@ class Inputs:
     def reach(self) -> dict[str, tuple[float, float]]:
         """Return smallest and largest value at which the simulator will be called, by name.
 
-        Of dependent noise, those along the lines through its centre.
+        For dependent noise, they are taken along the lines through its centre.
         """
         ends = np.vstack([np.diag(np.full(len(self.axes), side)) for side in (-1.0, 1.0)])
-        found = self.values(ends)
-        lows, highs = found.min(axis=0).tolist(), found.max(axis=0).tolist()
+        extremes = self.values(ends)
+        lows, highs = extremes.min(axis=0).tolist(), extremes.max(axis=0).tolist()
         return dict(zip(self.names, zip(lows, highs, strict=True), strict=True))
 
 

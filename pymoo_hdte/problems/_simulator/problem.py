@@ -12,8 +12,8 @@ from pymoo.core.problem import Problem
 
 from pymoo_hdte.checks import InvalidInput, finite_array
 from pymoo_hdte.problems._simulator.around import Around, CommonSamples
-from pymoo_hdte.problems._simulator.asked import asked_of, by_moments, place_of
 from pymoo_hdte.problems._simulator.inputs import Inputs
+from pymoo_hdte.problems._simulator.requested import by_moments, place_of, requested_of
 from pymoo_hdte.problems._simulator.statistics import RobustConstraint, Statistic
 from pymoo_hdte.problems._simulator.stored import read_problem, write_problem
 from pymoo_hdte.surrogate._sparse.adaptive import AdaptiveFit
@@ -45,9 +45,9 @@ class SimulatorProblem(Problem):
     responses : tuple of str
         Names of the responses.
     objectives : sequence of Statistic
-        To be minimised.
+        Objectives to be minimised.
     constraints : sequence of RobustConstraint
-        To be met.
+        Constraints to be met.
     n_runs : int
         Runs of the simulator that were made.
 
@@ -93,7 +93,7 @@ class SimulatorProblem(Problem):
         self.design_box = Box(inputs.designed, *bounds.T)
         self.objectives, self.constraints = tuple(objectives), tuple(constraints)
         self.responses, self.n_runs, self._fit = responses, n_runs, fit
-        self._asked = asked_of(objectives, constraints, responses)
+        self._requested = requested_of(objectives, constraints, responses)
         super().__init__(
             n_var=len(bounds),
             n_obj=len(objectives),
@@ -102,7 +102,7 @@ class SimulatorProblem(Problem):
             xu=bounds[:, 1].copy(),
         )
         self.var_names, self.input_names = inputs.designed, inputs.names
-        self.obj_names = tuple(one.name for one in objectives)
+        self.obj_names = tuple(statistic.name for statistic in objectives)
         self._common = CommonSamples(fit.moments, seed=1)
         self.failed = inputs.values(fit.failed) if len(fit.failed) else fit.failed
         self.accuracy = self._accuracy()
@@ -134,7 +134,7 @@ class SimulatorProblem(Problem):
         Parameters
         ----------
         path : str or path-like
-            Of the file.
+            The file.
 
         Returns
         -------
@@ -217,8 +217,8 @@ class SimulatorProblem(Problem):
         point = self.design_box.settle(finite_array("design", design, (self.n_var,))[None])
         moments = self._fit.moments
         expansion = moments.expansion(point)[0, place]
-        variance, first, total = moments.divided_variance(expansion)
-        return SobolIndices(self.input_names, float(expansion[0]), variance, first, total)
+        variance, first_order, total = moments.divided_variance(expansion)
+        return SobolIndices(self.input_names, float(expansion[0]), variance, first_order, total)
 
     def _around(self, X: Array) -> list[Around]:
         """Return the expansion of each response around the designs."""
@@ -227,7 +227,7 @@ class SimulatorProblem(Problem):
 
     def _band(self, around: list[Around]) -> Array:
         columns = []
-        for statistic, _, _, place in self._asked[: self.n_obj]:
+        for statistic, _, _, place in self._requested[: self.n_obj]:
             scatter = np.maximum(around[place].std, self._fit.smallest_scatter[place])
             errors = self._fit.mean_error[place] * scatter, self._fit.std_error[place] * scatter
             columns.append(statistic.half_width(*errors, around[place]))
@@ -237,26 +237,26 @@ class SimulatorProblem(Problem):
         designs = draw_designs(self._inputs.axes, _JUDGED, np.random.default_rng(1))
         around = self._around(designs)
         shares = self._band(around)
-        for column, (statistic, _, _, place) in enumerate(self._asked[: self.n_obj]):
+        for column, (statistic, _, _, place) in enumerate(self._requested[: self.n_obj]):
             if statistic.relative_to_scatter:
                 least = self._fit.smallest_scatter[place]
                 shares[:, column] /= np.maximum(around[place].std, least)
         return np.median(shares, axis=0)
 
     def _evaluate(self, x: Array, out: dict[str, Any], *args: Any, **kwargs: Any) -> None:
-        """Fill F and G, and dF, dG and F_band if asked for.
+        """Fill F and G, and dF, dG and F_band if requested.
 
         Raises
         ------
         ExtrapolationError
             If a design is outside the box or NaN.
         InvalidInput
-            If the gradient of a statistic is asked for that has none.
+            If a gradient is requested of a statistic that has none.
         """
         x = self.design_box.settle(x)
         slopes: list[str] = [key for key in ("dF", "dG") if key in out]
         blocks = range(0, len(x), _AT_ONCE)
-        quick = None if slopes else by_moments(self._asked, self._fit.moments, x)
+        quick = None if slopes else by_moments(self._requested, self._fit.moments, x)
         if quick is not None:
             parts = [{"F": quick[:, : self.n_obj], "G": quick[:, self.n_obj :]}]
         else:
@@ -270,17 +270,17 @@ class SimulatorProblem(Problem):
     def _block(self, x: Array, slopes: list[str]) -> dict[str, Array]:
         around = self._around(x)
         values, gradients = [], []
-        for statistic, sign, bound, place in self._asked:
+        for statistic, sign, bound, place in self._requested:
             value, slope = statistic.value(around[place])
             values.append(sign * value - bound)
             if slopes:
                 gradients.append(sign * self._gradient(x, statistic, slope, place))
         F, G = np.split(np.column_stack(values), [self.n_obj], axis=1)
-        found = {"F": F, "G": G}
+        outputs = {"F": F, "G": G}
         if slopes:
             dF, dG = np.split(np.stack(gradients, axis=1), [self.n_obj], axis=1)
-            found |= {"dF": dF, "dG": dG}
-        return found
+            outputs |= {"dF": dF, "dG": dG}
+        return outputs
 
     def _gradient(self, x: Array, statistic: Statistic, slope: Array, place: int) -> Array:
         if not statistic.has_gradient:

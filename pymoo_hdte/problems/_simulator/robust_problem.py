@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from pymoo_hdte.checks import InvalidInput, real_number, whole_number
-from pymoo_hdte.problems._simulator.asked import place_of
 from pymoo_hdte.problems._simulator.identity import identity
 from pymoo_hdte.problems._simulator.inputs import Design, Inputs
 from pymoo_hdte.problems._simulator.problem import SimulatorProblem
+from pymoo_hdte.problems._simulator.requested import place_of
 from pymoo_hdte.problems._simulator.run_file import RunFile
 from pymoo_hdte.problems._simulator.runs import Simulator
 from pymoo_hdte.problems._simulator.statistics import (
@@ -99,7 +99,7 @@ def robust_problem(
         variance), or from a tuple of names to a joint one of `chaospy`. Together with the designs
         at most 20 inputs.
     objectives : sequence of Statistic
-        To be minimised; ``-Mean()`` is maximised.
+        Objectives to be minimised; ``-Mean()`` is maximised.
     constraints : sequence of RobustConstraint
         As ``Quantile(0.99, response="stress") <= 250e6``.
     accuracy : float
@@ -130,14 +130,14 @@ def robust_problem(
         or the modules that it names are others or cannot be told. What else it reads or calls, as
         files and programs, is not seen: delete the file where that has changed.
     seed : int
-        Of where the runs are.
+        Seed of the positions of the runs.
     progress : bool
         Whether to tell runs and memory on the error stream before the first run, and show a bar.
 
     Returns
     -------
     SimulatorProblem
-        With ``accuracy`` and ``n_runs``.
+        The problem, with ``accuracy`` and ``n_runs``.
 
     Raises
     ------
@@ -182,8 +182,8 @@ def robust_problem(
         simulate = Simulator(simulator, inputs.names, vectorised, workers, count, file, bar)
         statistics = [*objectives, *(limit.statistic for limit in constraints)]
 
-        def asked() -> list[int]:
-            return sorted({place_of(one, simulate.responses) for one in statistics})
+        def requested_places() -> list[int]:
+            return sorted({place_of(statistic, simulate.responses) for statistic in statistics})
 
         fit = fit_adaptively(
             inputs.axes,
@@ -195,16 +195,16 @@ def robust_problem(
                 not negative_somewhere(inputs, fit, positive_places(positive, simulate.responses))
             ),
             batch,
-            lambda fit: largest_error(fit, asked())[0],
+            lambda fit: largest_error(fit, requested_places())[0],
         )
-        _refuse_untrusted(inputs, fit, accuracy, simulate, positive, asked())
+        _refuse_untrusted(inputs, fit, accuracy, simulate, positive, requested_places())
     if file:
         file.finish()
     responses = simulate.responses
     problem = SimulatorProblem(inputs, fit, responses, objectives, constraints, fit.n_runs)
-    _tell_failures(problem)
+    _warn_of_failures(problem)
     if not fit.confirmed:
-        _tell_budget(fit, responses, asked())
+        _warn_of_budget(fit, responses, requested_places())
     return problem
 
 
@@ -214,10 +214,10 @@ def _refuse_untrusted(
     accuracy: float,
     simulate: Simulator,
     positive: Sequence[str] | bool,
-    asked: Sequence[int],
+    places: Sequence[int],
 ) -> None:
     responses = simulate.responses
-    unsure = inaccurate(inputs, fit, accuracy, responses, asked)
+    unsure = inaccurate(inputs, fit, accuracy, responses, places)
     if unsure and (cause := random(inputs, fit, accuracy, responses, simulate.again)):
         raise cause
     refusal = (
@@ -229,8 +229,8 @@ def _refuse_untrusted(
         raise UntrustedSurrogate(*refusal)
 
 
-def _tell_budget(fit: AdaptiveFit, responses: tuple[str, ...], asked: Sequence[int]) -> None:
-    error, _, place = largest_error(fit, asked)
+def _warn_of_budget(fit: AdaptiveFit, responses: tuple[str, ...], places: Sequence[int]) -> None:
+    error, _, place = largest_error(fit, places)
     message = (
         f"the budget of {fit.n_runs} runs is used up: the error of {responses[place]!r} is "
         f"{error:.2g} of its scatter, no more than asked for, but not confirmed: {IN_A_ROW} checks "
@@ -269,15 +269,21 @@ def _check_signature(simulator: Callable[..., Any], names: Sequence[str]) -> Non
     except (TypeError, ValueError):
         return
     parameters = signature.parameters.values()
-    named = [one for one in parameters if one.kind in (one.POSITIONAL_OR_KEYWORD, one.KEYWORD_ONLY)]
+    named = [
+        parameter
+        for parameter in parameters
+        if parameter.kind in (parameter.POSITIONAL_OR_KEYWORD, parameter.KEYWORD_ONLY)
+    ]
     optional = (inspect.Parameter.VAR_POSITIONAL, inspect.Parameter.VAR_KEYWORD)
-    takes = {one.name for one in named}
-    anything = any(one.kind is one.VAR_KEYWORD for one in parameters)
+    takes = {parameter.name for parameter in named}
+    anything = any(parameter.kind is parameter.VAR_KEYWORD for parameter in parameters)
     surplus = [] if anything else [name for name in names if name not in takes]
     missing = [
-        one.name
-        for one in parameters
-        if one.default is one.empty and one.kind not in optional and one.name not in names
+        parameter.name
+        for parameter in parameters
+        if parameter.default is parameter.empty
+        and parameter.kind not in optional
+        and parameter.name not in names
     ]
     if surplus or missing:
         reasons = [f"it takes no {', '.join(surplus)}"] if surplus else []
@@ -296,10 +302,10 @@ def _check_statistics(
         allowed = f"a list of {kind.__name__}s"
         if not isinstance(given, Sequence):
             raise InvalidInput(field, given, allowed + _hint(field, given))
-        for place, one in enumerate(given):
-            if not isinstance(one, kind):
+        for place, entry in enumerate(given):
+            if not isinstance(entry, kind):
                 raise InvalidInput(
-                    f"{field}[{place}]", one, f"a {kind.__name__}{_hint(field, one)}"
+                    f"{field}[{place}]", entry, f"a {kind.__name__}{_hint(field, entry)}"
                 )
     if not objectives:
         raise InvalidInput("objectives", objectives, "one or more")
@@ -315,13 +321,13 @@ def _hint(field: str, given: Any) -> str:
     return ""
 
 
-def _tell_failures(problem: SimulatorProblem) -> None:
+def _warn_of_failures(problem: SimulatorProblem) -> None:
     if not len(problem.failed):
         return
     rows = [
         ", ".join(f"{n} = {v:.6g}" for n, v in zip(problem.input_names, row, strict=True))
         for row in problem.failed[:5]
     ]
-    more = "" if len(problem.failed) <= len(rows) else ", .."
-    message = f"{len(problem.failed)} runs failed and are left out: {'; '.join(rows)}{more}"
+    ending = "" if len(problem.failed) <= len(rows) else ", .."
+    message = f"{len(problem.failed)} runs failed and are left out: {'; '.join(rows)}{ending}"
     warnings.warn(message, RuntimeWarning, stacklevel=3)

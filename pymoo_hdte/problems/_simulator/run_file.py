@@ -24,11 +24,11 @@ if sys.platform != "win32":
 
 _SAME = 1e-6
 """Relative difference of two runs of one simulator, on two machines say; set by hand."""
-_ASKED = 5
+_RERUNS = 5
 """Runs of a file that are made again, one after the other, until one does not fail; by hand. Also
-the most damaged lines that are told one by one."""
+the largest number of damaged lines that are listed."""
 _SHOWN = 80
-"""Characters of the reason why a line is damaged; by hand."""
+"""Characters that are shown of the reason why a line is damaged; set by hand."""
 _DAMAGED = (ValueError, TypeError, OverflowError, RecursionError)
 """What is raised by a line that is no JSON, or other JSON than a run file has: no text in UTF-8,
 too many digits, nested too deeply, a number beyond those of floats, another type."""
@@ -44,22 +44,22 @@ class RunFile:
     Parameters
     ----------
     path : str or path-like
-        Of the file; made if it is not there.
+        The file; it is made if it is not there.
     names : tuple of str
-        Of the simulator's inputs. A file of others is refused.
+        Names of the simulator's inputs. A file with other names is refused.
     simulator : str or None
         What tells the simulator from others (`pymoo_hdte.problems._simulator.identity`).
 
     Attributes
     ----------
     runs : dict
-        What the simulator gave, by inputs.
+        Results of the simulator, by inputs.
     failures : dict
-        Why a run gave nothing, by inputs.
+        Reasons why runs gave no result, by inputs.
     order : dict
-        Which run ended when, from 0 on, by inputs.
+        Position of each run in the order in which they ended, from 0, by inputs.
     responses : tuple of str
-        Names of what it gives; empty before the first run.
+        Names of the results; empty before the first run.
     goes_on : bool
         Whether this simulator wrote the file and was stopped before the study's end.
 
@@ -148,14 +148,14 @@ class RunFile:
             except _DAMAGED as error:
                 damaged.append((number, str(error) or type(error).__name__))
         if damaged:
-            self._tell_damaged(damaged)
+            self._warn_of_damaged(damaged)
         known = self._simulator is not None and header.get("simulator") == self._simulator
         # Without the names of the responses a run has to be made again, which tells them.
         named = bool(self.responses) or not self.runs
         self.goes_on = known and named and not self._finished
 
     def _read_line(self, line: Any) -> None:
-        """Take in what a line says, or raise one of `_DAMAGED` and take in nothing."""
+        """Take over the contents of a line, or raise one of `_DAMAGED` and change nothing."""
         if not isinstance(line, dict):
             raise ValueError("it is no table")
         if "responses" in line:
@@ -179,11 +179,12 @@ class RunFile:
             raise ValueError("it is neither a run nor a remark on one")
         self._finished = "finished" in line
 
-    def _tell_damaged(self, damaged: Sequence[tuple[int, str]]) -> None:
-        told = "; ".join(f"line {number} ({why[:_SHOWN]})" for number, why in damaged[:_ASKED])
-        more = f" and {len(damaged) - _ASKED} more" if len(damaged) > _ASKED else ""
+    def _warn_of_damaged(self, damaged: Sequence[tuple[int, str]]) -> None:
+        listing = "; ".join(f"line {number} ({why[:_SHOWN]})" for number, why in damaged[:_RERUNS])
+        ending = f" and {len(damaged) - _RERUNS} more" if len(damaged) > _RERUNS else ""
         message = (
-            f"{self.path}: damaged lines are left out, and their runs are made again: {told}{more}"
+            f"{self.path}: damaged lines are left out, and their runs are made again: "
+            f"{listing}{ending}"
         )
         warnings.warn(message, RuntimeWarning, stacklevel=5)
 
@@ -232,42 +233,42 @@ class RunFile:
             If it gives something else, or the first five of the file fail.
         """
         allowed = "runs of this simulator; delete the file"
-        for row, kept in islice(self.runs.items(), _ASKED):
+        for row, stored in islice(self.runs.items(), _RERUNS):
             gave = again(row)
             if gave is not None:
-                same = len(gave) == len(kept) and np.allclose(gave, kept, rtol=_SAME, atol=0.0)
+                same = len(gave) == len(stored) and np.allclose(gave, stored, rtol=_SAME, atol=0.0)
                 if not same:
                     raise InvalidInput("cache", str(self.path), allowed)
                 return
         if self.runs:
-            allowed += f", if it fails now at the first {_ASKED} of them by right"
+            allowed += f", if it fails now at the first {_RERUNS} of them by right"
             raise InvalidInput("cache", str(self.path), allowed)
 
     def finish(self) -> None:
-        """Note that the study came to its end."""
+        """Note in the file that the study has ended."""
         if not self._finished:
             self._append({"finished": True})
             self._finished = True
 
     def _append(self, line: dict[str, Any]) -> None:
-        left = (json.dumps(line) + "\n").encode()
-        while left:
-            left = left[os.write(self._descriptor, left) :]
+        remaining = (json.dumps(line) + "\n").encode()
+        while remaining:
+            remaining = remaining[os.write(self._descriptor, remaining) :]
         os.fsync(self._descriptor)
 
 
 def _texts(given: Any) -> list[str]:
     """Return a list of texts, or raise `TypeError`."""
-    if not isinstance(given, list) or not all(isinstance(one, str) for one in given):
+    if not isinstance(given, list) or not all(isinstance(entry, str) for entry in given):
         raise TypeError("it has no list of texts where there should be one")
     return given
 
 
 def _numbers(given: Any) -> list[float]:
     """Return a list of finite numbers as floats, or raise one of `_DAMAGED`."""
-    if not isinstance(given, list) or not all(type(one) in (int, float) for one in given):
+    if not isinstance(given, list) or not all(type(entry) in (int, float) for entry in given):
         raise TypeError("it has no list of numbers where there should be one")
-    values = [float(one) for one in given]
+    values = [float(entry) for entry in given]
     if not values or not all(map(math.isfinite, values)):
         raise ValueError("it has no response, or one that is not finite")
     return values

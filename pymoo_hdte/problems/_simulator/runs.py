@@ -48,15 +48,15 @@ class Simulator:
         Takes the inputs by name. Returns a number, a mapping of names to numbers, or a sequence of
         numbers; with ``vectorised`` arrays of shape (n,) in their place.
     names : tuple of str
-        Of the inputs.
+        Names of the inputs.
     vectorised : bool
         Whether it takes and returns arrays of shape (n,).
     workers : Workers
-        That make the runs, unless it is vectorised.
+        Workers that make the runs, unless the function is vectorised.
     tries : int
         How often a run is made before it counts as failed.
     file : RunFile or None
-        Of finished runs.
+        File of finished runs.
     progress : tqdm
         A bar to move.
 
@@ -68,7 +68,7 @@ class Simulator:
     Attributes
     ----------
     responses : tuple of str
-        Names of what it returns; empty before the first run.
+        Names of the results; empty before the first run.
     """
 
     def __init__(
@@ -86,7 +86,7 @@ class Simulator:
         self.file, self.progress = file, progress
         self.responses = file.responses if file else ()
         self._ran = self._sized = False
-        self._last: Failure | None = None
+        self._last_failure: Failure | None = None
         self._given_up: set[tuple[float, ...]] = set()
         if file and file.goes_on:
             file.retry_within(workers.time_limit)
@@ -95,7 +95,7 @@ class Simulator:
             file.check(self.again)
 
     def again(self, row: tuple[float, ...]) -> Any:
-        """Return what a run made anew gives, whatever the file has; None if it fails."""
+        """Return the result of a new run, whatever the file has; None if it fails."""
         for _ in range(self.tries):
             ((_, gave),) = self._run([row])
             if self._good(gave):
@@ -113,26 +113,28 @@ class Simulator:
             If what it returns is no set of numbers, or another one than before.
         """
         rows = [tuple(row) for row in values.tolist()]
-        kept = self.file.runs if self.file else {}
-        found: dict[tuple[float, ...], Any] = {row: kept.get(row) for row in rows}
+        stored = self.file.runs if self.file else {}
+        results: dict[tuple[float, ...], Any] = {row: stored.get(row) for row in rows}
         for _ in range(self.tries):
             missing = [
-                row for row in found if row not in self._given_up and not self._good(found[row])
+                row for row in results if row not in self._given_up and not self._good(results[row])
             ]
             for row, gave in self._run(missing) if missing else ():
-                found[row] = gave
+                results[row] = gave
                 if self.file and self._good(gave):
                     self.file.keep(row, gave, self.responses)
         self.progress.update(len(rows))
-        self._ran = self._ran or any(self._good(found[row]) for row in rows)
-        self._give_up([row for row in found if not self._good(found[row])])
+        self._ran = self._ran or any(self._good(results[row]) for row in rows)
+        self._give_up([row for row in results if not self._good(results[row])])
         if not self._ran:
             where = ", ".join(f"{n} = {v:g}" for n, v in zip(self.names, rows[0], strict=True))
             message = f"the simulator failed in all of {len(rows)} runs, the first at {where}"
-            message += f": {self._last.text}" if self._last else ""
-            raise SimulatorFailed(message) from (self._last.error if self._last else None)
+            message += f": {self._last_failure.text}" if self._last_failure else ""
+            raise SimulatorFailed(message) from (
+                self._last_failure.error if self._last_failure else None
+            )
         bad = [np.nan] * len(self.responses)
-        table = np.array([found[row] if self._good(found[row]) else bad for row in rows])
+        table = np.array([results[row] if self._good(results[row]) else bad for row in rows])
         if not self._sized:
             self._check_sizes(table)
         return table
@@ -144,7 +146,7 @@ class Simulator:
         """
         for row in rows:
             if self.file and self._ran and row not in self.file.failures:
-                why = self._last.text if self._last else "not a number"
+                why = self._last_failure.text if self._last_failure else "not a number"
                 self.file.keep_failure(row, why)
             self._given_up.add(row)
 
@@ -181,7 +183,7 @@ class Simulator:
             for _ in rows:
                 row, gave = self.workers.next()  # type: ignore[assignment]
                 if isinstance(gave, Failure):
-                    self._last = gave
+                    self._last_failure = gave
                     # Another try would last as long again.
                     if gave.kind == TOO_LONG:
                         self._give_up([row])

@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 FEWEST = 10
 """Samples that have to lie beyond a quantile or a limit: ten have an error of a third."""
 RESOLVED = FEWEST / SAMPLES
-"""Smallest probability that the samples tell."""
+"""Smallest probability that the samples resolve."""
 STUDENT = 3.182
 """Standard errors of a mean of four parts within which it lies with 95 %: Student's t(3).
 
@@ -192,7 +192,7 @@ class FailureProbability(Statistic):
         # How far it moves if the response is off by its error, plus the error of sampling.
         shift = mean_error + std_error
         ends = [self._share(around, side * shift) for side in (-1.0, 1.0)]
-        found = self._share(around, 0.0 * shift)
+        share = self._share(around, 0.0 * shift)
         count = len(around.samples[1])
-        sampling = np.maximum(2.0 * np.sqrt(found * (1.0 - found) / count), NONE_OF / count)
-        return np.max(np.abs(np.array(ends) - found), axis=0) + sampling
+        sampling = np.maximum(2.0 * np.sqrt(share * (1.0 - share) / count), NONE_OF / count)
+        return np.max(np.abs(np.array(ends) - share), axis=0) + sampling

@@ -48,18 +48,18 @@ class Statistic:
 
     @property
     def name(self) -> str:
-        """What it is called as an objective."""
+        """Name of the statistic as an objective."""
         words = [type(self).__name__.lower(), *([self.response] if self.response else [])]
         return ("-" if self.sign < 0 else "") + "_".join(words)
 
     @property
     def has_gradient(self) -> bool:
-        """Whether it is smooth enough for a gradient in the design."""
+        """Whether the statistic is smooth enough for a gradient in the design."""
         return True
 
     @property
     def relative_to_scatter(self) -> bool:
-        """Whether its error is told as a share of the scatter."""
+        """Whether its error is reported as a share of the scatter."""
         return True
 
     def value(self, around: Around) -> tuple[Array, Array]:
@@ -93,7 +93,7 @@ class Statistic:
 
     @property
     def weights(self) -> tuple[float, float] | None:
-        """Of mean and standard deviation, dimensionless; None if it is no such sum."""
+        """Weights of mean and standard deviation, dimensionless; None if it is no such sum."""
         return None
 
     def _of(self, around: Around) -> tuple[Array, Array]:
@@ -154,7 +154,7 @@ class Mean(Statistic):
 
     @property
     def weights(self) -> tuple[float, float]:
-        """Of mean and standard deviation, dimensionless."""
+        """Weights of mean and standard deviation, dimensionless."""
         return 1.0, 0.0
 
 
@@ -182,7 +182,7 @@ class Std(Statistic):
 
     @property
     def weights(self) -> tuple[float, float]:
-        """Of mean and standard deviation, dimensionless."""
+        """Weights of mean and standard deviation, dimensionless."""
         return 0.0, 1.0
 
     def _error(self, mean_error: Array, std_error: Array, around: Around) -> Array:
@@ -219,12 +219,12 @@ class MeanPlusStd(Statistic):
         object.__setattr__(self, "k", real_number("k", self.k))
 
     def _of(self, around: Around) -> tuple[Array, Array]:
-        parts = [one.value(around) for one in (Mean(), Std())]
+        parts = [moment.value(around) for moment in (Mean(), Std())]
         return parts[0][0] + self.k * parts[1][0], parts[0][1] + self.k * parts[1][1]
 
     @property
     def weights(self) -> tuple[float, float]:
-        """Of mean and standard deviation, dimensionless."""
+        """Weights of mean and standard deviation, dimensionless."""
         return 1.0, self.k
 
     def _error(self, mean_error: Array, std_error: Array, around: Around) -> Array:
@@ -242,7 +242,7 @@ class WorstCase(Statistic):
     Parameters
     ----------
     side : {"largest", "smallest"}
-        Which value is worst.
+        The value that is the worst.
     response : str or None
         Name of the response; None for the only one.
     sign : float

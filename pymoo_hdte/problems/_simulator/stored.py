@@ -30,8 +30,8 @@ from pymoo_hdte.surrogate._sparse.polynomial import SparsePolynomial
 Array = NDArray[np.float64]
 
 STATISTICS: dict[str, type[Statistic]] = {
-    one.__name__: one
-    for one in (Mean, Std, MeanPlusStd, WorstCase, Quantile, CVaR, FailureProbability)
+    kind.__name__: kind
+    for kind in (Mean, Std, MeanPlusStd, WorstCase, Quantile, CVaR, FailureProbability)
 }
 HIGHEST_DEGREE = 100
 """Largest degree that is read from a file; surrogates have 60 at most."""
@@ -66,16 +66,20 @@ def write_problem(
         If the file cannot be written.
     """
     header = {
-        "designs": {name: _design(name, one) for name, one in inputs.designs.items()},
+        "designs": {name: _design(name, design) for name, design in inputs.designs.items()},
         "noise": [
             [list(key) if isinstance(key, tuple) else key, described(f"noise[{key!r}]", given)]
             for key, given in inputs.noise.items()
         ],
         "responses": list(responses),
-        "objectives": [_statistic(one) for one in objectives],
+        "objectives": [_statistic(statistic) for statistic in objectives],
         "constraints": [
-            {"statistic": _statistic(one.statistic), "bound": one.bound, "side": one.side}
-            for one in constraints
+            {
+                "statistic": _statistic(constraint.statistic),
+                "bound": constraint.bound,
+                "side": constraint.side,
+            }
+            for constraint in constraints
         ],
         "n_runs": n_runs,
         "tails": _with_tails(fit),
@@ -104,8 +108,8 @@ def read_problem(
     # The parts check themselves; whatever else is wrong with a part is said as it comes.
     try:
         inputs = Inputs(_designs(header["designs"]), _noise(header["noise"]))
-        objectives = [_read_statistic(one) for one in header["objectives"]]
-        constraints = [_read_constraint(one) for one in header["constraints"]]
+        objectives = [_read_statistic(entry) for entry in header["objectives"]]
+        constraints = [_read_constraint(entry) for entry in header["constraints"]]
         if not objectives:
             raise ValueError("objectives are missing")
         responses = _responses(header["responses"])
@@ -120,7 +124,7 @@ def read_problem(
 
 
 def _design(name: str, design: Design) -> dict[str, Any]:
-    table: dict[str, Any] = {one.name: getattr(design, one.name) for one in fields(design)}
+    table: dict[str, Any] = {field.name: getattr(design, field.name) for field in fields(design)}
     for word in ("tolerance", "deviation"):
         if hasattr(table[word], "pdf"):
             table[word] = described(f"{word} of {name!r}", table[word])
@@ -141,7 +145,7 @@ def _designs(tables: dict[str, Any]) -> dict[str, Design]:
 
 def _check_fields(owner: str, table: Mapping[str, Any], kind: type[Design | Statistic]) -> None:
     """Refuse a table without some field: its default would make another problem."""
-    wanted = sorted(one.name for one in fields(kind))
+    wanted = sorted(field.name for field in fields(kind))
     if sorted(table) != wanted:
         raise InvalidInput(f"fields of {owner}", sorted(table), f"just {wanted}")
 
@@ -165,7 +169,9 @@ def _statistic(statistic: Statistic) -> dict[str, Any]:
     kind = type(statistic).__name__
     if STATISTICS.get(kind) is not type(statistic):
         raise InvalidInput("statistic", statistic, f"one of {', '.join(STATISTICS)}")
-    return {"kind": kind} | {one.name: getattr(statistic, one.name) for one in fields(statistic)}
+    return {"kind": kind} | {
+        field.name: getattr(statistic, field.name) for field in fields(statistic)
+    }
 
 
 def _read_statistic(table: Mapping[str, Any]) -> Statistic:
@@ -195,7 +201,7 @@ def _with_tails(fit: AdaptiveFit) -> list[bool]:
     """Return of which inputs the moments take the scatter beyond all runs into account."""
     whole = SparseMoments(fit.polynomial, fit.moments.axes)
     pairs = zip(whole.orthonormal, fit.moments.orthonormal, strict=True)
-    return [np.array_equal(one.nodes, other.nodes) for one, other in pairs]
+    return [np.array_equal(basis.nodes, fitted.nodes) for basis, fitted in pairs]
 
 
 def _check_indices(indices: Array) -> None:
@@ -224,11 +230,11 @@ def _read_fit(
         "held_out_error": (held_out, responses),
     }
     for name, shape in shapes.items():
-        found = arrays[name].shape
-        if len(found) != len(shape) or any(
-            one not in (None, other) for one, other in zip(shape, found, strict=True)
+        actual_shape = arrays[name].shape
+        if len(actual_shape) != len(shape) or any(
+            wanted not in (None, actual) for wanted, actual in zip(shape, actual_shape, strict=True)
         ):
-            raise InvalidInput(f"shape of {name}", found, str(shape))
+            raise InvalidInput(f"shape of {name}", actual_shape, str(shape))
     _check_indices(indices)
     for name in ("coefficients", *_OF_RESPONSES):
         if not np.all(np.isfinite(arrays[name])):
@@ -236,11 +242,11 @@ def _read_fit(
     for name in _OF_RESPONSES:
         if np.any(arrays[name] < 0.0):
             raise InvalidInput(f"{name} of the file", arrays[name].tolist(), "at least 0")
-    if not isinstance(tails, list) or [type(one) for one in tails] != [bool] * len(axes):
+    if not isinstance(tails, list) or [type(flag) for flag in tails] != [bool] * len(axes):
         raise InvalidInput("tails", tails, f"{len(axes)} times true or false")
     polynomial = SparsePolynomial(indices.astype(int), coefficients)
     pairs = zip(axes, tails, strict=True)
-    measures = [axis.measure if one else axis.cut for axis, one in pairs]
+    measures = [axis.measure if has_tail else axis.cut for axis, has_tail in pairs]
     others: dict[str, Any] = {name: np.array(arrays[name]) for name in FORMAT.arrays[2:]}
     moments = SparseMoments(polynomial, axes, measures)
     return AdaptiveFit(polynomial=polynomial, moments=moments, n_runs=n_runs, **others)

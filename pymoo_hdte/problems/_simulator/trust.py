@@ -20,7 +20,7 @@ MOST_FAILED = 0.2
 _LIKE_THE_WORST = 0.3
 """Share of the largest error above which a point belongs to the region of the error."""
 _OF_ACCURACY = 0.1
-"""Share of the accuracy asked for up to which runs may differ, by rounding or iteration."""
+"""Share of the requested accuracy up to which runs may differ, by rounding or iteration."""
 _REPEATED = 3
 """Runs at one point. Two of a random simulator may agree by chance, three hardly."""
 _LOOKED_AT = 1024
@@ -52,7 +52,7 @@ def inaccurate(
     responses: tuple[str, ...],
     places: Sequence[int],
 ) -> Refusal | None:
-    """Return why and where the surrogate of some responses is less accurate than asked for."""
+    """Return why and where the surrogate of some responses is less accurate than requested."""
     error, which, place = largest_error(fit, places)
     if error <= accuracy:
         return None

@@ -32,7 +32,7 @@ class Workers:
     Parameters
     ----------
     executor : int, object or None
-        Of `concurrent.futures`, or a client of Dask; a number of processes of our own, each ended
+        Executor of `concurrent.futures`, client of Dask, or a number of own processes, each ended
         and replaced alone; None for this process, one call after the other.
     time_limit : float, optional
         Seconds after which a call is ended, imports not counted. Calls then run in a process beside
@@ -96,13 +96,13 @@ class Workers:
         # Dask would return the stored result of a call that is made again.
         options = {"pure": False} if _is_dask(self._executor) else {}
         if not isinstance(call, bytes):
-            asked = call
+            task = call
         else:
-            asked = (call_in_child, call, self.time_limit)
+            task = (call_in_child, call, self.time_limit)
             if self._own:
-                asked = (self._children.call, call, self.time_limit, self._children.round)
+                task = (self._children.call, call, self.time_limit, self._children.round)
         try:
-            future = self._executor.submit(*asked, **options)
+            future = self._executor.submit(*task, **options)
         except BrokenExecutor:
             self._replace()
             self._submit(key, call if isinstance(call, bytes) else parcel(*call))
@@ -153,8 +153,8 @@ class Workers:
         words = f"a pool of workers broke; its evaluations go on in {number} processes of our own"
         warnings.warn(words, RuntimeWarning, stacklevel=3)
         self._start_own(number)
-        left, self._waiting = self._waiting, {}
-        for future, (key, call) in left.items():
+        waiting, self._waiting = self._waiting, {}
+        for future, (key, call) in waiting.items():
             # What came back before the pool broke is in the queue.
             if future.done() and not future.cancelled() and future.exception() is None:
                 self._waiting[future] = key, call
@@ -164,10 +164,10 @@ class Workers:
     def cancel(self) -> None:
         """Forget all calls under way, and end those that run in processes of our own."""
         self._here.clear()
-        left, self._waiting = self._waiting, {}
-        for future in left:
+        waiting, self._waiting = self._waiting, {}
+        for future in waiting:
             future.cancel()
-        if self._own and left:
+        if self._own and waiting:
             self._children.end()
 
     def close(self) -> None:

@@ -51,7 +51,7 @@ JUDGED_DRAWS = 128
 DEGREES = (6, 40)
 """Least and largest degree in one variable; between them a third of the runs."""
 LARGEST_ACCURACY = 0.01
-"""Accuracy asked for above which no more terms are left out."""
+"""Requested accuracy above which no more terms are left out."""
 SMALLEST_SCATTER = 0.1
 """Scatter below this share of its median over the designs is judged as if it were that; by hand."""
 SCATTER_OF_RANGE = 1e-4
@@ -60,20 +60,20 @@ SCATTER_OF_RANGE = 1e-4
 
 @dataclass(frozen=True)
 class AdaptiveFit:
-    """What growth ended with.
+    """The surrogate with which its building ended.
 
     Attributes
     ----------
     polynomial : SparsePolynomial
-        In -1..1 of every axis, r responses in their units.
+        Polynomial in -1..1 of every axis, of r responses in their units.
     moments : SparseMoments
-        Of it.
+        Moments of the polynomial.
     mean_error, std_error : ndarray, shape (r,)
         Estimated errors of mean and standard deviation as shares of the scatter.
     n_runs : int
         Calls of the function.
     smallest_scatter : ndarray, shape (r,)
-        What a smaller scatter is judged as, in the responses' units.
+        A smaller scatter is judged as this, in the responses' units.
     failed : ndarray, shape (k, d)
         Points in -1..1 at which the function failed.
     held_out_points : ndarray, shape (v, d)
@@ -81,7 +81,7 @@ class AdaptiveFit:
     held_out_error : ndarray, shape (v, r)
         Each of them minus what the others predict, as a share of the scatter.
     confirmed : bool
-        Whether as many judgements as are asked for have passed before the budget was spent.
+        Whether the required judgements passed before the budget was spent.
     """
 
     polynomial: SparsePolynomial
@@ -97,17 +97,17 @@ class AdaptiveFit:
 
     @property
     def errors(self) -> Array:
-        """Those of the mean above those of the standard deviation, shape (2, r)."""
+        """Errors of the mean above those of the standard deviation, shape (2, r)."""
         return np.array([self.mean_error, self.std_error])
 
     @property
     def largest_error(self) -> float:
-        """Of mean and standard deviation of all responses, as a share of the scatter."""
+        """Largest error of mean and deviation of all responses, as a share of the scatter."""
         return float(self.errors.max())
 
 
-class _Growth:
-    """The runs so far."""
+class _SurrogateBuild:
+    """The runs of the function so far, and the fit to them."""
 
     def __init__(
         self,
@@ -151,7 +151,7 @@ class _Growth:
             fitted(features, values, weights, judged, self.lost, start)
             for values, start in zip(truth.T, starts, strict=True)
         ]
-        self.parameters = [one.regression.parameters for one in fits]
+        self.parameters = [fit.regression.parameters for fit in fits]
         polynomial = _joined(fits, polynomials)
         # Where there are no runs the polynomial runs away: its error would hide behind a scatter
         # that is not there.
@@ -163,10 +163,10 @@ class _Growth:
         )
         least = np.where(least > 0.0, least, np.finfo(float).tiny ** 0.25)
         self.scale = np.maximum(judged_std, least)
-        errors = [one.errors(judged, size) for one, size in zip(fits, least.tolist(), strict=True)]
+        errors = [fit.errors(judged, size) for fit, size in zip(fits, least.tolist(), strict=True)]
         of_mean, of_std = np.sqrt(np.mean(np.square(errors), axis=2)).T
         _, std = moments(nearest_designs(self.axes, points))
-        left_out = np.column_stack([one.left_out for one in fits])
+        left_out = np.column_stack([fit.left_out for fit in fits])
         return AdaptiveFit(
             polynomial,
             moments,
@@ -195,11 +195,11 @@ class _Growth:
 
 def _joined(fits: list[ResponseFit], polynomials: EvenPolynomials) -> SparsePolynomial:
     """Return all responses on the union of their terms."""
-    indices = closed(np.concatenate([one.indices for one in fits]))
+    indices = closed(np.concatenate([fit.indices for fit in fits]))
     places = {tuple(row): place for place, row in enumerate(indices.tolist())}
     coefficients = np.zeros((len(fits), len(indices)))
-    for row, one in zip(coefficients, fits, strict=True):
-        row[[places[tuple(index)] for index in one.indices.tolist()]] = one.coefficients
+    for row, fit in zip(coefficients, fits, strict=True):
+        row[[places[tuple(index)] for index in fit.indices.tolist()]] = fit.coefficients
     matrices = [polynomials.to_chebyshev()] * indices.shape[1]
     return SparsePolynomial.from_triangular(indices, coefficients, matrices)
 
@@ -232,29 +232,29 @@ def fit_adaptively(
     at_once : int
         Least number of runs to add together.
     error_of : callable
-        What is to be as small as asked for, of a fit; by default the errors of all responses.
+        Error of a fit that must be as small as requested; by default the largest of all responses.
 
     Returns
     -------
     AdaptiveFit
-        Of the accuracy asked for unless the budget is spent.
+        A surrogate of the requested accuracy unless the budget is spent.
     """
-    growth = _Growth(axes, function, accuracy, random_state)
-    growth.run(min(first_runs(len(axes)), budget))
+    build = _SurrogateBuild(axes, function, accuracy, random_state)
+    build.run(min(first_runs(len(axes)), budget))
     passed, goal = 0, min(accuracy, LOOSEST)
     while True:
-        fit = growth.judge()
+        fit = build.judge()
         inside = error_of(fit)
         if inside <= accuracy:
-            fit = growth.with_tails(fit, inside)
+            fit = build.with_tails(fit, inside)
         good = error_of(fit) <= accuracy and acceptable(fit)
         passed = passed + 1 if good and inside <= goal else 0
-        if passed >= IN_A_ROW and growth.n_runs >= least_runs(len(axes)):
+        if passed >= IN_A_ROW and build.n_runs >= least_runs(len(axes)):
             return fit
-        count = min(max(at_once, int(BATCH * growth.n_runs)), budget - growth.n_runs)
+        count = min(max(at_once, int(BATCH * build.n_runs)), budget - build.n_runs)
         if count <= 0:
             return replace(fit, confirmed=False)
-        growth.run(count)
+        build.run(count)
 
 
 def first_runs(inputs: int) -> int:

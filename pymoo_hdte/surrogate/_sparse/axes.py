@@ -37,7 +37,7 @@ class Scatter:
     Parameters
     ----------
     distribution : Distribution
-        Of the variable.
+        Distribution of the variable.
     measure : Measure
         The same as weighted nodes.
 
@@ -68,9 +68,12 @@ class Scatter:
         """Whether a tail is longer than `LONGEST_TAIL`."""
         p = np.array([1e-9, 1e-3, 0.5, 1.0 - 1e-3, 1.0 - 1e-9])
         far_low, low, middle, high, far_high = self.distribution.quantile(p)
-        far = max(middle - far_low, 0.0), max(far_high - middle, 0.0)
-        near = middle - low, high - middle
-        return any(one > LONGEST_TAIL * other for one, other in zip(far, near, strict=True))
+        outer_spans = max(middle - far_low, 0.0), max(far_high - middle, 0.0)
+        inner_spans = middle - low, high - middle
+        return any(
+            outer > LONGEST_TAIL * inner
+            for outer, inner in zip(outer_spans, inner_spans, strict=True)
+        )
 
 
 def standard_normal() -> Scatter:
@@ -85,9 +88,9 @@ class Axis:
     Parameters
     ----------
     name : str
-        Of the variable.
+        Name of the variable.
     scatter : Scatter or None
-        Of the deviation of a designed variable, None for one without, or of a noise variable.
+        Scatter of the deviation of a designed variable, or of a noise variable; None for none.
     design : tuple of float or None
         Lower and upper bound of a designed variable in its unit, None for noise.
     relative : bool
@@ -101,7 +104,7 @@ class Axis:
     Attributes
     ----------
     measure, cut, ended : Measure
-        Of s, a single node where nothing scatters: the whole, and those of `Scatter`.
+        Measures of s: the whole, and those of `Scatter`; a single node where nothing scatters.
     """
 
     def __init__(
@@ -120,7 +123,7 @@ class Axis:
         fixed = Measure(np.zeros(1), np.ones(1))
         measures = [scatter.measure, scatter.cut, scatter.ended] if scatter else [fixed] * 3
         if logarithmic:
-            measures = [Measure(np.log1p(one.nodes), one.weights) for one in measures]
+            measures = [Measure(np.log1p(measure.nodes), measure.weights) for measure in measures]
         self.measure, self.cut, self.ended = measures
         low, high = self._ends()
         self.centre, self.half_width = 0.5 * (low + high), 0.5 * (high - low)
@@ -159,8 +162,8 @@ class Axis:
         if self.design is None or designs is None:
             zero = np.zeros(1)
             return zero - self.centre / self.half_width, zero + 1.0 / self.half_width, zero, zero
-        zero, one = np.zeros_like(designs), np.ones_like(designs)
-        offset, slope = self.cube(designs), one / self.half_width
+        zero, ones = np.zeros_like(designs), np.ones_like(designs)
+        offset, slope = self.cube(designs), ones / self.half_width
         if self.logarithmic:
             return offset, slope, slope / designs, zero
         if self.relative:
@@ -170,7 +173,7 @@ class Axis:
     def sample(self, p: Array) -> Array:
         """Return values of s below which these shares of its probability lie, same shape.
 
-        Those beyond the interval for nodes are moved to its ends.
+        Values beyond the interval for nodes are moved to its ends.
         """
         if self.scatter is None:
             return np.zeros_like(p)

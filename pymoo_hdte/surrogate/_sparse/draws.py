@@ -40,7 +40,7 @@ class SpreadPoints:
     ----------
     axes : list of Axis, length d
     random_state : numpy.random.Generator
-        Of the scrambling.
+        Generator of the scrambling.
     """
 
     def __init__(self, axes: list[Axis], random_state: np.random.Generator) -> None:
@@ -54,31 +54,33 @@ class SpreadPoints:
             warnings.simplefilter("ignore", UserWarning)
             p = self._sequence.random(count)
         columns = [
-            np.interp(one, share, _GRID) for one, share in zip(p.T, self._shares, strict=True)
+            np.interp(column, share, _GRID) for column, share in zip(p.T, self._shares, strict=True)
         ]
         return np.column_stack(columns)
 
 
 def relevance(axes: list[Axis], points: Array) -> Array:
-    """Return how much oftener than the runs are spread the scatter gives points, shape (n,).
+    """Return the density of the scatter at points over that of the runs, shape (n,).
 
     Parameters
     ----------
     axes : list of Axis, length d
     points : ndarray, shape (n, d)
-        In -1..1.
+        Points in -1..1.
     """
-    found = np.prod(np.maximum(1.0 - points**2, 0.0), axis=1) ** OUTWARD
+    ratio = np.prod(np.maximum(1.0 - points**2, 0.0), axis=1) ** OUTWARD
     for axis, z in zip(axes, points.T, strict=True):
         density = _density(axis, z)
         if density is not None:
-            found *= (density * axis.half_width) ** (1.0 - _power(axes, axis))
-    return found / max(float(found.mean()), np.finfo(float).tiny)
+            ratio *= (density * axis.half_width) ** (1.0 - _power(axes, axis))
+    return ratio / max(float(ratio.mean()), np.finfo(float).tiny)
 
 
 def _power(axes: list[Axis], axis: Axis) -> float:
     """Return the power of a noise's density by which runs are spread."""
-    return 1.0 - (TEMPERED / sum(one.is_unbounded for one in axes) if axis.is_unbounded else 0.5)
+    return 1.0 - (
+        TEMPERED / sum(noise.is_unbounded for noise in axes) if axis.is_unbounded else 0.5
+    )
 
 
 def _density(axis: Axis, z: Array) -> Array | None:
@@ -117,9 +119,9 @@ def draw_around(
     Returns
     -------
     points : ndarray, shape (v, count, d)
-        In -1..1.
+        Points in -1..1.
     weights : ndarray, shape (v, count)
-        They sum to 1 at each design.
+        Weights, which sum to 1 at each design.
     """
     shape = len(designs), count
     p = scipy.stats.qmc.LatinHypercube(len(axes), rng=random_state).random(shape[0] * count)
@@ -145,9 +147,9 @@ def _rare_oftener(axis: Axis, p: Array, power: float) -> tuple[Array, Array]:
     density = np.maximum(axis.scatter.distribution.density(values), 0.0)
     tempered = np.where(np.isfinite(density), density, 0.0) ** power
     below = np.append(0.0, np.cumsum(tempered[1:] + tempered[:-1]))
-    found = np.interp(p, below / below[-1], values)
-    weight = np.interp(found, values, tempered) ** (1.0 / power - 1.0)
-    return np.log1p(found) if axis.logarithmic else found, weight
+    drawn = np.interp(p, below / below[-1], values)
+    weight = np.interp(drawn, values, tempered) ** (1.0 / power - 1.0)
+    return np.log1p(drawn) if axis.logarithmic else drawn, weight
 
 
 def nearest_designs(axes: list[Axis], points: Array) -> Array:

@@ -39,10 +39,10 @@ class AxisMap:
         fibre = fibre.reshape(-1)
         self._source = np.full((fibre.max() + 1, columns), count)
         self._source[fibre, indices[:, axis]] = np.arange(count)
-        kept = np.flatnonzero(indices[:, axis] < rows)
-        self.result = indices[kept]
-        self._target = np.full((fibre.max() + 1, min(rows, columns)), len(kept))
-        self._target[fibre[kept], indices[kept, axis]] = np.arange(len(kept))
+        inside = np.flatnonzero(indices[:, axis] < rows)
+        self.result = indices[inside]
+        self._target = np.full((fibre.max() + 1, min(rows, columns)), len(inside))
+        self._target[fibre[inside], indices[inside, axis]] = np.arange(len(inside))
 
     @property
     def columns(self) -> int:
@@ -71,16 +71,16 @@ class AxisMap:
 
         Target and source among the coefficients, row and column in the matrix.
         """
-        found = []
+        blocks = []
         for source, target in zip(self._source, self._target, strict=True):
             inside = np.flatnonzero(source < self._count)
             for row in np.flatnonzero(target < len(self.result)).tolist():
                 above = inside[inside >= row]
                 rows = np.full(len(above), row)
-                found.append(
+                blocks.append(
                     np.column_stack([np.full(len(above), target[row]), source[above], rows, above])
                 )
-        together = np.concatenate(found)
+        together = np.concatenate(blocks)
         return together[np.argsort(together[:, 0], kind="stable")]
 
     def backward(self, weights: Array, matrix: Array, count: int) -> Array:

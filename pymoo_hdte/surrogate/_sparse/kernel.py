@@ -18,7 +18,8 @@ from pymoo_hdte.surrogate._sparse.measures import Measure, OrthonormalPolynomial
 Array = NDArray[np.float64]
 
 PARAMETERS = 3
-"""Of an axis: the logarithm of s, and the logits of q and of the share of even degrees."""
+"""Number of parameters of an axis: the logarithm of s, and the logits of q and of the share of
+even degrees."""
 START = (np.log(0.1), 0.0, 0.0)
 """Where parameters start, and the middle of what they are expected to be."""
 EXPECTED = (4.0, 2.0, 2.0)
@@ -84,18 +85,18 @@ def variances(parameters: Array, degree: int) -> tuple[Array, Array]:
 
 def factors(features: list[Array], others: list[Array], variance: Array) -> list[Array]:
     """Return the covariance's factor of every axis between two sets of points, (n, m) each."""
-    found = []
-    for one, other, of_axis in zip(features, others, variance, strict=True):
-        factor = 1.0 + (one.T * of_axis) @ other
+    per_axis = []
+    for rows, columns, of_axis in zip(features, others, variance, strict=True):
+        factor = 1.0 + (rows.T * of_axis) @ columns
         small = np.abs(factor) < _LEAST
         factor[small] = _LEAST
-        found.append(factor)
-    return found
+        per_axis.append(factor)
+    return per_axis
 
 
 def covariance(features: list[Array], others: list[Array], variance: Array) -> Array:
     """Return the covariance between two sets of points, shape (n, m)."""
-    product, *rest = factors(features, others, variance)
-    for factor in rest:
+    product, *remaining = factors(features, others, variance)
+    for factor in remaining:
         product *= factor
     return product

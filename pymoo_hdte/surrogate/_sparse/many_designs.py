@@ -26,11 +26,11 @@ class ManyDesigns:
     Parameters
     ----------
     coefficients : ndarray, shape (r, p)
-        Before the first step.
+        Coefficients before the first step.
     steps : list of AxisMap, length m
-        Of the designed axes, in their order.
+        Steps of the designed axes, in their order.
     families : list of OrthonormalPolynomials, length m
-        Of their scatter.
+        Orthonormal polynomials under their scatter.
     """
 
     def __init__(
@@ -47,14 +47,14 @@ class ManyDesigns:
             self._rules[j, : rows[j], : rows[j]] = family(family.nodes) * family.weights
         pairs = [step.pairs() for step in steps]
         self._pairs = np.concatenate(pairs, axis=0)
-        self._ends = np.append(0, np.cumsum([len(one) for one in pairs]))
+        self._ends = np.append(0, np.cumsum([len(step_pairs) for step_pairs in pairs]))
         self._sizes = np.array([coefficients.shape[1], *(len(step.result) for step in steps)])
-        last = steps[-1].result
-        self._mean_place = int(np.flatnonzero((last == 0).all(axis=1))[0])
+        final_indices = steps[-1].result
+        self._mean_place = int(np.flatnonzero((final_indices == 0).all(axis=1))[0])
 
     def __call__(self, offsets: Array, factors: Array) -> tuple[Array, Array]:
         """Return mean and deviation, shape (n, r) each, from A and B of every axis, (m, n)."""
-        found = np.empty((2, offsets.shape[1], len(self._coefficients)))
+        moments = np.empty((2, offsets.shape[1], len(self._coefficients)))
         # Room for a block, made here: what makes it in machine code takes a second to compile.
         columns, terms = self._columns.max(), self._sizes.max()
         work = (
@@ -69,9 +69,9 @@ class ManyDesigns:
             (self._pairs, self._ends, self._sizes, self._mean_place),
             self._coefficients,
             work,
-            found,
+            moments,
         )
-        return found[0], found[1]
+        return moments[0], moments[1]
 
 
 @compiled
@@ -99,7 +99,7 @@ def _matrices(places, families, start, count, matrix, basis):  # type: ignore[no
 
 
 @compiled
-def _moments(places, families, steps, coefficients, work, found):  # type: ignore[no-untyped-def]
+def _moments(places, families, steps, coefficients, work, moments):  # type: ignore[no-untyped-def]
     pairs, ends, sizes, mean_place = steps
     matrix, basis, old, new = work
     n = places[0].shape[1]
@@ -121,11 +121,11 @@ def _moments(places, families, steps, coefficients, work, found):  # type: ignor
                         new[target, b] += matrix[j, row, column, b] * old[source, b]
                 old, new = new, old
             for b in range(count):
-                found[0, start + b, response] = old[mean_place, b]
-                found[1, start + b, response] = 0.0
+                moments[0, start + b, response] = old[mean_place, b]
+                moments[1, start + b, response] = 0.0
             for p in range(sizes[-1]):
                 if p != mean_place:
                     for b in range(count):
-                        found[1, start + b, response] += old[p, b] ** 2
+                        moments[1, start + b, response] += old[p, b] ** 2
             for b in range(count):
-                found[1, start + b, response] = np.sqrt(found[1, start + b, response])
+                moments[1, start + b, response] = np.sqrt(moments[1, start + b, response])

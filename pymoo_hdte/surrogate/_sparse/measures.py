@@ -28,7 +28,7 @@ _PANEL_ERROR = 1e-13
 _CONTRADICTION = 1e-4
 """Largest difference from 1 of what the density integrates to; Trunc of chaospy has 2e-6."""
 _SHORTEST_PANEL = 1e-11
-"""As a share of the support; nearer to an end of it nodes would be rounded onto the end."""
+"""Shortest panel as a share of the support: nodes of a shorter one would be rounded onto an end."""
 _NO_VARIANCE = 0.499
 """Exponent of the quantiles of a tail above which it has no variance: 1/2, less rounding."""
 _SHORTENS = 0.95
@@ -42,7 +42,7 @@ class Distribution:
     Parameters
     ----------
     field : str
-        What to call it in an error.
+        Name of the distribution in an error.
     given : object
         A distribution of `chaospy`, a frozen one of `scipy.stats`, or a `TruncatedNormal`.
 
@@ -94,8 +94,8 @@ class Distribution:
         """
         p = np.array([1e-6, 1e-9, 1e-12])
         middle = self.quantile(0.5)
-        for far in (middle - self.quantile(p), self.quantile(1.0 - p) - middle):
-            early, late = np.diff(np.log(np.maximum(far, 1e-300))) / np.log(1e3)
+        for distances in (middle - self.quantile(p), self.quantile(1.0 - p) - middle):
+            early, late = np.diff(np.log(np.maximum(distances, 1e-300))) / np.log(1e3)
             if late > _NO_VARIANCE and late > _SHORTENS * early:
                 return True
         return False
@@ -146,18 +146,18 @@ class Measure:
         edges = np.unique([distribution.lower, *inner, distribution.upper])
         panels = list(pairwise(edges.tolist()))
         shortest = _SHORTEST_PANEL * (distribution.upper - distribution.lower)
-        kept = []
+        rules = []
         while panels:
             low, high = panels.pop()
             middle = 0.5 * (low + high)
             whole = _panel(distribution, low, high)
             halves = _panel(distribution, low, middle), _panel(distribution, middle, high)
-            first, *others = (float(one[1].sum()) for one in (whole, *halves))
-            if abs(first - sum(others)) < _PANEL_ERROR or high - low < shortest:
-                kept.append(whole)
+            total, *others = (float(panel[1].sum()) for panel in (whole, *halves))
+            if abs(total - sum(others)) < _PANEL_ERROR or high - low < shortest:
+                rules.append(whole)
             else:
                 panels += [(low, middle), (middle, high)]
-        nodes, weights = np.concatenate(kept, axis=1)
+        nodes, weights = np.concatenate(rules, axis=1)
         if not abs(weights.sum() - 1.0) < _CONTRADICTION:
             raise InvalidInput(f"integral of the density of {field}", float(weights.sum()), "1")
         order = np.argsort(nodes)
@@ -176,8 +176,8 @@ class Measure:
     def inside(self, lower: float, upper: float) -> tuple[Measure, Measure]:
         """Return what lies in an interval, and the whole with all beyond moved to the ends."""
         below, above = self.nodes < lower, self.nodes > upper
-        kept = ~(below | above)
-        nodes, weights = self.nodes[kept], self.weights[kept]
+        within = ~(below | above)
+        nodes, weights = self.nodes[within], self.weights[within]
         beyond = [self.weights[below].sum()], [self.weights[above].sum()]
         ended = np.concatenate([[lower], nodes, [upper]])
         cut = Measure(nodes, weights / weights.sum())

@@ -23,7 +23,7 @@ from pymoo_hdte.surrogate._sparse.measures import Measure, OrthonormalPolynomial
 from pymoo_hdte.surrogate._sparse.polynomial import SparsePolynomial
 from pymoo_hdte.surrogate.moments import divide_or_zero
 from pymoo_hdte.surrogate.tensor import chebyshev_basis
-from pymoo_hdte.surrogate.threads import MANY, in_blocks
+from pymoo_hdte.surrogate.threads import ENOUGH_FOR_THREADS, in_blocks
 
 Array = NDArray[np.float64]
 
@@ -37,18 +37,18 @@ class SparseMoments:
     Parameters
     ----------
     polynomial : SparsePolynomial
-        Of d variables.
+        Polynomial in d variables.
     axes : sequence of Axis, length d
         Their coordinates and scatter; m of them, one or more, have designs.
     measures : list of Measure, length d, optional
-        Of the scatter, in the place of the whole of each axis.
+        Measures of the scatter, in place of the whole measure of each axis.
 
     Attributes
     ----------
     indices : ndarray of int, shape (q, d)
         Degrees of the expansion's terms in the scatter of each variable; the first is 0.
     orthonormal : list of OrthonormalPolynomials, length d
-        Of the scatter of each variable.
+        Orthonormal polynomials under the scatter of each variable.
     """
 
     def __init__(
@@ -74,8 +74,8 @@ class SparseMoments:
             step = AxisMap(indices, j, self.orthonormal[j].size)
             self._steps.append(step)
             indices = step.result
-        first = np.lexsort(indices.T[::-1])
-        self._order, self.indices = first, indices[first]
+        order = np.lexsort(indices.T[::-1])
+        self._order, self.indices = order, indices[order]
         largest = max(step.size for step in self._steps)
         self._at_once = max(1, _AT_ONCE // (largest * coefficients.shape[1]))
 
@@ -86,13 +86,13 @@ class SparseMoments:
 
     def __call__(self, designs: Array) -> tuple[Array, Array]:
         """Return mean and standard deviation, shape (n, r) each, in the responses' units."""
-        if COMPILES and len(designs) >= MANY:
+        if COMPILES and len(designs) >= ENOUGH_FOR_THREADS:
             return self._many_moments(designs)
         expansion = self.expansion(designs)
         return expansion[..., 0], deviation(expansion)
 
     def _many_moments(self, designs: Array) -> tuple[Array, Array]:
-        moments = self._many
+        moments = self._many_designs
         mean, std = np.empty((2, len(designs), self._coefficients.shape[1]))
 
         def fill(block: slice) -> None:
@@ -103,11 +103,11 @@ class SparseMoments:
             offsets, factors = np.moveaxis(np.array(around), 1, 0)
             mean[block], std[block] = moments(offsets, factors)
 
-        in_blocks(fill, len(designs), MANY)
+        in_blocks(fill, len(designs), ENOUGH_FOR_THREADS)
         return mean, std
 
     @cached_property
-    def _many(self) -> ManyDesigns:
+    def _many_designs(self) -> ManyDesigns:
         families = [self.orthonormal[j] for j in self.designed]
         return ManyDesigns(self._coefficients[0], self._steps, families)
 
@@ -168,7 +168,7 @@ class SparseMoments:
     def _matrices(self, j: int, columns: int, designs: Array | None) -> tuple[Array, Array]:
         """Return what changes T_k(A + B s) into the orthonormal p_l(s), and its slope.
 
-        Both of shape (n, rows, columns), n = 1 for noise.
+        Both have shape (n, rows, columns), with n = 1 for noise.
         """
         axis, family = self.axes[j], self.orthonormal[j]
         offset, factor, d_offset, d_factor = axis.around(designs)

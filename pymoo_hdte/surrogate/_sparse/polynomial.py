@@ -22,7 +22,7 @@ class SparsePolynomial:
     indices : ndarray of int, shape (p, d)
         Degrees of the terms.
     coefficients : ndarray, shape (r, p)
-        Of r responses, in their units.
+        Coefficients of r responses, in their units.
     """
 
     def __init__(self, indices: NDArray[np.int_], coefficients: NDArray[np.float64]) -> None:
@@ -46,7 +46,7 @@ class SparsePolynomial:
             A downward-closed set.
         coefficients : ndarray, shape (r, p)
         matrices : list of ndarray
-            Of every variable: column j holds the polynomial of degree j in T_0, T_1, ..
+            For every variable, column j holds the polynomial of degree j in T_0, T_1, ..
         """
         changed = coefficients[None]
         for axis, matrix in enumerate(matrices):
@@ -71,17 +71,17 @@ class SparsePolynomial:
 
     @cached_property
     def _factors(self) -> list[tuple[NDArray[np.int_], ...]]:
-        """By axis: terms that it is the last variable of, the same without it, and its degrees."""
+        """For each axis: terms whose last variable it is, the same without it, and its degrees."""
         places = {tuple(row): place for place, row in enumerate(self.indices.tolist())}
-        last = np.max(np.where(self.indices > 0, np.arange(self.indices.shape[1]), -1), axis=1)
-        found: list[tuple[NDArray[np.int_], ...]] = []
+        last_axis = np.max(np.where(self.indices > 0, np.arange(self.indices.shape[1]), -1), axis=1)
+        factors: list[tuple[NDArray[np.int_], ...]] = []
         for axis in range(self.indices.shape[1]):
-            terms = np.flatnonzero(last == axis)
+            terms = np.flatnonzero(last_axis == axis)
             without = self.indices[terms]
             without[:, axis] = 0
             before = np.array([places[tuple(row)] for row in without.tolist()], dtype=int)
-            found.append((terms, before, self.indices[terms, axis]))
-        return found
+            factors.append((terms, before, self.indices[terms, axis]))
+        return factors
 
     def _products(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the terms, shape (p, n), each from the one without its last variable."""

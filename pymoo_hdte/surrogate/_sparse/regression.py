@@ -102,8 +102,8 @@ class Regression:
         across = covariance(self._features, features, self.variance)
         prior = np.einsum("fm,mn,fn->f", functionals, inside, functionals, optimize=True)
         known = solve_triangular(self._lower, across @ functionals.T, lower=True)
-        left = np.maximum(prior - np.sum(known**2, axis=0), 0.0)
-        return self.unit * np.sqrt(self.size * left)
+        variance = np.maximum(prior - np.sum(known**2, axis=0), 0.0)
+        return self.unit * np.sqrt(self.size * variance)
 
 
 def _with_nugget(matrix: Array) -> Array:
@@ -114,7 +114,7 @@ def _with_nugget(matrix: Array) -> Array:
 def _learnt(features: list[Array], standard: Array, start: Array) -> Array:
     """Return the most probable parameters: by the marginal likelihood and what is expected."""
     count = min(len(standard), MOST_LEARNT)
-    features, standard = [one[:, :count] for one in features], standard[:count]
+    features, standard = [feature[:, :count] for feature in features], standard[:count]
     bounds = [end for _ in features for end in ENDS]
 
     def loss(flat: Array) -> tuple[float, Array]:
@@ -123,10 +123,10 @@ def _learnt(features: list[Array], standard: Array, start: Array) -> Array:
         return value + 0.5 * float(np.sum(off**2)), (slope + off / EXPECTED).ravel()
 
     options = {"maxiter": _ITERATIONS, "maxcor": 20}
-    found = scipy.optimize.minimize(
+    optimum = scipy.optimize.minimize(
         loss, start.ravel(), jac=True, method="L-BFGS-B", bounds=bounds, options=options
     )
-    return np.array(found.x).reshape(start.shape)
+    return np.array(optimum.x).reshape(start.shape)
 
 
 def _misfit(features: list[Array], standard: Array, parameters: Array) -> tuple[float, Array]:

@@ -42,9 +42,9 @@ class Judged:
     Attributes
     ----------
     weights : ndarray, shape (v, k)
-        Of the draws; they sum to 1 at each design.
+        Weights of the draws; they sum to 1 at each design.
     features : list of list of ndarray
-        By design and axis, the polynomials there.
+        The polynomials at the draws, by design and axis.
     """
 
     weights: Array
@@ -54,8 +54,8 @@ class Judged:
     def at(cls, points: Array, weights: Array, polynomials: EvenPolynomials) -> Judged:
         """Return it with these polynomials at points of shape (v, k, d)."""
         together = polynomials(points.reshape(-1, points.shape[-1]))
-        parts = [np.split(one, len(points), axis=1) for one in together]
-        return cls(weights, [list(one) for one in zip(*parts, strict=True)])
+        parts = [np.split(table, len(points), axis=1) for table in together]
+        return cls(weights, [list(group) for group in zip(*parts, strict=True)])
 
 
 @dataclass(frozen=True)
@@ -68,7 +68,7 @@ class ResponseFit:
     indices : ndarray of int, shape (p, d)
         Degrees of the terms, a downward-closed set.
     coefficients : ndarray, shape (p,)
-        Of the orthonormal polynomials, in the response's unit.
+        Coefficients of the orthonormal polynomials, in the response's unit.
     left_out : ndarray, shape (n,)
         Every run minus what the others predict there.
     alone : bool
@@ -90,22 +90,22 @@ class ResponseFit:
         least : float
             Scatter below which it counts as this, in the response's unit.
         """
-        found = []
+        errors = []
         for features, weights in zip(judged.features, judged.weights, strict=True):
             values = products(features, self.indices) @ self.coefficients
             deviation = values - weights @ values
             scatter = max(_std(values, weights), least)
             if self.alone:
                 share = float(np.sqrt(np.mean(self.left_out**2))) / scatter
-                found.append((share, share))
+                errors.append((share, share))
                 continue
             off = self.regression.predict(features) - values
             functionals = np.array([weights, weights * deviation / scatter])
             expected = self.regression.spread(features, functionals)
             expected = expected * max(self.regression.surprise, LEAST_SURPRISE)
             cut = np.array([abs(float(weights @ off)), _std(off, weights)])
-            found.append(tuple((COVERAGE * expected + cut) / scatter))
-        mean, std = np.array(found).T
+            errors.append(tuple((COVERAGE * expected + cut) / scatter))
+        mean, std = np.array(errors).T
         return mean, std
 
 
@@ -122,29 +122,29 @@ def fitted(
     Parameters
     ----------
     features : list of ndarray
-        Of the runs.
+        Features of the runs.
     values : ndarray, shape (n,)
         The response there.
     relevance : ndarray, shape (n,)
-        How much every run counts when errors are told.
+        How much every run counts in the estimated errors.
     judged : Judged
     lost : float
-        What terms left out may change, as a share of the least scatter.
+        Largest change by terms left out, as a share of the least scatter.
     start : ndarray, shape (d, 3), or None
         Parameters of the regression to start from.
     """
     regression = Regression(features, values, relevance, start)
     scatters = [
-        _std(regression.predict(one), weights)
-        for one, weights in zip(judged.features, judged.weights, strict=True)
+        _std(regression.predict(features), weights)
+        for features, weights in zip(judged.features, judged.weights, strict=True)
     ]
     looked_at = likely_terms(regression.variance)
     coefficients = _posterior(regression, features, looked_at)
-    kept = largest(coefficients, lost * float(np.quantile(scatters, 0.1)))
+    essential = largest(coefficients, lost * float(np.quantile(scatters, 0.1)))
     alone = _alone(features, values, looked_at, coefficients, regression)
     if alone is not None:
         return alone
-    indices = closed(looked_at[kept])
+    indices = closed(looked_at[essential])
     return ResponseFit(
         regression,
         indices,
@@ -162,9 +162,9 @@ def _posterior(regression: Regression, features: list[Array], indices: Indices) 
     prior = np.ones(len(indices))
     for of_axis, degrees in zip(regression.variance, indices.T, strict=True):
         prior *= np.append(1.0, of_axis)[degrees]
-    found = regression.unit * prior * (regression.weights @ products(features, indices))
-    found[0] += regression.centre
-    return found
+    posterior = regression.unit * prior * (regression.weights @ products(features, indices))
+    posterior[0] += regression.centre
+    return posterior
 
 
 def _alone(
@@ -187,9 +187,9 @@ def _alone(
         q, r = np.linalg.qr(products(features, chosen))
         if np.min(np.abs(np.diag(r))) < 1e-8 * np.max(np.abs(np.diag(r))):
             continue
-        found = np.linalg.solve(r, q.T @ values)
+        solution = np.linalg.solve(r, q.T @ values)
         leverage = np.minimum(np.sum(q**2, axis=1), 1.0 - 1e-12)
         left_out = (values - q @ (q.T @ values)) / (1.0 - leverage)
         if (error := float(np.sqrt(np.mean(left_out**2)))) < rms:
-            best, rms = ResponseFit(regression, chosen, found, left_out, alone=True), error
+            best, rms = ResponseFit(regression, chosen, solution, left_out, alone=True), error
     return best

@@ -52,7 +52,7 @@ def beyond_all_runs(
     scale : ndarray, shape (n, r)
         Scatter there, of which errors are shares.
     error : float
-        Of the surrogate inside, as a share of the scatter.
+        Error of the surrogate inside, as a share of the scatter.
     """
     whole = SparseMoments(polynomial, axes)
     unbounded = [j for j, axis in enumerate(axes) if axis.is_unbounded]
@@ -61,7 +61,7 @@ def beyond_all_runs(
         return whole, np.zeros((2, scale.shape[1]))
     inside = SparseMoments(polynomial, axes, [axis.cut for axis in axes])
     ended = SparseMoments(polynomial, axes, [axis.ended for axis in axes])
-    without, added, at_ends = (np.array(one(designs)) for one in (inside, whole, ended))
+    without, added, at_ends = (np.array(moments(designs)) for moments in (inside, whole, ended))
     series = _series(polynomial, axes, unbounded, designs, without[0]) / scale**2
     expected = np.abs(at_ends - without) / scale
     expected[0] = np.maximum(expected[0], np.sqrt(2.0 * TAIL * series))
@@ -79,18 +79,18 @@ def _series(
     mean: Array,
 ) -> Array:
     """Return the variance expected beyond all runs, shape (n, r), in squares of units."""
-    found = np.zeros_like(mean)
+    variance = np.zeros_like(mean)
     for j in unbounded:
         for upper in (False, True):
-            third, second, last = (
+            third, second, outermost = (
                 _added(polynomial, axes, j, slab, designs, mean)
                 for slab in _slabs(axes[j].measure, upper)
             )
-            ratio, before = _ratio(last, second), _ratio(second, third)
+            ratio, before = _ratio(outermost, second), _ratio(second, third)
             slower = np.minimum(ratio / np.maximum(before, np.finfo(float).tiny), 1.0)
             following = ratio * slower
-            found += last * following / (1.0 - following * slower)
-    return found
+            variance += outermost * following / (1.0 - following * slower)
+    return variance
 
 
 def _ratio(later: Array, earlier: Array) -> Array:
@@ -103,13 +103,13 @@ def _slabs(measure: Measure, upper: bool) -> list[tuple[float, Measure | None]]:
     order = slice(None, None, -1) if upper else slice(None)
     nodes, weights = measure.nodes[order], measure.weights[order]
     beyond = np.cumsum(weights) - 0.5 * weights
-    found: list[tuple[float, Measure | None]] = []
+    slabs: list[tuple[float, Measure | None]] = []
     for high, low in pairwise(STEPS):
         inside = (beyond > low) & (beyond <= high)
         share = float(weights[inside].sum())
         places = nodes[inside][order], weights[inside][order] / (share or 1.0)
-        found.append((share, Measure(*places) if share else None))
-    return found
+        slabs.append((share, Measure(*places) if share else None))
+    return slabs
 
 
 def _added(
@@ -124,7 +124,7 @@ def _added(
     share, measure = slab
     if measure is None:
         return np.zeros_like(mean)
-    measures = [one.cut for one in axes]
+    measures = [entry.cut for entry in axes]
     measures[axis] = measure
     there, std = SparseMoments(polynomial, axes, measures)(designs)
     return share * (std**2 + (there - mean) ** 2)

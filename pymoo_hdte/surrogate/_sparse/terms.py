@@ -33,23 +33,23 @@ def likely_terms(variance: Array, most: int = MOST_TERMS) -> Indices:
     envelope = np.maximum.accumulate(whole[:, ::-1], axis=1)[:, ::-1]
     threshold, step = float(np.prod(envelope[:, 0])), 1e-2
     least = LEAST_VARIANCE * threshold
-    found = np.zeros((1, len(variance)), dtype=int)
+    indices = np.zeros((1, len(variance)), dtype=int)
     while threshold > least:
-        more = _above(envelope, threshold * step, most)
-        if more is not None:
-            found, threshold = more, threshold * step
+        enlarged = _above(envelope, threshold * step, most)
+        if enlarged is not None:
+            indices, threshold = enlarged, threshold * step
         elif step >= 1.0 / _BESIDE:
             break
         else:
             step = min(np.sqrt(step), 1.0 / _BESIDE)
-    return found
+    return indices
 
 
 def _above(envelope: Array, threshold: float, most: int) -> Indices | None:
     """Return all indices of products above a threshold, or None if they are too many."""
-    rest = np.append(np.cumprod(envelope[::-1, 0])[::-1][1:], 1.0)
+    largest_after = np.append(np.cumprod(envelope[::-1, 0])[::-1][1:], 1.0)
     indices, weights = np.zeros((1, 0), dtype=int), np.ones(1)
-    for of_axis, after in zip(envelope, rest, strict=True):
+    for of_axis, after in zip(envelope, largest_after, strict=True):
         products = weights[:, None] * of_axis
         row, degree = np.nonzero(products * after >= threshold)
         if len(row) > most:
@@ -60,30 +60,30 @@ def _above(envelope: Array, threshold: float, most: int) -> Indices | None:
 
 def products(features: list[Array], indices: Indices) -> Array:
     """Return the terms at points, shape (n, p), from the polynomials of every axis there."""
-    found = np.ones((len(indices), features[0].shape[1]))
+    values = np.ones((len(indices), features[0].shape[1]))
     for feature, degrees in zip(features, indices.T, strict=True):
         raised = np.flatnonzero(degrees)
-        found[raised] *= feature[degrees[raised] - 1]
-    return found.T
+        values[raised] *= feature[degrees[raised] - 1]
+    return values.T
 
 
 def largest(coefficients: Array, lost: float) -> NDArray[np.bool_]:
     """Return which coefficients to keep, shape (p,): the others have at most this norm."""
     order = np.argsort(np.abs(coefficients))
     dropped = np.sqrt(np.cumsum(coefficients[order] ** 2)) <= lost
-    kept = np.ones(len(coefficients), dtype=bool)
-    kept[order[dropped]] = False
-    kept[0] = True
-    return kept
+    stays = np.ones(len(coefficients), dtype=bool)
+    stays[order[dropped]] = False
+    stays[0] = True
+    return stays
 
 
 def closed(indices: Indices) -> Indices:
     """Return the smallest downward-closed set that holds these indices, sorted, shape (q, d)."""
     waiting = [tuple(row) for row in indices.tolist()]
-    found = set(waiting)
+    closure = set(waiting)
     while waiting:
         for _, below in parents(waiting.pop()):
-            if below not in found:
-                found.add(below)
+            if below not in closure:
+                closure.add(below)
                 waiting.append(below)
-    return np.array(sorted(found), dtype=int)
+    return np.array(sorted(closure), dtype=int)

@@ -35,5 +35,7 @@ def named(given: Any) -> str:
     frozen: Any = getattr(given, "dist", None)
     if not hasattr(frozen, "name") or not hasattr(given, "kwds"):
         return ""
-    numbers = [f"{one!r}" for one in given.args] + [f"{k}={v!r}" for k, v in given.kwds.items()]
+    numbers = [f"{argument!r}" for argument in given.args] + [
+        f"{k}={v!r}" for k, v in given.kwds.items()
+    ]
     return f"; this is {frozen.name}({', '.join(numbers)})"

@@ -84,7 +84,7 @@ def test_revised_model_predicts_the_fit_s_transmission_error(ripple):
 
 def test_model_without_a_name_has_no_effect_and_says_so(ripple, clean):
     unlisted = replace(ripple, verdict=with_status(ripple.verdict, "unlisted"))
-    for analysis, words in ((unlisted, "none added"), (clean, "nothing was found")):
+    for analysis, words in ((unlisted, "outside the library"), (clean, "nothing is missing")):
         model = revised_model(analysis)
         assert [one.name for one in model.effects] == ["load_inertia", "damping_reference"]
         assert words in model.description

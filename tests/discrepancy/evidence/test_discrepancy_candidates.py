@@ -293,12 +293,14 @@ def test_an_order_that_is_no_whole_number_of_output_turns_is_not_the_encoder_s()
 def test_only_parameters_of_the_drive_can_be_out_of_tolerance():
     base = known_data().base
     names = [parameter.name for parameter in base]
-    freed = [candidate.frees for candidate in out_of_tolerance(base, names, BELIEVED.error_orders)]
+    freed = [
+        candidate.releases for candidate in out_of_tolerance(base, names, BELIEVED.error_orders)
+    ]
     amplitudes = {f"error_amplitude_{line}" for line in range(len(BELIEVED.error_orders))}
     # Load inertia and damping have effects of their own names, unless several are freed together.
     assert set(freed) == set(MECHANICAL) - {"load_inertia", "damping"} | amplitudes
     together = out_of_tolerance(base, names, BELIEVED.error_orders, together=True)
-    assert {candidate.frees for candidate in together} == set(MECHANICAL) | amplitudes
+    assert {candidate.releases for candidate in together} == set(MECHANICAL) | amplitudes
     for candidate in out_of_tolerance(base, names, BELIEVED.error_orders):
         assert candidate.build(()) == ()
         assert candidate.unknowns == 1
@@ -310,7 +312,8 @@ def test_what_is_believed_to_be_nothing_is_not_out_of_tolerance():
         replace(one, start=0.0) if one.name == "input_damping" else one for one in known_data().base
     )
     freed = {
-        candidate.frees for candidate in out_of_tolerance(base, MECHANICAL, BELIEVED.error_orders)
+        candidate.releases
+        for candidate in out_of_tolerance(base, MECHANICAL, BELIEVED.error_orders)
     }
     assert "stiffness" in freed
     assert "input_damping" not in freed

@@ -177,7 +177,7 @@ BAD_FIELDS = {
     "stiffness in N.m/arcmin": (
         "rad = 25830",
         "rad = 7.5",
-        r"torsion.csv.gz.*slope.*believed stiffness of 7\.5 N\.m/rad.*the unit of either",
+        r"torsion.csv.gz.*slope.*nominal stiffness of 7\.5 N\.m/rad.*the unit of either",
     ),
     "stiffness without its power of ten": (
         "rad = 25830",

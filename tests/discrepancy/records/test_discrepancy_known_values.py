@@ -82,7 +82,7 @@ def test_a_number_at_its_bound_is_a_candidate_that_explains_the_rest(holding):
     campaign = with_amplitude(holding, 0.6, amplitude=0.1)
     data = data_of(campaign)
     base = fit(data)
-    (freed,) = [one for one in data.out_of_tolerance(base.at_bounds) if one.frees == AMPLITUDE]
+    (freed,) = [one for one in data.out_of_tolerance(base.at_bounds) if one.releases == AMPLITUDE]
     assert freed.sentence == (
         "The amplitude of the torque ripple of order 3 at the input lies outside its tolerance."
     )
@@ -102,7 +102,7 @@ def test_a_number_whose_law_does_not_take_ten_times_as_much_is_no_candidate():
     depth = "mesh_stiffness_variation.2.depth"
     base = [Parameter(depth, 0.2, 0.1, 0.3, 0.1), Parameter(LEVEL, 0.01, 0.005, 0.015, 0.005)]
     (found,) = out_of_tolerance(base, (depth, LEVEL), (), effects=effects)
-    assert found.frees == LEVEL
+    assert found.releases == LEVEL
 
 
 def test_vectors_with_numbers_of_their_own_predict_as_each_alone(holding):

@@ -156,7 +156,7 @@ def test_without_a_gain_the_ratios_are_determined_and_that_is_said(folder):
     )
     finding = found(measured)
     assert is_the_joint(finding, unit=-GAIN)
-    assert any("told in units of current" in one for one in limits(finding))
+    assert any("are in units of current" in one for one in limits(finding))
     with pytest.raises(InvalidInput, match=r"line 7: inputs\.current\.gain is None.*inertia of"):
         rig(folder, ("gain = { value = -7.6 }\n", ""), ("1.0, factor = 3.0 }\n[p", "1.0 }\n[p"))
 

@@ -72,7 +72,7 @@ def test_page_stands_alone_and_answers(written):
         head, body = source.split(",", 1)
         assert head == "data:image/svg+xml;base64"
         assert b"</svg>" in base64.b64decode(body)
-    for question in ("Where is the model wrong?", "How sure", "Did the gap shrink", "test next"):
+    for question in ("Where is the model wrong?", "How sure", "held-out records?", "test next"):
         assert question in page
     assert "torque ripple" in page
     assert "Turn it backwards." in page
@@ -153,10 +153,10 @@ def test_failure_leaves_the_earlier_report(ripple, location, tmp_path, monkeypat
 
 def test_words_do_not_promise_what_is_not_there(ripple):
     proof = prove(ripple)
-    assert "% of what the noise does not explain is gone" in gap_sentence(ripple, proof)
+    assert "the correction removes" in gap_sentence(ripple, proof)
     unlisted = replace(ripple, verdict=with_status(ripple.verdict, "unlisted"))
     assert "Nothing was added" in gap_sentence(unlisted, prove(unlisted))
-    assert "what it is, is not" in how_sure(unlisted)
+    assert "what it is remains open" in how_sure(unlisted)
     assert "explains 100 % of the misfit" in how_sure(ripple)
 
 

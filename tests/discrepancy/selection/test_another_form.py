@@ -19,9 +19,9 @@ from pymoo_hdte.discrepancy._selection import any_form, choice, equivalents
 from pymoo_hdte.discrepancy._selection.any_form import AnyForm
 from pymoo_hdte.discrepancy._selection.candidate import Candidate
 from pymoo_hdte.discrepancy._selection.equivalents import undecided
-from pymoo_hdte.discrepancy._selection.fitted_sets import FittedSets, is_earned
+from pymoo_hdte.discrepancy._selection.fitted_sets import FittedSets, is_significant
 from pymoo_hdte.discrepancy._selection.fitting import fit
-from pymoo_hdte.discrepancy._selection.hypothesis import alike, hypothesis_of
+from pymoo_hdte.discrepancy._selection.hypothesis import hypothesis_of, indistinguishable
 from pymoo_hdte.discrepancy._selection.reason import NEEDS_ANOTHER_FORM
 from pymoo_hdte.discrepancy._selection.rules import RULES
 from pymoo_hdte.discrepancy._selection.search import Search
@@ -73,7 +73,7 @@ def test_a_law_is_named_in_part_whose_listed_form_explains_little(label):
     assert (found.status, found.chosen.label) == ("partial", label)
     assert found.chosen.explained < RULES.explained_share
     assert found.has_reason(NEEDS_ANOTHER_FORM)
-    assert AnyForm(data, found.base).explains_in_another(found.chosen)
+    assert AnyForm(data, found.base).explains_in_another_form(found.chosen)
     assert RULES.partial_share < found.in_another_form <= 1.0
 
 
@@ -94,9 +94,9 @@ def test_a_form_far_from_the_listed_one_is_followed_there(monkeypatch):
     (law,) = [one for one in library(DATA) if one.label == LOAD]
     found = fit(data, [law], np.append(forms.base.values, 0.3))
     one = hypothesis_of(found, forms.excess)
-    assert forms.explains_in_another(one)
+    assert forms.explains_in_another_form(one)
     monkeypatch.setattr(any_form, "in_free_form", lambda data, fitted: fitted)
-    assert not AnyForm(data, forms.base).explains_in_another(one)
+    assert not AnyForm(data, forms.base).explains_in_another_form(one)
 
 
 def test_a_force_of_another_argument_is_no_form_of_a_law():
@@ -112,7 +112,7 @@ def test_a_force_of_another_argument_is_no_form_of_a_law():
     search = Search(data, forms.base, laws)
     for law in laws:
         start = np.append(forms.base.values, law.starts[0])
-        assert not search.forms.explains_in_another(search.fitted((law,), start))
+        assert not search.forms.explains_in_another_form(search.fitted((law,), start))
 
 
 def test_each_curve_of_a_form_counts_as_an_unknown():
@@ -123,11 +123,11 @@ def test_each_curve_of_a_form_counts_as_an_unknown():
     one = Search(data, forms.base, [law]).fitted(
         (law,), np.append(forms.base.values, law.starts[0])
     )
-    assert forms.explains_in_another(one)
+    assert forms.explains_in_another_form(one)
     # As much as it removes, so that the curves alone are too many.
-    removed = forms.excess - forms.rest(one.fit).excess
+    removed = forms.excess - forms.unexplained(one.fit).excess
     stricter = replace(data, rules=replace(RULES, bic_gain=removed - 1.0))
-    assert not AnyForm(stricter, forms.base).explains_in_another(one)
+    assert not AnyForm(stricter, forms.base).explains_in_another_form(one)
 
 
 def test_the_chosen_set_may_explain_in_another_form_where_no_single_effect_does():
@@ -137,12 +137,12 @@ def test_the_chosen_set_may_explain_in_another_form_where_no_single_effect_does(
     search = SimpleNamespace(
         data=SimpleNamespace(corrections=lambda candidate: [], rules=RULES),
         candidates=list(members.values()),
-        found=[both, *alone.values()],
+        hypotheses=[both, *alone.values()],
         finished=lambda one: one,
         forms=forms_that_explain(lambda one: one is both),
     )
     assert choice.in_another_form(search, both, ()) == [both]
-    search.forms.explains_in_another = lambda one: one is not alone["first"]
+    search.forms.explains_in_another_form = lambda one: one is not alone["first"]
     assert choice.in_another_form(search, both, ()) == [alone["second"]]
     # A machine whose laws have no known other forms.
     search.data.corrections = lambda candidate: None
@@ -170,8 +170,8 @@ def a_set(*members, values=(), spread=1e-3, chi_square=1000.0, removed=1e5):
     )
     return SimpleNamespace(
         candidates=members,
-        effects=[one for one in members if one.frees is None],
-        freed=[one for one in members if one.frees is not None],
+        effects=[one for one in members if one.releases is None],
+        released=[one for one in members if one.releases is not None],
         fit=fitted,
         listed=True,
         exact=False,
@@ -182,7 +182,7 @@ def a_set(*members, values=(), spread=1e-3, chi_square=1000.0, removed=1e5):
 
 
 def forms_that_explain(which):
-    return SimpleNamespace(explains_in_another=which, in_free_form=lambda fitted: fitted)
+    return SimpleNamespace(explains_in_another_form=which, in_free_form=lambda fitted: fitted)
 
 
 @pytest.mark.nightly
@@ -197,7 +197,7 @@ def test_a_form_of_an_inertia_that_is_not_there_names_none(inertia, status):
 
 def freed_value(name):
     """A base parameter out of tolerance."""
-    return replace(a_law("parameter", name), frees=name, exact=True)
+    return replace(a_law("parameter", name), releases=name, exact=True)
 
 
 WIDTH = unknown("half_width", 0.0, 1.0, 0.1)
@@ -252,7 +252,7 @@ def test_forms_of_two_laws_at_one_port_overlap(port, overlap, near):
     further = 2.0 * RULES.form_accuracy**2 * 1e5
     soft = a_set(a_law("soft_windup"))
     play = a_set(a_law("backlash", port), chi_square=1000.0 + further)
-    assert alike(play, soft, 1000, RULES, overlap) == near
+    assert indistinguishable(play, soft, 1000, RULES, overlap) == near
 
 
 @pytest.mark.parametrize(
@@ -273,7 +273,7 @@ def test_values_out_of_tolerance_beside_two_laws_do_not_tell_their_forms_apart(l
     )
     sets.degrees_of_freedom, sets.forms = 1000, AnyForm.__new__(AnyForm)
     sets.forms.data = sets.data
-    assert sets.alike(play, soft) == near
+    assert sets.indistinguishable(play, soft) == near
 
 
 @pytest.mark.parametrize(("exact", "near"), [(True, False), (False, True)])
@@ -288,7 +288,7 @@ def test_lines_beside_a_law_are_told_apart_by_what_they_do_themselves(exact, nea
     theirs.fit.chi_square = theirs.fit.evidence = 1650.0
     for one in (ours, theirs):
         one.removed = 3.5e6
-    assert alike(theirs, ours, 1000, RULES) == near
+    assert indistinguishable(theirs, ours, 1000, RULES) == near
 
 
 def test_one_effect_at_one_order_or_another_is_one_member_of_a_class():
@@ -313,15 +313,17 @@ def test_what_contains_a_member_of_a_class_has_to_be_a_rival_of_that(
     further = a_set(falling, play, values=[0.1, 0.05], chi_square=1095.0)
     further.fit.evidence, further.fit.bound_sides = evidence, np.zeros(2)
     search = SimpleNamespace(
-        found=[chosen, rival, further],
+        hypotheses=[chosen, rival, further],
         data=SimpleNamespace(rules=RULES),
-        alike=lambda one, other: alike(one, other, 1000, RULES, overlap=True),
-        earned=lambda one: True,
+        indistinguishable=lambda one, other: indistinguishable(
+            one, other, 1000, RULES, overlap=True
+        ),
+        is_significant=lambda one: True,
     )
-    assert equivalents.rivals(search, chosen) == [rival, further][:members]
+    assert equivalents.competing_sets(search, chosen) == [rival, further][:members]
     # One effect at two orders is no special case of itself.
-    search.found = [chosen, rival, a_set(dry, a_law("backlash", order=2.0), chi_square=1105.0)]
-    assert equivalents.rivals(search, chosen) == search.found[1:]
+    search.hypotheses = [chosen, rival, a_set(dry, a_law("backlash", order=2.0), chi_square=1105.0)]
+    assert equivalents.competing_sets(search, chosen) == search.hypotheses[1:]
 
 
 @pytest.mark.parametrize(
@@ -344,14 +346,16 @@ def test_a_value_out_of_tolerance_may_stand_for_the_form_of_another_law(
     further = share * RULES.form_share**2 * 1e5
     play = a_set(a_law("backlash", port), *both, chi_square=1000.0 + further)
     search = SimpleNamespace(
-        found=[chosen, play],
+        hypotheses=[chosen, play],
         data=SimpleNamespace(rules=RULES),
         excess=1e5,
-        alike=lambda one, other: alike(one, other, 1000, RULES, overlap=True),
-        earned=lambda one: True,
-        forms=SimpleNamespace(rest_is_noise=lambda fitted: noise),
+        indistinguishable=lambda one, other: indistinguishable(
+            one, other, 1000, RULES, overlap=True
+        ),
+        is_significant=lambda one: True,
+        forms=SimpleNamespace(unexplained_is_noise=lambda fitted: noise),
     )
-    assert equivalents.rivals(search, chosen) == ([play] if told else [])
+    assert equivalents.competing_sets(search, chosen) == ([play] if told else [])
 
 
 @pytest.mark.parametrize(
@@ -381,7 +385,7 @@ def test_a_damping_out_of_tolerance_may_be_the_form_of_a_drag_at_its_port(
 ):
     """A fluid that thins was named a drag with a damping that had not changed."""
     drag = a_law("drag", "input")
-    freed = Candidate("parameter", "b", (), ((),), lambda v: (), "", frees="b", acts_at=acts_at)
+    freed = Candidate("parameter", "b", (), ((),), lambda v: (), "", releases="b", acts_at=acts_at)
     monkeypatch.setattr(
         "pymoo_hdte.discrepancy._selection.fitted_sets.ill_explained", lambda *arguments: [0]
     )
@@ -399,7 +403,7 @@ def test_a_damping_out_of_tolerance_may_be_the_form_of_a_drag_at_its_port(
     )
     rest = SimpleNamespace(fit=fitted("rest"), exact=False, candidates=(drag,))
     both = SimpleNamespace(fit=fitted("both"), candidates=(drag, freed))
-    assert is_earned(data, base, both, rest, (freed,)) == earned
+    assert is_significant(data, base, both, rest, (freed,)) == earned
 
 
 class Bristles(Aperiodic):
@@ -464,8 +468,10 @@ def moved():
 def test_a_parameter_that_an_effect_covers_is_told_as_that_effect(moved):
     search, one = moved
     search._prune(one)
-    assert {each.label for each in search.found[0].candidates} == {REACTION, LOAD}
-    assert "parameter:load_inertia" not in {c.label for one in search.found for c in one.candidates}
+    assert {each.label for each in search.hypotheses[0].candidates} == {REACTION, LOAD}
+    assert "parameter:load_inertia" not in {
+        c.label for one in search.hypotheses for c in one.candidates
+    }
 
 
 IN_A_CLUTCH = "load_inertia/coupled:output"
@@ -492,7 +498,7 @@ def test_values_that_an_effect_covers_are_replaced_by_a_form_of_it():
     (reaction,) = [one for one in laws if one.label == REACTION]
     one = search.fitted((reaction, *freed), np.append(search.base.values, 1.0))
     search._exchange_forms(one)
-    found = {frozenset(each.label for each in other.candidates) for other in search.found}
+    found = {frozenset(each.label for each in other.candidates) for other in search.hypotheses}
     assert {REACTION, IN_A_CLUTCH} in found
     assert {REACTION, IN_A_CLUTCH, "parameter:damping"} not in found
 
@@ -515,7 +521,7 @@ def test_two_covered_parameters_that_are_both_needed_stay(moved, monkeypatch):
     search = Search(data, fit(data), [one for one in library(DATA) if one.label in BOTH])
     freed = data.out_of_tolerance(["load_inertia", "damping"], together=True)
     one = search.fitted(tuple(freed), search.base.values)
-    assert search._prune(one).freed == tuple(freed)
+    assert search._prune(one).released == tuple(freed)
 
 
 def test_a_parameter_is_covered_only_by_an_effect_that_may_be_missing(moved):

@@ -15,7 +15,7 @@ from pymoo_hdte.discrepancy._evidence.order_lines.evidence import Data
 from pymoo_hdte.discrepancy._selection import caveats as doubts
 from pymoo_hdte.discrepancy._selection import verdict
 from pymoo_hdte.discrepancy._selection.any_form import AnyForm
-from pymoo_hdte.discrepancy._selection.excess import Vote
+from pymoo_hdte.discrepancy._selection.excess import HeldOutTest
 from pymoo_hdte.discrepancy._selection.fitting import fit
 from pymoo_hdte.discrepancy._selection.hypothesis import down_to_noise, hypothesis_of
 from pymoo_hdte.discrepancy._selection.reason import NEEDS_ANOTHER_FORM, SENSOR_AT_BOUND, Reason
@@ -95,7 +95,7 @@ def test_what_another_form_of_a_law_leaves_is_none_of_a_second_effect(label):
     degrees_of_freedom = len(base.residuals) - len(base.values)
     forms = AnyForm(data, base)
     assert not down_to_noise(found, degrees_of_freedom, data.rules)
-    assert forms.rest(found).is_noise
+    assert forms.unexplained(found).is_noise
     left = hypothesis_of(found, base.chi_square - degrees_of_freedom)
     assert forms.explains(left)
 
@@ -179,7 +179,7 @@ def test_what_no_form_of_a_law_follows_is_another_effect_at_its_port(plain, earn
     removed = alone.fit.chi_square - both.fit.chi_square
     assert removed < RULES.second_form_share * search.excess
     assert not search.enough(both)
-    assert search.forms.earns(both, alone) == earned
+    assert search.forms.is_significant(both, alone) == earned
 
 
 # That both are named where nothing speaks against them, a test below shows of the same data.
@@ -194,9 +194,9 @@ def test_a_small_effect_that_held_out_records_deny_is_not_named(monkeypatch, wor
 
     def vote(self, before, after):
         beside = before.candidates == (law,)
-        return Vote(500.0, 500.0 + worse if beside else 400.0, 10.0)
+        return HeldOutTest(500.0, 500.0 + worse if beside else 400.0, 10.0)
 
-    monkeypatch.setattr(Data, "held_out_vote", vote)
+    monkeypatch.setattr(Data, "held_out_test", vote)
     found = judge(data, fit(data), [law, drift])
     assert (DRIFT in {one.label for one in found.chosen.candidates}) == named
 
@@ -269,9 +269,9 @@ def test_beside_two_effects_a_third_is_not_fitted_to_errors_of_their_forms(monke
         search = Search(data, base, laws, screen(data, base, laws))
         search.singles()
         search.grow()
-        assert {one.label for one in search.found[0].candidates} == {SPRING, line}
-        assert not search.enough(search.found[0])
-        return {len(one.members) for one in search.found}
+        assert {one.label for one in search.hypotheses[0].candidates} == {SPRING, line}
+        assert not search.enough(search.hypotheses[0])
+        return {len(one.members) for one in search.hypotheses}
 
     assert sizes() == {1, 2}
     monkeypatch.setattr(AnyForm, "explains", lambda *_: False)
@@ -336,7 +336,7 @@ def test_laws_of_exact_form_may_have_no_other():
     forms, found = left_by(planted(ripple, harmonic), [law])
     assert found.exact
     assert found.explained > 0.9
-    assert forms.rest(found.fit).is_noise
+    assert forms.unexplained(found.fit).is_noise
     assert not forms.explains(found)
 
 
@@ -351,7 +351,7 @@ def test_a_harmonic_that_is_not_analysed_is_a_form_of_a_ripple():
     ]
     forms, found = left_by(planted(*ripple), [listed(DATA, "torque_ripple", (3.0,))])
     assert not down_to_noise(found.fit, forms.degrees_of_freedom, RULES)
-    assert forms.rest(found.fit).is_noise
+    assert forms.unexplained(found.fit).is_noise
 
 
 def test_a_law_whose_listed_form_contradicts_a_part_is_not_named_plainly(monkeypatch):

@@ -12,8 +12,8 @@ from pymoo_hdte.discrepancy._evidence.order_lines.candidates import out_of_toler
 from pymoo_hdte.discrepancy._evidence.order_lines.objective import LOST, Objective
 from pymoo_hdte.discrepancy._selection.candidate import Layout
 from pymoo_hdte.discrepancy._selection.fitting import fit
-from pymoo_hdte.discrepancy._selection.freed import gain_of_freed
 from pymoo_hdte.discrepancy._selection.hypothesis import expected_values
+from pymoo_hdte.discrepancy._selection.released import gain_of_released
 from pymoo_hdte.discrepancy._selection.rules import RULES
 from pymoo_hdte.units import ARCSEC
 
@@ -218,7 +218,7 @@ def test_a_parameter_out_of_tolerance_stops_at_its_bound(factor, side):
     deviation = np.sqrt(freed.covariance[place, place])
     assert freed.values[place] == pytest.approx(truth[place], abs=4.0 * deviation)
     assert freed.chi_square < 0.5 * base.chi_square
-    gain = gain_of_freed(base, freed.candidates)
+    gain = gain_of_released(base, freed.candidates)
     assert gain == pytest.approx(base.chi_square - freed.chi_square, rel=0.1)
 
 

@@ -208,7 +208,7 @@ def test_what_came_nowhere_near_is_only_evaluated_when_the_noise_is_renewed(ripp
     far = hypothesis.hypothesis_of(fit(data, of_labels([LINE]), steps=0), again.excess)
     moved = replace(chosen, fit=replace(chosen.fit, values=1.001 * chosen.fit.values))
     again.resume([moved, far])
-    found = {one.label: one.fit for one in again.found}
+    found = {one.label: one.fit for one in again.hypotheses}
     assert found[chosen.label].chi_square == pytest.approx(chosen.fit.chi_square, abs=0.1)
     assert np.array_equal(found[far.label].values, far.fit.values)
 
@@ -229,7 +229,7 @@ def test_what_came_as_near_as_the_chosen_set_is_fitted_again_when_the_noise_is_r
     known = [(chosen, 1000.0), (by_share[0.99], 1015.0), (by_share[1.0], 0.0)]
     again.resume([replace(one, bic=bic) for one, bic in known])
     moved = by_share[0.99]
-    (found,) = [one for one in again.found if one.label == moved.label]
+    (found,) = [one for one in again.hypotheses if one.label == moved.label]
     assert found.fit.chi_square <= chosen.fit.chi_square + 0.1 < moved.fit.chi_square - 100.0
 
 
@@ -293,9 +293,9 @@ def test_a_set_that_only_the_removal_of_a_member_gives_is_named(monkeypatch):
         there = tuple(one.label for one in fitted.candidates)
         return [one for one in screen(data, fitted, others) if one.candidate.label in ways[there]]
 
-    monkeypatch.setattr(search, "most_hopeful", hopeful)
-    monkeypatch.setattr(AnyForm, "beside", lambda *_: [])
-    monkeypatch.setattr(search.Search, "_exchange", lambda *_: None)
+    monkeypatch.setattr(search, "shortlist", hopeful)
+    monkeypatch.setattr(AnyForm, "shortlisted_beside", lambda *_: [])
+    monkeypatch.setattr(search.Search, "_exchange_members", lambda *_: None)
     data = planted({RIPPLE: (0.003, 0.001), SOFT: (0.3, 5e-4, 4.0)})
     verdict = verdict_on(data, [RIPPLE, DRAG, SOFT])
     assert verdict.status == "named"
@@ -320,7 +320,7 @@ def test_where_more_than_noise_is_left_every_curve_is_tried_for_a_curve(left):
     found = search.Search(data, fit(data), [cubic, soft, line])
     values = (0.3, 5e-4, 4.0, *line.starts[0])
     found._exchange_forms(found.fitted((soft, line), np.append(found.base.values, values)))
-    tried = {cubic, line} in [set(one.candidates) for one in found.found]
+    tried = {cubic, line} in [set(one.candidates) for one in found.hypotheses]
     assert tried == (left > 0.0)
 
 
@@ -354,9 +354,9 @@ def test_a_law_is_compared_in_each_form_and_from_each_start(tried):
     chosen = found.finished(fitted(SOFT, stiffer))
     assert found.enough(chosen)
     for label, start in tried.items():
-        assert not found.alike(fitted(label, start), chosen)
+        assert not found.indistinguishable(fitted(label, start), chosen)
     complete(found, chosen)
-    rivals = [one for one in found.of_size(2) if found.alike(one, chosen)]
+    rivals = [one for one in found.of_size(2) if found.indistinguishable(one, chosen)]
     assert {CORNER, LINE} in [hypothesis.label_of(one.candidates) for one in rivals]
 
 
@@ -425,7 +425,7 @@ def test_a_play_is_no_wind_up_of_straight_pieces(listed, status):
 def test_a_stiffness_out_of_tolerance_is_a_parameter_and_no_effect():
     verdict = verdict_on(planted({}, stiffness=1.2), FEW)
     assert verdict.status == "parameter"
-    assert [candidate.frees for candidate in verdict.chosen.candidates] == ["stiffness"]
+    assert [candidate.releases for candidate in verdict.chosen.candidates] == ["stiffness"]
     place = Layout(verdict.base.parameters).index("stiffness")
     deviation = np.sqrt(verdict.chosen.fit.covariance[place, place])
     wanted = 1.2 * EMPTY.base[place].start
@@ -455,7 +455,7 @@ def test_no_value_is_freed_for_what_another_form_of_the_law_explains(monkeypatch
     monkeypatch.setattr(AnyForm, "explains", lambda self, one: True)
     verdict = verdict_on(planted({LINE: (2e-6, 1e-6)}, error_amplitude_0=1.6), FEW)
     assert labels_of(verdict) == {LINE}
-    assert not any(one.freed and one.effects for one in verdict.alternatives)
+    assert not any(one.released and one.effects for one in verdict.alternatives)
 
 
 @pytest.mark.parametrize(
@@ -608,7 +608,7 @@ def test_what_explains_one_channel_is_no_plain_name_for_what_another_shows():
     verdict = verdict_on(data, [CUBIC, RIPPLE])
     assert (verdict.status, labels_of(verdict)) == ("partial", {CUBIC})
     assert verdict.chosen.explained > RULES.explained_share
-    left = hypothesis.unexplained(data, verdict.base, verdict.chosen.fit)
+    left = hypothesis.contradicted_parts(data, verdict.base, verdict.chosen.fit)
     assert left.tolist() == [False, True, False, False, False]
     # If another law leaves no more than a multiple of this, neither is certain.
     assert verdict_on(data, [CUBIC, RIPPLE], form_ratio=1e9).status == "unlisted"
@@ -621,7 +621,7 @@ def test_what_one_record_alone_shows_does_not_speak_against_a_curve():
     verdict = verdict_on(data, [CUBIC, RIPPLE])
     assert (verdict.status, labels_of(verdict)) == ("partial", {CUBIC})
     assert verdict_on(data, [CUBIC, RIPPLE], contradicting_chi_square=20.0).status == "named"
-    assert not hypothesis.unexplained(data, verdict.base, verdict.chosen.fit).any()
+    assert not hypothesis.contradicted_parts(data, verdict.base, verdict.chosen.fit).any()
     excess = data.excess(verdict.chosen.fit)
     contradicting = RULES.contradicting_chi_square - 1.0
     assert excess.of_parts[1] > contradicting * excess.degrees_of_freedom.sum(axis=0)[1]
@@ -638,7 +638,7 @@ def test_the_record_left_out_is_the_one_that_a_fit_misses_most(left, missed):
         Excess(np.array([rows]).T, np.full((4, 1), 10.0))
         for rows in ([900.0, 300.0, 100.0, 100.0], left)
     )
-    assert hypothesis.unexplained(data, before, after).tolist() == [missed]
+    assert hypothesis.contradicted_parts(data, before, after).tolist() == [missed]
 
 
 def test_an_effect_must_pay_for_its_unknowns():
@@ -662,7 +662,7 @@ def test_rivals_are_compared_by_their_evidence():
     # Both leave the same; what counts is how much of its bounds each had to give up.
     for more, equal in ((9.9, True), (10.1, False)):
         other = alternative("other", 1050.0 + more)
-        assert hypothesis.alike(other, chosen, 1000, RULES) == equal
+        assert hypothesis.indistinguishable(other, chosen, 1000, RULES) == equal
 
 
 def test_a_second_effect_that_leaves_only_noise_is_earned():
@@ -708,7 +708,7 @@ def test_a_second_effect_is_looked_for_where_the_first_explains_least():
     assert (verdict.status, labels_of(verdict)) == ("named", {CUBIC, DRAG})
     alone = next(one for one in verdict.alternatives if one.label == CUBIC)
     assert alone.explained > RULES.explained_share
-    left = hypothesis.unexplained(data, verdict.base, alone.fit)
+    left = hypothesis.contradicted_parts(data, verdict.base, alone.fit)
     assert left.tolist() == [False, True, False, False, False]
     verdict = verdict_on(data, [CUBIC, DRAG, RIPPLE], second_hope_share=1e9)
     assert (verdict.status, labels_of(verdict)) == ("partial", {CUBIC})

@@ -19,7 +19,7 @@ from pymoo_hdte.discrepancy._evidence.force_balances.preconditions import check_
 from pymoo_hdte.discrepancy._records.plausibility import check_believed
 from pymoo_hdte.discrepancy._selection.candidate import Layout
 from pymoo_hdte.discrepancy._selection.fitting import fit
-from pymoo_hdte.discrepancy._selection.hypothesis import alike
+from pymoo_hdte.discrepancy._selection.hypothesis import indistinguishable
 from pymoo_hdte.discrepancy._selection.rules import RULES, Rules
 from pymoo_hdte.discrepancy._selection.verdict import judge
 from pymoo_hdte.discrepancy._verdicts.mechanism import examine_mechanism
@@ -164,8 +164,8 @@ def test_a_shorter_distance_tells_two_explanations_apart():
         return SimpleNamespace(fit=fitted, candidates=(name,), names={name}, exact=True)
 
     one, other = explanation("one", 1050.0), explanation("other", 1057.0)
-    assert alike(other, one, 1000, RULES)
-    assert not alike(other, one, 1000, replace(RULES, evidence_distance=5.0))
+    assert indistinguishable(other, one, 1000, RULES)
+    assert not indistinguishable(other, one, 1000, replace(RULES, evidence_distance=5.0))
 
 
 def test_the_map_flags_by_the_rate_of_its_rules():

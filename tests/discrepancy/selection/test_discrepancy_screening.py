@@ -20,7 +20,7 @@ from pymoo_hdte.discrepancy._records.records import RunningRecord
 from pymoo_hdte.discrepancy._selection import screening
 from pymoo_hdte.discrepancy._selection.fitting import fit
 from pymoo_hdte.discrepancy._selection.rules import RULES
-from pymoo_hdte.discrepancy._selection.screening import Screened, most_hopeful, screen
+from pymoo_hdte.discrepancy._selection.screening import Screened, screen, shortlist
 from pymoo_hdte.discrepancy._verdicts.rattling import leading_sweep_effect
 from pymoo_hdte.units import ARCSEC
 
@@ -114,7 +114,7 @@ def test_where_no_second_effect_is_hopeful_the_best_one_is_tried(shares, tried, 
     ]
     monkeypatch.setattr(screening, "screen", lambda data, fitted, others: found)
     data = SimpleNamespace(rules=RULES)
-    chosen = most_hopeful(data, None, ["a", "b"], [], 100.0, [])
+    chosen = shortlist(data, None, ["a", "b"], [], 100.0, [])
     assert "".join(one.candidate.name for one in chosen) == tried
 
 
@@ -140,7 +140,7 @@ def test_a_freed_parameter_removes_what_was_predicted(factor):
     (stiffness,) = (
         one
         for one in out_of_tolerance(base.parameters, base.at_bounds, ())
-        if one.frees == "stiffness"
+        if one.releases == "stiffness"
     )
     (found,) = screen(data, base, (stiffness,))
     freed = fit(data, (stiffness,), base.values)
@@ -153,7 +153,7 @@ def test_a_parameter_that_would_go_inward_removes_nothing():
     (stiffness,) = (
         one
         for one in out_of_tolerance(base.parameters, base.at_bounds, ())
-        if one.frees == "stiffness"
+        if one.releases == "stiffness"
     )
     mirrored = replace(base, residuals=-base.residuals)
     (found,) = screen(data, mirrored, (stiffness,))

@@ -11,9 +11,14 @@ from made_verdicts import made_verdict
 from pymoo_hdte.discrepancy._selection import choice
 from pymoo_hdte.discrepancy._selection.candidate import Candidate, Layout
 from pymoo_hdte.discrepancy._selection.caveats import reasons_of, varies
-from pymoo_hdte.discrepancy._selection.excess import Vote
+from pymoo_hdte.discrepancy._selection.excess import HeldOutTest
 from pymoo_hdte.discrepancy._selection.fitted_sets import FittedSets
-from pymoo_hdte.discrepancy._selection.hypothesis import Hypothesis, alike, contains, label_of
+from pymoo_hdte.discrepancy._selection.hypothesis import (
+    Hypothesis,
+    contains,
+    indistinguishable,
+    label_of,
+)
 from pymoo_hdte.discrepancy._selection.rules import RULES
 from pymoo_hdte.discrepancy._selection.search import Search
 from pymoo_hdte.discrepancy._verdicts import mechanism_choice as measured
@@ -23,12 +28,12 @@ FREEDOM = 1000
 JUDGED = SimpleNamespace(rules=RULES, evident=frozenset())
 
 
-def one(label, *, exact, frees=None):
+def one(label, *, exact, releases=None):
     """A candidate without unknowns of its own."""
     name, _, place = label.partition(":")
     port, _, order = place.partition("@")
     of_place = {"name": name, "port": port, "order": float(order) if order else None}
-    return SimpleNamespace(label=label, exact=exact, frees=frees, parameters=(), **of_place)
+    return SimpleNamespace(label=label, exact=exact, releases=releases, parameters=(), **of_place)
 
 
 def fit_of(chi_square_per_degree, candidates, base=(), values=()):
@@ -59,7 +64,7 @@ def doubts(chi_square_per_degree, *candidates, base=(), values=()):
 
 
 FRICTION, LINE = one("stribeck:input", exact=False), one("kinematic_error:mesh@3", exact=True)
-FREED = one("parameter:damping", exact=True, frees="damping")
+FREED = one("parameter:damping", exact=True, releases="damping")
 
 
 @pytest.mark.parametrize(
@@ -143,7 +148,7 @@ def test_a_sensor_s_value_is_no_doubt_only_where_the_forms_of_all_laws_explain_i
         without=lambda chosen, member: SimpleNamespace(fit=fits[True, False]),
         forms=SimpleNamespace(
             in_free_form=lambda fitted: fits[place_of(fitted)[0], True],
-            rest_is_noise=lambda fitted: place_of(fitted) in noise,
+            unexplained_is_noise=lambda fitted: place_of(fitted) in noise,
         ),
     )
     chosen = Hypothesis(fits[False, False], bic=0.0, explained=1.0)
@@ -192,9 +197,9 @@ def test_the_special_case_that_does_as_well_stands_for_its_law(
         law("coulomb_friction", chi_square=left),
     )
     search = SimpleNamespace(
-        found=[best, simple],
+        hypotheses=[best, simple],
         enough=lambda one: one.fit.chi_square < 1100.0,
-        earned=lambda one: True,
+        is_significant=lambda one: True,
         excess=removed,
         finished=lambda one: one,
         data=SimpleNamespace(rules=RULES),
@@ -229,15 +234,15 @@ def test_a_special_case_may_need_fewer_values_than_the_law(first, second, nested
 def test_a_set_that_is_fitted_further_while_others_are_judged_is_judged_itself(monkeypatch):
     monkeypatch.setattr(choice, "explains_in_any_form", lambda search, one: True)
     pair, trial, other, ended = (object() for _ in range(4))
-    search = SimpleNamespace(found=[pair, other, trial])
+    search = SimpleNamespace(hypotheses=[pair, other, trial])
 
     def earned(one):
         # Without one of its members the pair is what was only tried so far.
         if one is pair:
-            search.found = [ended, pair, other]
+            search.hypotheses = [ended, pair, other]
         return one is not pair
 
-    search.earned = earned
+    search.is_significant = earned
     assert choice.best_set(search) is ended
 
 
@@ -252,7 +257,7 @@ def test_the_smaller_set_of_least_bic_is_left_of_two_members_in_doubt(monkeypatc
 
     both, alone = of(900.0, "first", "second"), {"first": of(1150.0, "f"), "second": of(990.0, "s")}
     search = SimpleNamespace(
-        data=SimpleNamespace(rules=RULES, held_out_vote=lambda before, after: None),
+        data=SimpleNamespace(rules=RULES, held_out_test=lambda before, after: None),
         without=lambda one, member: alone["second" if member == ("first",) else "first"],
         enough=lambda one: True,
     )
@@ -280,8 +285,8 @@ def set_of(*members, left, explained=0.9):
     return Hypothesis(fitted, bic=chi_square, explained=explained)
 
 
-def a_law(name, frees=None):
-    return Candidate(name, "mesh", (), ((),), lambda values: (), "", frees=frees)
+def a_law(name, releases=None):
+    return Candidate(name, "mesh", (), ((),), lambda values: (), "", releases=releases)
 
 
 def search_among(*found):
@@ -290,9 +295,9 @@ def search_among(*found):
         data=SimpleNamespace(rules=RULES),
         base=base,
         degrees_of_freedom=FREEDOM,
-        found=found,
+        hypotheses=found,
         of_size=lambda size: [one for one in found if len(one.members) == size],
-        earned=lambda one: True,
+        is_significant=lambda one: True,
     )
 
 
@@ -362,11 +367,11 @@ def test_what_brings_a_sensor_s_gain_back_is_earned_also_beside_noise(
     known.data, known.degrees_of_freedom = JUDGED, FREEDOM
     known.base = SimpleNamespace(residuals=np.zeros(FREEDOM), values=())
     known.forms = SimpleNamespace(
-        earns=lambda one, rest: False, in_free_form=lambda fitted: fits["free"]
+        is_significant=lambda one, rest: False, in_free_form=lambda fitted: fits["free"]
     )
     known.without = lambda one, member: SimpleNamespace(fit=fits["rest"])
     whole = SimpleNamespace(fit=fits["both"], members=[(LINE,), (FRICTION,)])
-    assert known.earned(whole) == earned
+    assert known.is_significant(whole) == earned
 
 
 def freed(*names):
@@ -379,7 +384,7 @@ def test_all_sets_of_a_size_may_be_known_under_another_name():
     known.degrees_of_freedom = FREEDOM
     known.data, known.candidates = JUDGED, [a_law("load_inertia")]
     # The effect in its place is no better.
-    known._by_its_effect = lambda one: None
+    known._replace_by_effect = lambda one: None
     ripple, covered = a_law("ripple"), freed("load_inertia")
     covered = tuple(replace(one, covered_by="load_inertia") for one in covered)
     sets = [set_of(ripple, *covered, *more, left=1.0) for more in ((), freed("damping"))]
@@ -402,7 +407,7 @@ def test_all_sets_of_a_size_may_be_known_under_another_name():
 def test_an_effect_may_stand_for_several_values_beside_another(members, left, near):
     """A wind-up with more damping was a hardening with two values out of tolerance, plainly."""
     chosen = set_of(a_law("hardening_stiffness"), *freed("stiffness", "damping"), left=5.0)
-    assert alike(set_of(*members, left=left), chosen, FREEDOM, RULES) == near
+    assert indistinguishable(set_of(*members, left=left), chosen, FREEDOM, RULES) == near
 
 
 @pytest.mark.parametrize(
@@ -438,7 +443,7 @@ def test_twins_are_told_apart_by_no_evidence_and_say_something_else(monkeypatch)
     )
     freed_alone = set_of(*freed("damping"), left=5.0)
     search = search_among(chosen, twin, far, richer, freed_alone)
-    assert choice.twins(search, chosen) == [twin]
+    assert choice.competing_by_evidence(search, chosen) == [twin]
 
 
 @pytest.mark.parametrize(("special_left", "name"), [(9.0, "hysteresis"), (11.0, "richer")])
@@ -477,7 +482,7 @@ def denials(change, share, misfit=1.0):
     predicted[0] = np.sqrt(change)
     measured = share * predicted + misfit**0.5 * rng.normal(size=(4000, 40))
     before, after = (np.sum((measured - one) ** 2, axis=1) for one in (0.0, predicted))
-    votes = [Vote(*pair, change) for pair in zip(before, after, strict=True)]
+    votes = [HeldOutTest(*pair, change) for pair in zip(before, after, strict=True)]
     return np.mean([one.denies(RULES, misfit) for one in votes])
 
 
@@ -497,12 +502,12 @@ def test_records_deny_a_change_of_which_half_is_true_and_none_of_which_a_tenth_i
 
 def test_a_play_that_stood_for_an_error_that_grows_with_load_is_denied():
     """As it was fitted from one start to a published case: its error shrinks by 0.02 of 54."""
-    assert Vote(803.54, 803.52, 54.2).denies(RULES, 1.0)
+    assert HeldOutTest(803.54, 803.52, 54.2).denies(RULES, 1.0)
 
 
 def test_records_deny_a_change_with_which_their_prediction_diverges_and_none_that_prevents_it():
-    assert Vote(1.0, np.inf, np.inf).denies(RULES, 1.0)
-    assert not Vote(1.0, 0.0, np.inf).denies(RULES, 1.0)
+    assert HeldOutTest(1.0, np.inf, np.inf).denies(RULES, 1.0)
+    assert not HeldOutTest(1.0, 0.0, np.inf).denies(RULES, 1.0)
 
 
 @pytest.mark.parametrize("correlation", [0.0, 0.9])

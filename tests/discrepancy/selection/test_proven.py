@@ -7,7 +7,7 @@ import pytest
 from made_verdicts import made_set, made_verdict
 
 from pymoo_hdte.discrepancy._evidence.order_lines.candidates import out_of_tolerance
-from pymoo_hdte.discrepancy._selection.excess import Vote
+from pymoo_hdte.discrepancy._selection.excess import HeldOutTest
 from pymoo_hdte.discrepancy._selection.reason import HELD_OUT_ERROR_GROWS, NOT_VALIDATED, Reason
 from pymoo_hdte.discrepancy._selection.rules import RULES
 from pymoo_hdte.discrepancy._verdicts.gap import Gap, grows
@@ -47,17 +47,18 @@ def test_noise_alone_seldom_makes_a_true_change_look_denied(rng):
         before = np.sum((noise + direction) ** 2, axis=1)
         after = np.sum(noise**2, axis=1)
         denied = [
-            Vote(*pair, change).denies(RULES, 1.0) for pair in zip(before, after, strict=True)
+            HeldOutTest(*pair, change).denies(RULES, 1.0)
+            for pair in zip(before, after, strict=True)
         ]
         assert np.mean(denied) < 0.03
 
 
 def test_a_small_change_that_makes_it_worse_than_chance_allows_is_denied():
     """Those of two campaigns with an error that grows with load, named a zero and a clearance."""
-    assert Vote(426.1, 451.3, 9.36).denies(RULES, 1.0)
-    assert Vote(417.3, 420.3, 14.08).denies(RULES, 1.0)
-    assert not Vote(586.2, 586.4, 0.02).denies(RULES, 1.0)
-    assert not Vote(500.0, 500.0, 0.0).denies(RULES, 1.0)
+    assert HeldOutTest(426.1, 451.3, 9.36).denies(RULES, 1.0)
+    assert HeldOutTest(417.3, 420.3, 14.08).denies(RULES, 1.0)
+    assert not HeldOutTest(586.2, 586.4, 0.02).denies(RULES, 1.0)
+    assert not HeldOutTest(500.0, 500.0, 0.0).denies(RULES, 1.0)
 
 
 def test_a_growth_within_the_noise_of_the_metric_is_none():
@@ -80,8 +81,8 @@ def test_noise_makes_one_of_several_errors_grow_as_seldom_as_one(rng):
 def test_a_value_out_of_tolerance_and_its_effect_are_one_answer():
     base = [SimpleNamespace(name=name, start=1.0) for name in ("load_inertia", "stiffness")]
     inertia, stiffness = out_of_tolerance(base, ["load_inertia", "stiffness"], (), together=True)
-    assert inertia.says == ("load_inertia", "output")
-    assert stiffness.says == ("parameter", "stiffness")
+    assert inertia.named_effect == ("load_inertia", "output")
+    assert stiffness.named_effect == ("parameter", "stiffness")
 
 
 def line(order, side):

@@ -61,7 +61,7 @@ def test_a_second_effect_is_sought_beside_the_loop_and_not_beside_springs(
     forms = [one for one in laws if one.only_as_form]
     search = Search(data, base, searched, screen(data, base, searched), forms)
     search.singles()
-    assert (search.found[0].label == LOOP) == mended
+    assert (search.hypotheses[0].label == LOOP) == mended
 
 
 def test_what_creeps_in_a_record_is_noise_beside_such_a_loop():

@@ -226,9 +226,9 @@ def test_the_next_test_sets_what_was_found_against_its_rival():
     assert test.separates == ("coulomb_friction:spring", "stribeck_friction:spring")
     assert "train 4" in test.description or "another motion" in test.description
     alone = cubic_analysis()[0].next_experiment()
-    assert "no rival is left" in alone.description
+    assert "no competing hypothesis" in alone.description
     unknown = next_test(finding_on(swinging_stiffness))
-    assert "proved" not in unknown.description
+    assert "validates" not in unknown.description
 
 
 def test_a_repetition_is_told_by_its_travel_its_rate_and_the_speed_that_they_make():

@@ -235,7 +235,7 @@ def test_the_delay_of_an_encoder_is_not_told_from_friction():
         late * STIFFNESS, rel=0.02
     )
     (told,) = (one for one in torsion_limits(finding) if "encoder is read 2 ms" in one)
-    assert f"whole joint is {DAMPING:.3g} only" in told
+    assert f"whole joint is only {DAMPING:.3g}" in told
     assert "in the other order" in torsion_test(finding)
 
 
@@ -251,7 +251,7 @@ def test_effects_that_make_the_held_out_torsion_worse_are_not_named():
     told = replace(finding, verdict=verdict)
     both = JointFinding(joint, torque=told, torsion=told, gaps=())
     assert wiring_doubts(both) == []
-    (words,) = (one for one in torsion_limits(both) if "none is named" in one)
+    (words,) = (one for one in torsion_limits(both) if "None is named" in one)
     assert "soft windup" in words
 
 

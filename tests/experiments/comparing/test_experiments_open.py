@@ -15,8 +15,7 @@ from pymoo.optimize import minimize
 from pymoo.problems import get_problem
 
 from experiments.command_line import main
-from experiments.comparing.named import algorithm_named, problem_named
-from experiments.comparing.open_runs import OpenRun
+from experiments.comparing.named import OpenRun, algorithm_named, problem_named
 from experiments.comparing.paired import compare
 from experiments.comparing.quality import TrueFront
 from experiments.comparing.references import reference

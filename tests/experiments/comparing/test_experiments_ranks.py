@@ -12,6 +12,7 @@ from hypothesis.extra.numpy import arrays
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from scipy.stats import friedmanchisquare
 
+from experiments.comparing.figures import critical_difference_plot, rank_heatmap
 from experiments.comparing.ranks import (
     average_ranks,
     cliques,
@@ -21,7 +22,6 @@ from experiments.comparing.ranks import (
     problem_ranks,
     rank_intervals,
 )
-from experiments.comparing.ranks_figures import critical_difference_plot, rank_heatmap
 from experiments.comparing.rivals import holm_against, outcomes, signs_against, win_tie_loss
 from pymoo_hdte.checks import InvalidInput
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from experiments.comparing.rates import Estimate, mean, median, rate
+from experiments.comparing.statistics import Estimate, mean, median, rate
 from experiments.runner.result import MISSED, NOT_SHOWN, SHOWN, Finding, scored
 
 

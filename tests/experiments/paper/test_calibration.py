@@ -15,7 +15,15 @@ from experiments.paper.calibrating.data import (
     read_outcomes,
 )
 from experiments.paper.calibrating.experiment import OUTCOMES, best_rungs
-from experiments.paper.calibrating.fitting import Budget, Fit, _refine, _residuals, outcome_row
+from experiments.paper.calibrating.fitting import (
+    TRAITS,
+    Budget,
+    Fit,
+    _refine,
+    _residuals,
+    front_traits,
+    outcome_row,
+)
 from experiments.paper.calibrating.ladder import (
     EFFECTS,
     KNOWN,
@@ -41,7 +49,6 @@ from experiments.paper.calibrating.rigid import (
     inverse_moments,
     simplest,
 )
-from experiments.paper.calibrating.trade_off import TRAITS, front_traits
 from experiments.paper.scatter import dte_samples
 from experiments.published_values import TABLE_9
 from experiments.runner.campaign import Campaign

@@ -5,29 +5,27 @@ import pytest
 from night import others_at_night
 from scipy import stats
 
-from experiments.comparing.rates import at_least
+from experiments.comparing.statistics import at_least
 from experiments.paper import later_prototypes, table2, table3
 from experiments.paper.bench.campaign import draw_campaign, slope_error_per_noise, summaries
 from experiments.paper.static_error import statistics as static_error_statistics
-from experiments.paper.static_error.normality import (
-    pooled_rejection_rate,
-    possible_sizes,
-    shapiro_p,
-)
-from experiments.paper.static_error.sources import (
-    outlier_counts,
-    power,
-    prototypes_needed,
-    spoilt_readings,
-)
 from experiments.paper.static_error.statistics import (
     READINGS,
     angle_ranges,
     components,
     of_component,
+    outlier_counts,
+    power,
     prototypes,
+    prototypes_needed,
     sample_statistics,
+    spoilt_readings,
     tooth_order_error,
+)
+from experiments.paper.static_error.tables import (
+    pooled_rejection_rate,
+    possible_sizes,
+    shapiro_p,
 )
 from experiments.published_values import TABLE_2, TABLE_3, TABLE_6
 from experiments.runner.campaign import Campaign

@@ -9,9 +9,16 @@ from numpy.polynomial.legendre import leggauss
 from scipy.signal import butter, sosfreqz
 
 from experiments.comparing.runs import robust_problem
-from experiments.paper import design_tables, fig12, published, table8
-from experiments.paper.choices import BAND, initial_choices, paper_choices
-from experiments.paper.design_tables import _idle_sweep, deviation_table
+from experiments.paper import fig12, published, table8
+from experiments.paper.choices import (
+    BAND,
+    design_indices,
+    falls_when_halved,
+    initial_choices,
+    paper_choices,
+    scatter_indices,
+    study_designs,
+)
 from experiments.paper.models import FITTED
 from experiments.paper.prototypes.consistency import Prediction, best_case_table, consistency_table
 from experiments.paper.prototypes.printed_validation import (
@@ -28,22 +35,25 @@ from experiments.paper.prototypes.printed_validation import (
     bounds,
     nearest_assignment,
 )
-from experiments.paper.prototypes.records import record
 from experiments.paper.scatter import exact_moments
-from experiments.paper.shares import (
-    design_indices,
-    falls_when_halved,
-    scatter_indices,
-    study_designs,
-)
+from experiments.paper.table6 import record
+from experiments.paper.table8 import _idle_sweep, deviation_table
 from experiments.published_values import TABLE_6, Moments
 from experiments.runner.campaign import Campaign
 from experiments.runner.registry import Context
 from experiments.runner.store import load, png_bytes, save
 from experiments.studies import dte_map, sensitivity
-from experiments.studies.accuracy_per_run import Trial, needed_table
-from experiments.studies.chaospy_twins import chaos, compare
-from experiments.studies.rival_surrogates import FAMILIES, SCREENED, TENSOR, fit_grid, rivals
+from experiments.studies.crosscheck import (
+    FAMILIES,
+    SCREENED,
+    TENSOR,
+    Trial,
+    chaos,
+    compare,
+    fit_grid,
+    needed_table,
+    rivals,
+)
 from pymoo_hdte.decision import deviation_degree
 from pymoo_hdte.drive import (
     PARAMETERS,
@@ -284,8 +294,8 @@ class TestFitted:
     def test_optima_that_random_designs_dominate_are_not_of_this_model(
         self, share, words, verdict, monkeypatch
     ):
-        monkeypatch.setattr(design_tables, "dominating_shares", lambda _: {"balanced": share})
-        _, _, *found = design_tables.optima_table(paper_choices()).findings
+        monkeypatch.setattr(table8, "dominating_shares", lambda _: {"balanced": share})
+        _, _, *found = table8.optima_table(paper_choices()).findings
         assert [finding.verdict for finding in found] == [verdict] * len(FITTED)
         assert all(f" is {words} (balanced)." in finding.sentence for finding in found)
 

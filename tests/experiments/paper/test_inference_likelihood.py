@@ -8,7 +8,6 @@ from numpy.polynomial.legendre import leggauss
 from experiments.paper.calibrating.ladder import EFFECTS, KNOWN, NARROW, WIDE, Candidate
 from experiments.paper.calibrating.predictions import surrogate_moments
 from experiments.paper.inference.closures import CLOSURES
-from experiments.paper.inference.draws import JointValues, sampling_covariance
 from experiments.paper.inference.likelihood import (
     BAND,
     DRAWS,
@@ -20,7 +19,12 @@ from experiments.paper.inference.likelihood import (
     least_deviance,
     residuals_of,
 )
-from experiments.paper.inference.moments import TensorSurrogate, place
+from experiments.paper.inference.moments import (
+    JointValues,
+    TensorSurrogate,
+    place,
+    sampling_covariance,
+)
 from experiments.paper.inference.rungs import (
     COLUMNS,
     Rung,
@@ -28,7 +32,7 @@ from experiments.paper.inference.rungs import (
     dte_arcsec,
     rung_named,
 )
-from experiments.paper.quadrature import gauss_rule
+from experiments.paper.scatter import gauss_rule
 from experiments.published_values import TABLE_9
 from pymoo_hdte.drive import preset
 from pymoo_hdte.problems import RobustDTE

@@ -19,11 +19,11 @@ from experiments.paper.inference.node_noise import (
     published_influence,
     share_of_noise,
 )
-from experiments.paper.inference.noisy_front import noisy_choice
 from experiments.paper.inference.rungs import RIGID, Rung, all_rungs, noisy_rungs
 from experiments.paper.inference.verdicts import (
     WITHIN,
     noise_that_excuses,
+    noisy_choice,
     step_errors,
     uncertainty_of_steps,
 )

@@ -9,10 +9,10 @@ from experiments.paper.calibrating.ladder import EFFECTS, KNOWN, NARROW, Candida
 from experiments.paper.inference import likelihood, posterior
 from experiments.paper.inference.knowledge import interval
 from experiments.paper.inference.likelihood import evaluate, least_deviance, residuals_of
-from experiments.paper.inference.optimum import optima
 from experiments.paper.inference.posterior import (
     Posterior,
     near,
+    optima,
     profiles,
     sample,
     scaled_jacobian,

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from experiments.paper import later_prototypes, printed_times
-from experiments.paper.design_tables import box_finding
-from experiments.paper.prototypes import ranking
+from experiments.paper import later_prototypes, table8
+from experiments.paper.prototypes import consistency
 from experiments.paper.prototypes.consistency import bounds_table
 from experiments.paper.prototypes.printed_validation import (
     HALF_DIGIT,
@@ -23,8 +22,9 @@ from experiments.paper.prototypes.printed_validation import (
     least_lead_unrounded,
     mean_error_interval,
 )
-from experiments.paper.static_error import normality_tables
-from experiments.paper.static_error.normality import implied_size, shapiro_p
+from experiments.paper.static_error import tables
+from experiments.paper.static_error.tables import implied_size, shapiro_p
+from experiments.paper.table8 import box_finding
 from experiments.published_values import DESIGN_BOX, TABLE_2, TABLE_3, TABLE_6, TABLE_9
 from pymoo_hdte.drive import hs_20_100
 from pymoo_hdte.identification import largest_deviation
@@ -89,10 +89,10 @@ class TestRanking:
     def test_a_response_that_grows_with_theta_s_needs_more_of_the_design(self, rng):
         static = np.array([prototype.theta_s_arcsec for prototype in TABLE_6.values()])
         truth, error = measured(rng, 5000), residuals(rng, 0, 5000)
-        for demand in ranking.demands():
+        for demand in consistency.demands():
             by_design = truth - error - demand.slope * static
             assert (by_design[:, HIGH] - by_design[:, LOW]).min() >= demand.by_design
-            assert demand.by_design > ranking.reach()
+            assert demand.by_design > consistency.reach()
 
     def test_the_reach_is_that_of_a_linear_response_between_opposite_corners(self, rng):
         """Its least value over the box lies as far below the centre as the greatest above it."""
@@ -107,13 +107,13 @@ class TestRanking:
         assert np.abs(designs / centre - 1.0).max() < DESIGN_BOX
 
     def test_it_contradicts_the_tables_only_while_the_designs_cannot_do_it(self, monkeypatch):
-        (finding,) = ranking.ranking_table().findings
+        (finding,) = consistency.ranking_table().findings
         assert (finding.within_paper, finding.agrees) == (True, False)
-        assert ranking.of_the_first_page()
-        monkeypatch.setattr(ranking, "reach", lambda: 14.0)
-        (finding,) = ranking.ranking_table().findings
+        assert consistency.of_the_first_page()
+        monkeypatch.setattr(consistency, "reach", lambda: 14.0)
+        (finding,) = consistency.ranking_table().findings
         assert finding.agrees
-        assert not ranking.of_the_first_page()
+        assert not consistency.of_the_first_page()
 
     def test_the_interval_of_the_mean_error_is_that_of_a_t_test(self):
         values = residuals(np.random.default_rng(1), 2, 1)[0]
@@ -145,9 +145,9 @@ class TestShapiroWilk:
         assert share < 0.02
 
     def test_the_page_finds_no_size_that_fits_twenty(self):
-        (finding,) = normality_tables.sizes_table().findings
+        (finding,) = tables.sizes_table().findings
         assert (finding.within_paper, finding.agrees) == (True, False)
-        low, high = normality_tables.common_sizes()
+        low, high = tables.common_sizes()
         assert low <= 200 <= high
 
 
@@ -202,26 +202,26 @@ class TestLaterPrototypes:
 
 class TestTimes:
     def test_a_run_is_the_printed_time_as_often_as_designs_are_evaluated(self):
-        assert printed_times.run_seconds() == pytest.approx(sum([0.0030] * 100 * 100))
-        assert printed_times.run_seconds(1000 * 3e-6) == pytest.approx(30.0)
+        assert table8.run_seconds() == pytest.approx(sum([0.0030] * 100 * 100))
+        assert table8.run_seconds(1000 * 3e-6) == pytest.approx(30.0)
 
     def test_no_rounding_brings_it_down_to_a_run_of_table_7(self, rng):
         single = rng.uniform(2.5e-6, 3.5e-6, 1000)
         batch = rng.uniform(0.00295, 0.00305, 1000)
         seconds = np.minimum(single * 1000, batch) * 10_000
-        assert printed_times.least_run_seconds() <= seconds.min()
-        assert printed_times.least_run_seconds() > printed_times.longest_run()
+        assert table8.least_run_seconds() <= seconds.min()
+        assert table8.least_run_seconds() > table8.longest_run()
 
     def test_the_speed_ups_are_ratios_of_the_printed_times(self):
-        longer, ratios = printed_times.times_table().findings
+        longer, ratios = table8.times_table().findings
         assert (longer.within_paper, longer.agrees) == (True, False)
         assert (ratios.within_paper, ratios.agrees) == (True, True)
 
     def test_the_first_page_is_silent_where_the_times_fit(self, monkeypatch):
-        assert printed_times.of_the_first_page()
-        monkeypatch.setattr(printed_times, "longest_run", lambda: 40.0)
-        assert printed_times.times_table().findings[0].agrees
-        assert not printed_times.of_the_first_page()
+        assert table8.of_the_first_page()
+        monkeypatch.setattr(table8, "longest_run", lambda: 40.0)
+        assert table8.times_table().findings[0].agrees
+        assert not table8.of_the_first_page()
 
 
 def test_one_of_the_paper_s_optimal_values_is_a_bound_of_its_box():

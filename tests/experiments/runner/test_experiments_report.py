@@ -35,7 +35,7 @@ from experiments.runner.result import (
     significant,
 )
 from experiments.runner.store import load, png_bytes, save
-from pymoo_hdte._io.text_table import csv_text
+from pymoo_hdte._io.csv_table import csv_text
 from pymoo_hdte.checks import InvalidInput
 
 

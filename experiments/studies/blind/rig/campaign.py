@@ -24,7 +24,9 @@ class Shown:
 
 def shown(about: Circumstances, effects: Sequence[Drawn]) -> Shown:
     """Run a session with hidden effects."""
-    machine, sensors = equipped(about.machine, about.sensors, tuple(one.hidden for one in effects))
+    machine, sensors = equipped(
+        about.machine, about.sensors, tuple(effect.hidden for effect in effects)
+    )
     records = tuple(
         running(about, place, machine, sensors) for place in range(len(about.conditions))
     )
@@ -70,9 +72,9 @@ def seen_of(about: Circumstances, effect: Drawn, session: Shown, clean: Shown) -
     return visibility(about, changes, orders, bend)
 
 
-def restricted(about: Circumstances, kept: Sequence[int]) -> Circumstances:
+def restricted(about: Circumstances, conditions: Sequence[int]) -> Circumstances:
     """Return a session with some of its records only."""
-    rows = list(kept)
+    rows = list(conditions)
     return replace(
         about,
         conditions=tuple(about.conditions[row] for row in rows),

@@ -100,20 +100,20 @@ def equipped(
     Clash
         If two of them need a third body.
     """
-    for one in effects:
-        if one.third is not None and machine.third is not None:
+    for effect in effects:
+        if effect.third is not None and machine.third is not None:
             raise Clash("two third bodies")
         machine = replace(
             machine,
-            elements=(*machine.elements, *one.elements),
-            load_inertia=machine.load_inertia + one.load_inertia,
-            third=one.third or machine.third,
-            lag=machine.lag + one.lag,
+            elements=(*machine.elements, *effect.elements),
+            load_inertia=machine.load_inertia + effect.load_inertia,
+            third=effect.third or machine.third,
+            lag=machine.lag + effect.lag,
         )
         sensors = replace(
             sensors,
-            curvature=sensors.curvature + one.curvature,
-            scale=(*sensors.scale, *one.scale),
-            drift=(*sensors.drift, *one.drift),
+            curvature=sensors.curvature + effect.curvature,
+            scale=(*sensors.scale, *effect.scale),
+            drift=(*sensors.drift, *effect.drift),
         )
     return machine, sensors

@@ -14,8 +14,7 @@ from scipy.linalg import expm
 
 from experiments.studies.blind.rig.elements import Values
 from experiments.studies.blind.rig.machine import LinearPart, Matrix
-from experiments.studies.blind.rig.shapes import copy_into
-from experiments.studies.blind.rig.torques import LOAD, Plant, torques
+from experiments.studies.blind.rig.torques import LOAD, Plant, copy_into, torques
 
 
 class Step(NamedTuple):
@@ -46,13 +45,13 @@ class Readout(NamedTuple):
 def step_of(linear: LinearPart, length: float) -> Step:
     """Return the matrices of a step of ``length`` seconds."""
     half = _phi(linear, 0.5 * length, 1)
-    one, two, three = (_phi(linear, length, order) for order in (1, 2, 3))
+    order_1, two, three = (_phi(linear, length, order) for order in (1, 2, 3))
     return Step(
         length,
         expm(linear.system * length),
         expm(linear.system * 0.5 * length),
         half,
-        one - 3.0 * two + 4.0 * three,
+        order_1 - 3.0 * two + 4.0 * three,
         2.0 * two - 4.0 * three,
         4.0 * three - two,
     )
@@ -84,7 +83,7 @@ def follow(
     step: Step,
     readout: Readout,
     y: Values,
-    kept: Values,
+    memory: Values,
     before: Values,
     begin: float,
     n_settle: int,
@@ -114,36 +113,36 @@ def follow(
     """
     size = len(y)
     seen = np.empty((4, n_samples))
-    moved, now = kept.copy(), before.copy()
+    moved, now = memory.copy(), before.copy()
     f = np.zeros((4, LOAD + 1))
-    at, first = y.copy(), np.empty(size)
+    at, state = y.copy(), np.empty(size)
     since, h = begin, step.length
     for number in range((n_settle + n_samples) * substeps):
         time = begin + number * h
         for stage in range(4):
             when = time + 0.5 * h * ((stage + 1) // 2)
-            motor = torques(plant, when, at, kept, before, since, moved, now, f[stage])
+            motor = torques(plant, when, at, memory, before, since, moved, now, f[stage])
             if stage == 0:
-                copy_into(kept, moved)
+                copy_into(memory, moved)
                 copy_into(before, now)
                 since = time
                 sample = number // substeps - n_settle
                 if sample >= 0 and number % substeps == 0:
                     seen[0, sample], seen[1, sample] = y[0], y[1]
                     seen[2, sample], seen[3, sample] = read_torques(plant, readout, y, f[0], motor)
-                moving(step.halfway, y, step.half, f[0], first)
-                copy_into(at, first)
+                moving(step.halfway, y, step.half, f[0], state)
+                copy_into(at, state)
             elif stage == 1:
                 moving(step.halfway, y, step.half, f[1], at)
             elif stage == 2:
                 for j in range(3):
                     f[3, j] = 2.0 * f[2, j] - f[0, j]
-                moving(step.halfway, first, step.half, f[3], at)
-        moving(step.whole, y, step.first, f[0], first)
+                moving(step.halfway, state, step.half, f[3], at)
+        moving(step.whole, y, step.first, f[0], state)
         for j in range(3):
             f[0, j] = f[1, j] + f[2, j]
         for i in range(size):
-            total = first[i]
+            total = state[i]
             for j in range(3):
                 total += step.middle[i, j] * f[0, j] + step.last[i, j] * f[3, j]
             y[i] = total

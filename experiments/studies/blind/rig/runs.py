@@ -12,10 +12,10 @@ from experiments.studies.blind.rig import elements as el
 from experiments.studies.blind.rig.elements import Values, table
 from experiments.studies.blind.rig.integrator import follow, readout_of, step_of
 from experiments.studies.blind.rig.machine import LinearPart, Machine, Matrix, linear_part
-from experiments.studies.blind.rig.shapes import copy_into
 from experiments.studies.blind.rig.torques import (
     LOAD,
     Plant,
+    copy_into,
     elastic_torque,
     friction_torque,
     static_error,
@@ -158,20 +158,20 @@ def run(
     )
     n_samples = rows * condition.averaged
     begin = -n_settle / condition.rate
-    y, kept = np.zeros(len(linear.system)), np.zeros(len(plant.rows))
+    y, memory = np.zeros(len(linear.system)), np.zeros(len(plant.rows))
     # The brake loads the drive before the motor starts: elements with memory know the way.
     loading = load * np.linspace(0.0, 1.0, LOADING)
-    y[1] = -_locked(plant, loading, 0.0, 0.0, kept)[-1]
+    y[1] = -_locked(plant, loading, 0.0, 0.0, memory)[-1]
     y[1] -= static_error(plant, start + condition.speed * begin)[0]
     if linear.load_row == 2 and machine.third is not None:
         y[4] = y[1] - load / machine.third.stiffness
     elif machine.third is not None:
         y[4] = y[1]
-    before, moved = np.zeros(len(kept)), np.zeros(len(kept))
-    torques(plant, begin, y, kept, before, begin, moved, before, np.zeros(LOAD + 1))
+    before, moved = np.zeros(len(memory)), np.zeros(len(memory))
+    torques(plant, begin, y, memory, before, begin, moved, before, np.zeros(LOAD + 1))
     step = step_of(linear, 1.0 / (condition.rate * substeps))
     seen = follow(
-        plant, step, readout_of(linear), y, kept, before, begin, n_settle, n_samples, substeps
+        plant, step, readout_of(linear), y, memory, before, begin, n_settle, n_samples, substeps
     )
     turned = start + condition.speed * np.arange(n_samples) / condition.rate
     seen[0] += turned
@@ -205,16 +205,18 @@ def locked_torsion(machine: Machine, torque: Values, interval: float) -> Values:
         for row in plant.rows
         if row[0] in (el.DRY, el.UNEVEN) and row[7] == el.OUTPUT
     )
-    kept = np.zeros(len(plant.rows))
-    return _locked(plant, torque, interval, max(float(holding), 0.0), kept)
+    memory = np.zeros(len(plant.rows))
+    return _locked(plant, torque, interval, max(float(holding), 0.0), memory)
 
 
 @njit(cache=True)
-def _locked(plant: Plant, torque: Values, interval: float, holding: float, kept: Values) -> Values:
+def _locked(
+    plant: Plant, torque: Values, interval: float, holding: float, memory: Values
+) -> Values:
     """Return the torsion under torques (n,), and leave the states of memory in ``kept``."""
     rows = len(plant.rows)
     moved, trial, before = np.zeros(rows), np.zeros(rows), np.zeros(rows)
-    found = np.empty(len(torque))
+    torsion = np.empty(len(torque))
     carried = d = 0.0
     for place in range(len(torque)):
         carried = min(max(carried, torque[place] - holding), torque[place] + holding)
@@ -222,29 +224,29 @@ def _locked(plant: Plant, torque: Values, interval: float, holding: float, kept:
         low, high = -reach, reach
         for _ in range(_HALVINGS):
             middle = 0.5 * (low + high)
-            if _static(plant, middle, kept, before, moved, trial) < carried:
+            if _static(plant, middle, memory, before, moved, trial) < carried:
                 low = middle
             else:
                 high = middle
         d = 0.5 * (low + high)
-        _static(plant, d, kept, before, moved, trial)
-        copy_into(kept, trial)
+        _static(plant, d, memory, before, moved, trial)
+        copy_into(memory, trial)
         for e in range(rows):
             before[e] = d
             row = plant.rows[e]
             if row[0] == el.CREEP:
-                kept[e] += (row[1] * d - kept[e]) * (1.0 - math.exp(-interval / row[2]))
-        found[place] = d
-    return found
+                memory[e] += (row[1] * d - memory[e]) * (1.0 - math.exp(-interval / row[2]))
+        torsion[place] = d
+    return torsion
 
 
 @njit(cache=True)
 def _static(
-    plant: Plant, d: float, kept: Values, before: Values, moved: Values, trial: Values
+    plant: Plant, d: float, memory: Values, before: Values, moved: Values, trial: Values
 ) -> float:
     """Return the torque that holds a torsion, N.m, and write states of memory to ``trial``."""
-    copy_into(moved, kept)
-    total = elastic_torque(plant, d, 0.0, 0.0, 0.0, kept, before, moved)
+    copy_into(moved, memory)
+    total = elastic_torque(plant, d, 0.0, 0.0, 0.0, memory, before, moved)
     copy_into(trial, moved)
     for e in range(len(plant.rows)):
         row = plant.rows[e]
@@ -252,6 +254,6 @@ def _static(
             # The output turns back as the torsion grows: its friction opposes both.
             way = d - before[e]
             aim = math.copysign(1.0, way)
-            trial[e] = aim + (kept[e] - aim) * math.exp(-abs(way) / row[4])
+            trial[e] = aim + (memory[e] - aim) * math.exp(-abs(way) / row[4])
             total += (row[1] + row[2]) * trial[e]
     return total

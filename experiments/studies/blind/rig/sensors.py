@@ -8,7 +8,7 @@ import numpy as np
 
 from experiments.studies.blind.rig.elements import Values
 from experiments.studies.blind.rig.machine import Matrix
-from experiments.studies.blind.rig.shapes import wave
+from experiments.studies.blind.rig.torques import wave
 
 
 @dataclass(frozen=True)

@@ -163,10 +163,10 @@ def draw_circumstances(
         gains=(float(share[0] * sheet.gain), float(share[1] * sheet.gain)),
         zeros=(float(share[2] * sheet.input_zero), float(share[3] * sheet.output_zero)),
     )
-    set_loads = np.array([one.load for one in conditions])
+    set_loads = np.array([condition.load for condition in conditions])
     loads = set_loads + LOAD_SETTING * rng.standard_normal(records) * (set_loads != 0.0)
     order = rng.permutation(records)
-    lasting = np.array([one.duration(RATIO) + PAUSE for one in conditions])
+    lasting = np.array([condition.duration(RATIO) + PAUSE for condition in conditions])
     clocks = np.empty(records)
     clocks[order] = np.concatenate([[0.0], np.cumsum(lasting[order])[:-1]])
     spread = sheet.repeatability / lines**0.5
@@ -214,8 +214,8 @@ def sweep(machine: Machine, sensors: Sensors) -> Matrix:
 
 def row_times(condition: Condition, rows: int) -> Values:
     """Return the middle times of rows, s, shape (rows,)."""
-    first = 0.5 * (1.0 - 1.0 / condition.averaged)
-    return (np.arange(float(rows)) + first) * (condition.averaged / condition.rate)
+    weight = 0.5 * (1.0 - 1.0 / condition.averaged)
+    return (np.arange(float(rows)) + weight) * (condition.averaged / condition.rate)
 
 
 def averaged_rows(condition: Condition, shown: Matrix) -> Matrix:

@@ -5,19 +5,119 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 from experiments.studies.blind.rig import elements as el
 from experiments.studies.blind.rig.elements import Values
-from experiments.studies.blind.rig.shapes import (
-    beyond_gap,
-    bouc_wen,
-    bump,
-    copy_into,
-    decay,
-    rounded_sign,
-    wave,
-)
+
+MEAN_OF_BUMP = 1.2660658777520084
+"""I0(1), mean of exp(cos x) over a period."""
+TRAPEZOID = 3.0
+"""How steep the sides of the rounded trapezoid are."""
+
+
+@njit(cache=True)
+def copy_into(target: NDArray[np.float64], source: NDArray[np.float64]) -> None:
+    """Copy an array (n,) into another; slices take seconds to compile, for words of an error."""
+    for place in range(len(source)):
+        target[place] = source[place]
+
+
+@njit(cache=True)
+def wave(form: float, x: float) -> tuple[float, float]:
+    """Return a wave of period 2 pi without mean, of amplitude near 1, and its slope.
+
+    0 is a cosine, 1 one with 30 % of its second harmonic, 2 a rounded trapezoid, 3 a narrow crest.
+    """
+    cosine, sine = math.cos(x), math.sin(x)
+    if form == 1.0:
+        return cosine + 0.3 * math.cos(2.0 * x + 1.0), -sine - 0.6 * math.sin(2.0 * x + 1.0)
+    if form == 2.0:
+        value, top = math.tanh(TRAPEZOID * cosine), math.tanh(TRAPEZOID)
+        return value / top, -TRAPEZOID * (1.0 - value * value) * sine / top
+    if form == 3.0:
+        crest = math.exp(cosine)
+        return crest - MEAN_OF_BUMP, -crest * sine
+    return cosine, -sine
+
+
+@njit(cache=True)
+def decay(form: float, x: float) -> float:
+    """Return a curve that falls from 1 at x = 0: Gaussian, exponential or rational."""
+    if form == 1.0:
+        return math.exp(-abs(x))
+    if form == 2.0:
+        return 1.0 / (1.0 + x * x)
+    return math.exp(-x * x)
+
+
+@njit(cache=True)
+def rounded_sign(form: float, x: float) -> float:
+    """Return a sign rounded over x of about 1: tanh, arc tangent or root."""
+    if form == 1.0:
+        return 2.0 / math.pi * math.atan(0.5 * math.pi * x)
+    if form == 2.0:
+        return x / math.sqrt(1.0 + x * x)
+    return math.tanh(x)
+
+
+@njit(cache=True)
+def beyond_gap(form: float, x: float, half_width: float) -> float:
+    """Return the deflection of flanks with a gap: sharp, of soft skin, or of round contact."""
+    distance = abs(x) - half_width
+    if form == 1.0:
+        skin = 0.3 * half_width + 1e-15
+        # Two soft contacts, one on each side.
+        upper = skin * _softplus((x - half_width) / skin)
+        return upper - skin * _softplus((-x - half_width) / skin)
+    if distance <= 0.0:
+        return 0.0
+    if form == 2.0:
+        round_off = 0.25 * half_width
+        distance = math.sqrt(distance * distance + round_off * round_off) - round_off
+    return math.copysign(distance, x)
+
+
+@njit(cache=True)
+def _softplus(x: float) -> float:
+    return max(x, 0.0) + math.log1p(math.exp(-abs(x)))
+
+
+@njit(cache=True)
+def bouc_wen(z: float, way: float, exponent: float, beta: float) -> float:
+    """Return the state after a way in units of the torsion of yield, z between -1 and 1.
+
+    dz/dx = 1 - |z|^n (beta sgn(dx z) + 1 - beta): midpoint steps of a twentieth of the yield.
+    """
+    steps = 1 + int(20.0 * abs(way))
+    part = way / steps
+    for _ in range(steps):
+        middle = z + 0.5 * part * _bouc_wen_slope(z, part, exponent, beta)
+        z += part * _bouc_wen_slope(middle, part, exponent, beta)
+        z = min(max(z, -1.0), 1.0)
+    return z
+
+
+@njit(cache=True)
+def _bouc_wen_slope(z: float, way: float, exponent: float, beta: float) -> float:
+    turn = 1.0 if way * z > 0.0 else -1.0
+    return 1.0 - abs(z) ** exponent * (beta * turn + 1.0 - beta)
+
+
+@njit(cache=True)
+def bump(time: float, period: float, width: float) -> float:
+    """Return a smooth pulse of height 1 at an irregular moment of every period."""
+    number = math.floor(time / period)
+    # The golden ratio spreads the moments evenly and never repeats them.
+    place = number * 0.6180339887498949
+    begin = number * period + (place - math.floor(place)) * (period - width)
+    share = (time - begin) / width
+    if share <= 0.0 or share >= 1.0:
+        return 0.0
+    return math.sin(math.pi * share) ** 2
+
 
 RATED = 40.0
 """N.m, at which friction by load with another exponent than 1 has its share."""
@@ -75,7 +175,7 @@ def elastic_torque(
     angle: float,
     speed: float,
     time: float,
-    kept: Values,
+    memory: Values,
     before: Values,
     moved: Values,
 ) -> float:
@@ -91,7 +191,7 @@ def elastic_torque(
             half_width = max(row[1] + row[2] * height * (1.0 - row[6]), 0.0)
             d = beyond_gap(row[5], d - row[2] * height * row[6], half_width)
         elif row[0] == el.CREEP:
-            d -= kept[e]
+            d -= memory[e]
     for e in range(len(plant.rows)):
         row = plant.rows[e]
         kind = row[0]
@@ -105,8 +205,8 @@ def elastic_torque(
         elif kind == el.OVERLOAD:
             x = size - row[2]
             pressed = 0.5 * (x + math.sqrt(x * x + row[3] * row[3]))
-            rest = 0.5 * (-row[2] + math.sqrt(row[2] * row[2] + row[3] * row[3]))
-            further += row[1] * math.copysign(pressed - rest, d)
+            resting = 0.5 * (-row[2] + math.sqrt(row[2] * row[2] + row[3] * row[3]))
+            further += row[1] * math.copysign(pressed - resting, d)
         elif kind == el.SOFT_ROOT:
             further -= row[1] * d / math.sqrt(1.0 + (d / row[2]) ** 2)
         elif kind == el.SOFT_PIECES:
@@ -117,11 +217,11 @@ def elastic_torque(
             reach = 2.0 * row[2] / math.pi
             further -= row[1] * reach * math.atan(d / reach)
         elif kind == el.SLIP:
-            stuck = kept[e] + row[1] * (torsion - before[e])
+            stuck = memory[e] + row[1] * (torsion - before[e])
             moved[e] = min(max(stuck, -row[2]), row[2])
             further += moved[e]
         elif kind == el.BOUC_WEN:
-            moved[e] = bouc_wen(kept[e], (torsion - before[e]) / row[2], row[3], row[4])
+            moved[e] = bouc_wen(memory[e], (torsion - before[e]) / row[2], row[3], row[4])
             further += row[1] * moved[e]
         elif kind == el.STIFFNESS_WAVE:
             factor += row[1] * wave(row[4], row[2] * angle + row[3])[0]
@@ -176,7 +276,7 @@ def torques(
     plant: Plant,
     time: float,
     y: Values,
-    kept: Values,
+    memory: Values,
     before: Values,
     since: float,
     moved: Values,
@@ -196,10 +296,10 @@ def torques(
     value, slope = static_error(plant, angle)
     d = y[0] / plant.ratio - y[1] - value
     rate = y[2] / plant.ratio - y[3] - slope * speed
-    copy_into(moved, kept)
+    copy_into(moved, memory)
     for e in range(len(now)):
         now[e] = d
-    spring = elastic_torque(plant, d, angle, speed, time, kept, before, moved)
+    spring = elastic_torque(plant, d, angle, speed, time, memory, before, moved)
     dashpot = plant.damping * rate
     motor, on_input, on_output, load = plant.motor, 0.0, 0.0, plant.load
     for row in plant.rows:
@@ -211,11 +311,11 @@ def torques(
         row = plant.rows[e]
         kind = row[0]
         if kind == el.CREEP:
-            moved[e] = relaxed(kept[e], row[1] * d, (time - since) / row[2])
+            moved[e] = relaxed(memory[e], row[1] * d, (time - since) / row[2])
         elif kind == el.REACTION:
             aim = slope * (spring if row[2] == 1.0 else mesh)
             if row[3] > 0.0:
-                moved[e] = relaxed(kept[e], aim, (time - since) / row[3])
+                moved[e] = relaxed(memory[e], aim, (time - since) / row[3])
                 aim = moved[e]
             on_input += row[1] * aim
         elif kind == el.BRISTLES:
@@ -223,7 +323,7 @@ def torques(
             now[e] = out_angle if out else angle
             w = out_speed if out else speed
             way = now[e] - before[e]
-            moved[e] = relaxed(kept[e], math.copysign(1.0, way), abs(way) / row[4])
+            moved[e] = relaxed(memory[e], math.copysign(1.0, way), abs(way) / row[4])
             torque = (row[1] + row[2] * decay(row[5], w / row[3])) * moved[e]
             if out:
                 on_output -= torque
@@ -237,7 +337,7 @@ def torques(
             load += plant.load * row[1] * wave(row[4], row[2] * out_angle + row[3])[0]
         elif kind >= el.DRY:
             if kind == el.MESH_FRICTION:
-                moved[e] = relaxed(kept[e], mesh, (time - since) / row[2])
+                moved[e] = relaxed(memory[e], mesh, (time - since) / row[2])
             if row[7] == el.OUTPUT:
                 on_output -= friction_torque(plant, row, out_speed, out_angle, clock, moved[e])
             else:

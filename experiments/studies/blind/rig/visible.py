@@ -23,8 +23,7 @@ from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
 from experiments.studies.blind.rig.elements import Values
-from experiments.studies.blind.rig.machine import Machine, Matrix
-from experiments.studies.blind.rig.response import lines, means, response
+from experiments.studies.blind.rig.machine import Machine, Matrix, linear_part
 from experiments.studies.blind.rig.session import (
     SHEET,
     UNCERTAIN,
@@ -47,7 +46,9 @@ _EVER = (1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 2.02)
 def orders_seen(ratio: float, further: Sequence[float] = ()) -> Values:
     """Return the orders whose lines count, cycles per input turn."""
     wanted = [1.0 / ratio, 2.0 / ratio, *_EVER]
-    wanted += [one for one in further if min(abs(one - other) for other in wanted) > 0.005]
+    wanted += [
+        effect for effect in further if min(abs(effect - second) for second in wanted) > 0.005
+    ]
     return np.array(sorted(wanted))
 
 
@@ -69,13 +70,13 @@ def visibility(
 
     ``sweep`` (k,) is the change of the angle in the torsion sweep, rad.
     """
-    kept = list(changes)
-    change = np.concatenate([one.ravel() for one in changes.values()])
-    noise = np.concatenate([_noise(about, place, orders).ravel() for place in kept])
-    sizes = np.concatenate([_sizes(one).ravel() for one in changes.values()])
+    names = list(changes)
+    change = np.concatenate([change.ravel() for change in changes.values()])
+    noise = np.concatenate([_noise(about, place, orders).ravel() for place in names])
+    sizes = np.concatenate([_sizes(change).ravel() for change in changes.values()])
     noise = np.hypot(noise, LINEAR * sizes)
-    within, low, high = _of_base(about, kept, orders)
-    costly = np.column_stack([_of_sensors(about, kept, orders), _unrepeated(about, kept, orders)])
+    within, low, high = _of_base(about, names, orders)
+    costly = np.column_stack([_of_sensors(about, names, orders), _unrepeated(about, names, orders)])
     count = costly.shape[1]
     columns = np.vstack(
         [
@@ -88,8 +89,8 @@ def visibility(
     _, triangle = np.linalg.qr(np.column_stack([columns, target]))
     ends = np.full(count, np.inf)
     bounds = np.concatenate([low, -ends]), np.concatenate([high, ends])
-    found = lsq_linear(triangle[:, :-1], triangle[:, -1], bounds)
-    return float(np.sqrt(2.0 * found.cost + _bend(about, sweep)))
+    solution = lsq_linear(triangle[:, :-1], triangle[:, -1], bounds)
+    return float(np.sqrt(2.0 * solution.cost + _bend(about, sweep)))
 
 
 def _sizes(change: Matrix) -> Matrix:
@@ -103,8 +104,8 @@ def _bend(about: Circumstances, sweep: Values) -> float:
     """Return the square of what of a sweep no straight line over the torque explains."""
     torque = sweep_torque()
     basis = np.column_stack([np.ones(len(torque)), torque])
-    left = sweep - basis @ np.linalg.lstsq(basis, sweep, rcond=None)[0]
-    return float(left @ left) / about.sensors.torsion_noise**2
+    residual = sweep - basis @ np.linalg.lstsq(basis, sweep, rcond=None)[0]
+    return float(residual @ residual) / about.sensors.torsion_noise**2
 
 
 def _noise(about: Circumstances, record: int, orders: Values) -> Matrix:
@@ -118,20 +119,20 @@ def _noise(about: Circumstances, record: int, orders: Values) -> Matrix:
 
 def _placed(mean: Values, phasors: NDArray[np.complex128], at: Values, orders: Values) -> Values:
     """Return features (3 (1 + 2 m),) with means (3,) and phasors (k, 3) at some orders (k,)."""
-    found = np.zeros((3, 1 + 2 * len(orders)))
-    found[:, 0] = mean
+    readings = np.zeros((3, 1 + 2 * len(orders)))
+    readings[:, 0] = mean
     for phasor, order in zip(phasors, at, strict=True):
         line = int(np.argmin(np.abs(orders - order)))
-        found[:, 1 + line] = phasor.real
-        found[:, 1 + len(orders) + line] = -phasor.imag
-    return found.ravel()
+        readings[:, 1 + line] = phasor.real
+        readings[:, 1 + len(orders) + line] = -phasor.imag
+    return readings.ravel()
 
 
 def _predicted(
-    about: Circumstances, machine: Machine, kept: Sequence[int], orders: Values
+    about: Circumstances, machine: Machine, rows: Sequence[int], orders: Values
 ) -> Values:
     parts = []
-    for record in kept:
+    for record in rows:
         speed = about.conditions[record].speed
         mean = means(machine, float(about.loads[record]), speed)
         parts.append(_placed(mean, lines(machine, speed), np.array(machine.orders), orders))
@@ -139,23 +140,23 @@ def _predicted(
 
 
 def _of_base(
-    about: Circumstances, kept: Sequence[int], orders: Values
+    about: Circumstances, rows: Sequence[int], orders: Values
 ) -> tuple[Matrix, Values, Values]:
     """Return what a tolerance of each base parameter changes, and how far each may move.
 
     Shapes (features, p), (p,) and (p,); in tolerances from its true value.
     """
     machine, columns, ends = about.machine, [], []
-    stands = _predicted(about, machine, kept, orders)
+    stands = _predicted(about, machine, rows, orders)
     step = 1e-4
     for name in UNCERTAIN:
         true = getattr(machine, name) / getattr(SHEET, name)
-        other = replace(machine, **{name: getattr(SHEET, name) * (true + step)})
-        moved = _predicted(about, other, kept, orders) - stands
+        changed = replace(machine, **{name: getattr(SHEET, name) * (true + step)})
+        moved = _predicted(about, changed, rows, orders) - stands
         columns.append(moved / step * SHEET.tolerance)
         ends.append(_ends((1.0 - true) / SHEET.tolerance))
     silent = replace(machine, amplitudes=(0.0,) * len(machine.orders))
-    still = _predicted(about, silent, kept, orders)
+    still = _predicted(about, silent, rows, orders)
     for line, (amplitude, believed) in enumerate(
         zip(machine.amplitudes, SHEET.amplitudes, strict=True)
     ):
@@ -163,12 +164,12 @@ def _of_base(
         for turn in (0.0, np.pi / 2.0):
             alone = np.eye(len(machine.orders))[line] * reach
             phases = [phase + turn for phase in machine.phases]
-            other = replace(machine, amplitudes=tuple(alone), phases=tuple(phases))
-            columns.append(_predicted(about, other, kept, orders) - still)
+            changed = replace(machine, amplitudes=tuple(alone), phases=tuple(phases))
+            columns.append(_predicted(about, changed, rows, orders) - still)
         # A line that turns by more than this is shorter than the tolerance allows, to this order.
         turned = (1.0 - (1.0 - SHEET.error_tolerance) ** 2) ** 0.5 / SHEET.error_tolerance
         ends += [_ends((believed - amplitude) / reach), (-turned, turned)]
-    level = np.zeros((len(kept), 3, 1 + 2 * len(orders)))
+    level = np.zeros((len(rows), 3, 1 + 2 * len(orders)))
     level[:, 0, 0] = SHEET.windup
     columns.append(level.ravel())
     ends.append((-np.inf, np.inf))
@@ -182,10 +183,10 @@ def _ends(middle: float) -> tuple[float, float]:
     return min(middle - 1.0, -0.01), max(middle + 1.0, 0.01)
 
 
-def _of_sensors(about: Circumstances, kept: Sequence[int], orders: Values) -> Matrix:
+def _of_sensors(about: Circumstances, rows: Sequence[int], orders: Values) -> Matrix:
     """Return what gains and zeros of the torque sensors change, shape (features, 4)."""
-    shape, columns = (len(kept), 3, 1 + 2 * len(orders)), []
-    stands = _predicted(about, about.machine, kept, orders).reshape(shape)
+    shape, columns = (len(rows), 3, 1 + 2 * len(orders)), []
+    stands = _predicted(about, about.machine, rows, orders).reshape(shape)
     for channel, zero in ((1, SHEET.input_zero), (2, SHEET.output_zero)):
         level, grown = np.zeros(shape), np.zeros(shape)
         level[:, channel, 0] = zero
@@ -194,12 +195,12 @@ def _of_sensors(about: Circumstances, kept: Sequence[int], orders: Values) -> Ma
     return np.column_stack(columns)
 
 
-def _unrepeated(about: Circumstances, kept: Sequence[int], orders: Values) -> Matrix:
+def _unrepeated(about: Circumstances, rows: Sequence[int], orders: Values) -> Matrix:
     """Return what a standard deviation of each line's error in each record changes."""
     machine, columns = about.machine, []
     spread = SHEET.repeatability / len(machine.orders) ** 0.5
     width = 3 * (1 + 2 * len(orders))
-    for row, record in enumerate(kept):
+    for row, record in enumerate(rows):
         speed = about.conditions[record].speed
         none = np.zeros((0, 3), dtype=complex)
         parts = [_placed(np.array([spread, 0.0, 0.0]), none, np.zeros(0), orders)]
@@ -210,7 +211,53 @@ def _unrepeated(about: Circumstances, kept: Sequence[int], orders: Values) -> Ma
                 for turn in (1.0, 1j)
             ]
         for part in parts:
-            column = np.zeros(width * len(kept))
+            column = np.zeros(width * len(rows))
             column[row * width : (row + 1) * width] = part
             columns.append(column)
     return np.column_stack(columns)
+
+
+Lines = NDArray[np.complex128]
+
+CHANNELS = ("transmission_error", "input_torque", "output_torque")
+
+
+def response(machine: Machine, order: float, speed: float) -> Lines:
+    """Return phasors of `CHANNELS` (3,), per radian of a line of the static error.
+
+    The line is cos(order theta_in), the input turns with ``speed`` (rad/s).
+    """
+    linear, s = linear_part(machine), 1j * order * speed
+    pull = machine.stiffness + s * machine.damping
+    f = np.array([pull / machine.ratio, -pull, 0.0])
+    entered = linear.entry @ f
+    y = np.linalg.solve(s * np.eye(len(entered)) - linear.system, entered)
+    acceleration = s * y[3]
+    return np.array(
+        [
+            y[0] / machine.ratio - y[1],
+            linear.motor @ y,
+            linear.sensor @ y + linear.sensor_inertia * acceleration,
+        ]
+    )
+
+
+def means(machine: Machine, load: float, speed: float) -> Values:
+    """Return the means of `CHANNELS` (3,) under a load (N.m) without any element."""
+    dragging = machine.output_damping * speed / machine.ratio
+    torsion = (load + dragging) / machine.stiffness + machine.error_offset
+    motor = (load + dragging) / machine.ratio + machine.input_damping * speed
+    return np.array([torsion, motor, load])
+
+
+def lines(machine: Machine, speed: float) -> Lines:
+    """Return the phasors (orders, 3) of `CHANNELS` at the orders of the static error.
+
+    A phasor p stands for Re p exp(i order theta_in).
+    """
+    phasors = np.array(machine.amplitudes) * np.exp(1j * (np.array(machine.phases) - np.pi / 2.0))
+    found = [
+        phasor * response(machine, order, speed)
+        for phasor, order in zip(phasors, machine.orders, strict=True)
+    ]
+    return np.array(found)

@@ -54,19 +54,19 @@ def imop_front(number: int) -> Array:
         if number < 3:
             return even_curve(points)
         return points[:: max(1, len(points) // N_POINTS)]
-    one = np.linspace(0.0, 1.0, _GRID)
+    axis = np.linspace(0.0, 1.0, _GRID)
     if number == 5:
-        return _discs(one)
+        return _discs(axis)
     if number == 7:
-        return _ribbons(one[::2])
-    first, second = (grid.ravel() for grid in np.meshgrid(one, one))
-    points = FRONTS[number](np.zeros_like(first), first, second)
+        return _ribbons(axis[::2])
+    x, second = (grid.ravel() for grid in np.meshgrid(axis, axis))
+    points = FRONTS[number](np.zeros_like(x), x, second)
     return points[is_nondominated(points)]
 
 
-def _discs(one: Array) -> Array:
+def _discs(parameter: Array) -> Array:
     """Return eight discs of radius 0.1 in the plane f1 + f2 + f3 = 0.5."""
-    side = 0.2 * (one[:: _GRID // 25] - 0.5)
+    side = 0.2 * (parameter[:: _GRID // 25] - 0.5)
     x, y = (grid.ravel() for grid in np.meshgrid(side, side))
     inside = np.column_stack([x, y])[np.hypot(x, y) <= 0.1]
     turn = np.pi / 4.0 * np.arange(1, 9)
@@ -75,10 +75,10 @@ def _discs(one: Array) -> Array:
     return np.column_stack([plane, 0.5 - plane.sum(axis=1)])
 
 
-def _ribbons(one: Array) -> Array:
+def _ribbons(parameter: Array) -> Array:
     """Return the parts of the unit sphere where two objectives differ by no more than 0.1."""
-    first, second = (grid.ravel() for grid in np.meshgrid(one, one))
-    points = FRONTS[7](np.zeros_like(first), first, second)
+    x, second = (grid.ravel() for grid in np.meshgrid(parameter, parameter))
+    points = FRONTS[7](np.zeros_like(x), x, second)
     return points[np.linalg.norm(points, axis=1) <= 1.0 + 1e-9]
 
 
@@ -87,9 +87,9 @@ def _objectives(number: int, X: Array) -> Array:
     if number <= 4:
         y = X[:, :N_PLACES].mean(axis=1) ** CROWDED
         return FRONTS[number](distance, y, y)
-    first = X[:, 0:N_PLACES:2].mean(axis=1) ** CROWDED
+    position = X[:, 0:N_PLACES:2].mean(axis=1) ** CROWDED
     second = X[:, 1:N_PLACES:2].mean(axis=1) ** SPARSE
-    return FRONTS[number](distance, first, second)
+    return FRONTS[number](distance, position, second)
 
 
 def _steep(exponent: float, g: Array, y: Array, _: Array) -> Array:

@@ -47,9 +47,9 @@ def lz09_front(number: int) -> Array:
 
 def _objectives(number: int, X: Array) -> Array:
     n = X.shape[1]
-    first = 3 if number == 6 else 2
-    j = np.arange(first, n + 1)
-    missed = X[:, first - 1 :] - _best(number, X, j, n)
+    start = 3 if number == 6 else 2
+    j = np.arange(start, n + 1)
+    missed = X[:, start - 1 :] - _best(number, X, j, n)
     x = X[:, 0]
     if number == 6:
         a, b = x * np.pi / 2.0, X[:, 1] * np.pi / 2.0

@@ -43,8 +43,8 @@ def zcat_front(number: int, n_obj: int) -> Array:
     if n_obj == 2 or number in ON_CURVES:
         y = np.linspace(0.0, 1.0, _GRID[0])[:, np.newaxis]
     else:
-        one = np.linspace(0.0, 1.0, _GRID[1])
-        y = np.column_stack([grid.ravel() for grid in np.meshgrid(one, one)])
+        axis = np.linspace(0.0, 1.0, _GRID[1])
+        y = np.column_stack([grid.ravel() for grid in np.meshgrid(axis, axis)])
     F = _weighted(_shape(number, y, n_obj))
     F = np.unique(F, axis=0)
     return F[is_nondominated(F)]
@@ -67,10 +67,10 @@ def _objectives(number: int, n_obj: int, level: int, X: Array) -> Array:
 
 
 def _within(y: Array, ranges: tuple[tuple[float, float], ...]) -> NDArray[np.bool_]:
-    found = np.zeros(y.shape, dtype=bool)
+    inside = np.zeros(y.shape, dtype=bool)
     for low, high in ranges:
-        found |= (y > low - _EPSILON) & (y < high + _EPSILON)
-    return found
+        inside |= (y > low - _EPSILON) & (y < high + _EPSILON)
+    return inside
 
 
 # --- the front ------------------------------------------------------------------------------------
@@ -78,16 +78,16 @@ def _within(y: Array, ranges: tuple[tuple[float, float], ...]) -> NDArray[np.boo
 
 def _shape(number: int, y: Array, n_obj: int) -> Array:
     """Return the objectives on the front, unweighted, from its variables (n, m - 1)."""
-    first = y[:, 0]
+    leading = y[:, 0]
     if number in FLAT:
-        y = np.where(_within(first, FLAT[number])[:, np.newaxis], first[:, np.newaxis], y)
+        y = np.where(_within(leading, FLAT[number])[:, np.newaxis], leading[:, np.newaxis], y)
     if number == 17:
-        y = np.where((y <= 0.5).all(axis=1, keepdims=True), first[:, np.newaxis], y)
+        y = np.where((y <= 0.5).all(axis=1, keepdims=True), leading[:, np.newaxis], y)
     if number == 18:
         wedge = [
             np.all((y > low - _EPSILON) & (y < low + 0.4 + _EPSILON), axis=1) for low in (0.0, 0.6)
         ]
-        y = np.where((wedge[0] | wedge[1])[:, np.newaxis], first[:, np.newaxis], y)
+        y = np.where((wedge[0] | wedge[1])[:, np.newaxis], leading[:, np.newaxis], y)
     sine, cosine = np.sin(y * np.pi / 2.0), np.cos(y * np.pi / 2.0)
     match number:
         case 1:
@@ -95,24 +95,24 @@ def _shape(number: int, y: Array, n_obj: int) -> Array:
         case 2:
             others, last = _products(1.0 - cosine, 1.0 - sine), 1.0 - sine[:, 0]
         case 3:
-            others, last = _means(y, 1.0 - y), 1.0 - first
+            others, last = _means(y, 1.0 - y), 1.0 - leading
         case 8:
             others, last = 1.0 - _products(1.0 - sine, 1.0 - cosine), cosine[:, 0]
         case 9:
             others, last = _means(sine, cosine), cosine[:, 0]
         case 11:
-            others, last = _means(y, 1.0 - y), _wave(first, 4)
+            others, last = _means(y, 1.0 - y), _wave(leading, 4)
         case 12:
-            others, last = 1.0 - _products(1.0 - y, y), _wave(first, 3)
+            others, last = 1.0 - _products(1.0 - y, y), _wave(leading, 3)
         case 13:
-            others, last = 1.0 - _means(sine, cosine), 1.0 - _wave(first, 3)
+            others, last = 1.0 - _means(sine, cosine), 1.0 - _wave(leading, 3)
         case 14:
-            others, last = _turning(sine[:, 0] ** 2, first, 3.0, n_obj), cosine[:, 0]
+            others, last = _turning(sine[:, 0] ** 2, leading, 3.0, n_obj), cosine[:, 0]
         case 15:
             powers = 1.0 + np.arange(n_obj - 1) / (4.0 * n_obj)
-            others, last = first[:, np.newaxis] ** powers, _wave(first, 3)
+            others, last = leading[:, np.newaxis] ** powers, _wave(leading, 3)
         case 16:
-            others, last = _turning(sine[:, 0], first, 5.0, n_obj), _wave(first, 5)
+            others, last = _turning(sine[:, 0], leading, 5.0, n_obj), _wave(leading, 5)
         case _:
             others, last = y, _LAST[number](y)
     return np.column_stack([others, last])

@@ -36,15 +36,15 @@ def locate_in_mechanism(finding: MechanismFinding) -> MechanismLocation:
     misfit = dict(zip(names, finding.base_misfit.tolist(), strict=True))
     noise = dict(zip(names, finding.sensor_noise.tolist(), strict=True))
     if finding.verdict.status == "adequate":
-        words = "Nowhere: what the model leaves is that of its sensors, or near it."
+        words = "Nowhere: the residual is at or near the sensor noise."
     elif finding.verdict.chosen is None and finding.verdict.status == "named":
-        words = "Nowhere up to the cutoff, but in the forces beyond it."
+        words = "Only in the forces beyond the cutoff frequency."
     else:
         parts = [
-            f"the {finding.data.what(name)} (off by {misfit[name]:.3g} "
-            f"{unit_of(finding.mechanism, name)}, sensors {noise[name]:.2g})"
+            f"the {finding.data.what(name)} (error {misfit[name]:.3g} "
+            f"{unit_of(finding.mechanism, name)}, sensor noise {noise[name]:.2g})"
             for name in names
             if misfit[name] ** 2 > finding.data.rules.noise_power_ratio * noise[name] ** 2
         ]
-        words = f"In {' and '.join(parts) or 'no balance by itself'}."
+        words = f"In {' and '.join(parts) or 'no single balance'}."
     return MechanismLocation(words, misfit, noise)

@@ -57,21 +57,21 @@ def _standing_out(finding: DriveFinding) -> list[str]:
         return []
     share = 100.0 * excess[worst] / excess.sum()
     return [
-        f"Record {records[worst].name} alone has {share:.0f} % of what the believed drive does not "
-        "explain: what is missing shows there only, or its sensors or its drive were not as in the "
-        "others. In that case leave it out."
+        f"Record {records[worst].name} alone has {share:.0f} % of the misfit: either the missing "
+        "effect shows only there, or its sensors or drive differed from the others. In that case "
+        "leave it out."
     ]
 
 
 def _unproven(finding: DriveFinding) -> list[str]:
     found = []
     if not finding.campaign.held_out:
-        found.append("No record was held out: nothing is proven about conditions not fitted.")
+        found.append("No record was held out: the correction is not validated.")
     if finding.verdict.status in EXPLAINED and not finding.verdict.shown_in_held_out:
-        found.append("The records kept out of the fit do not show what is named.")
+        found.append("The held-out records do not show what is named.")
     fitted = {record.name for record in finding.data.features.records}
     if finding.campaign.held_out and (held_out := finding.held_out) is None:
-        found.append("All held-out records rattle: nothing is proven about conditions not fitted.")
+        found.append("All held-out records rattle: the correction is not validated.")
     elif finding.campaign.held_out and held_out is not None:
         fitted |= {record.name for record in held_out.features.records}
     left_out = [record.name for record in finding.campaign.running if record.name not in fitted]
@@ -82,8 +82,8 @@ def _unproven(finding: DriveFinding) -> list[str]:
         )
     if finding.data.evident:
         found.append(
-            "Without load the motion does not repeat with the input, as where tooth flanks part "
-            "and meet again: no explanation without a clearance is told."
+            "Without load the motion does not repeat with the input, as when tooth flanks part and "
+            "meet again: no hypothesis without a clearance is reported."
         )
     return found
 
@@ -96,25 +96,25 @@ def _unvaried(finding: DriveFinding) -> list[str]:
     if np.abs(speeds).max() <= rules.one_speed_ratio * np.abs(speeds).min():
         found.append(
             "All fitted records run at one speed: dry friction, friction that changes with speed "
-            "and damping cannot be told apart."
+            "and damping are indistinguishable."
         )
     if np.ptp(loads) <= rules.one_load_range * np.abs(loads).max():
         found.append(
-            "All fitted records carry one load: an error that grows with load cannot be told from "
-            "one that does not."
+            "All fitted records carry one load: it remains open whether an error grows with the "
+            "load."
         )
     if np.all(speeds > 0.0) or np.all(speeds < 0.0):
         found.append(
-            "All fitted records turn one way: only the stated zero error of the input torque "
-            f"sensor, {finding.campaign.rig.input_torque_zero:g} N.m, tells dry friction at the "
-            "input from it."
+            "All fitted records turn one way. Dry friction at the input and a zero error of the "
+            "input torque sensor are separated only by the stated limit of that error, "
+            f"{finding.campaign.rig.input_torque_zero:g} N.m."
         )
     if np.ptp([record.elapsed for record in records]) == 0.0:
-        found.append("All fitted records stand at one time of the session: no drift can be seen.")
+        found.append("All fitted records have the same time in the session: no drift can be seen.")
     if not finding.data.torsion:
         found.append(
-            "No torsion sweep was fitted: a clearance cannot be told from a soft wind-up, nor "
-            "hysteresis from damping, where the running records do not pass through zero torque."
+            "No torsion sweep was fitted. Unless the running records pass through zero torque, a "
+            "clearance looks like a soft wind-up, and hysteresis like damping."
         )
     return found
 
@@ -130,9 +130,9 @@ def _like_a_gain(finding: DriveFinding) -> list[str]:
         return []
     gain = 100.0 * finding.campaign.rig.input_torque_gain
     return [
-        "Power flows one way through the drive in all fitted records, so that friction that grows "
+        "Power flows one way through the drive in all fitted records, so friction that grows "
         "with the load looks like a wrong gain of the input torque sensor: only its stated gain "
-        f"error, {gain:g} %, tells them apart."
+        f"error, {gain:g} %, separates them."
     ]
 
 
@@ -155,10 +155,10 @@ def _unseen(finding: DriveFinding) -> list[str]:
     ]
     found = []
     if mixed := _named([order for order in unseen if order <= highest]):
-        found.append(f"The records do not resolve the believed static error of order {mixed}.")
+        found.append(f"The records do not resolve the nominal static error of order {mixed}.")
     if high := _named([order for order in unseen if order > highest]):
         found.append(
-            f"The believed static error of order {high} is not looked at: lines are compared up to "
+            f"The nominal static error of order {high} is not compared: lines are compared up to "
             f"order {highest:.3g}."
         )
     return found
@@ -175,7 +175,7 @@ def _too_high(finding: DriveFinding) -> list[str]:
     # Unexpected lines are searched strictly below the highest order.
     return [
         f"Order {2.0 * order:.4g}, the second harmonic of order {order:.4g}, is not fitted: it "
-        f"lies above order {highest:.3g}. What is left may be that harmonic{values}."
+        f"lies above order {highest:.3g}. The residual may be that harmonic{values}."
         for order in sorted(orders)
         if 2.0 * order >= highest and harmonics_among(seen, order, 2) == 1
     ]

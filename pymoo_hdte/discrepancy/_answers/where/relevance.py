@@ -53,7 +53,7 @@ class Relevance:
                 f"{what} by at most {_shown(change, what)} ({_shown(limit, what)} is good enough)"
                 for what, change, limit in compared
             )
-            rest = "" if self.whole else " What is left beyond the noise is not counted."
+            rest = "" if self.whole else " The unexplained residual is not counted."
             return f"Real and irrelevant at the stated size: it changes {words}.{rest}"
         words = " and ".join(
             f"{what} by up to {_shown(change, what)} ({_shown(limit, what)} is good enough)"

@@ -52,11 +52,11 @@ def sentences(location: Location, data: Data, unexpected: Sequence[float]) -> tu
         parts.append(f"{nature.sentence}.")
     elif not location.within_noise.everywhere:
         parts.append(
-            "No single mean or order line stands out of the noise, but together they do: in "
+            "No single mean or order line exceeds the noise, but together they do: in "
             f"{_beyond(location, believed.ratio)}."
         )
     elif location.named:
-        parts.append("The named effect moves no mean and no order line by more than its noise.")
+        parts.append("The named effect changes no mean or order line by more than its noise.")
     else:
         parts.append("Nowhere: all means and order lines agree within the noise.")
     if location.sweep_flagged and (nature is None or nature.code != IN_SWEEP):

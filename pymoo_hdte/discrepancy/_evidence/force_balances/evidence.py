@@ -99,7 +99,7 @@ class MeasuredData(WhitenedBalances):
             out_of_tolerance(name, name) for name in at_bounds if name in self.mechanism.quantities
         ]
 
-    def held_out_vote(self, base: Fit, fitted: Fit) -> None:
+    def held_out_test(self, base: Fit, fitted: Fit) -> None:
         """Return None, because held-out records of a mechanism are simulated after the verdict."""
         return
 

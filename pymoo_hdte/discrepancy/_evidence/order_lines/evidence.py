@@ -24,7 +24,7 @@ from pymoo_hdte.discrepancy._evidence.order_lines.torsion_curve import torsion_p
 from pymoo_hdte.discrepancy._records.campaign import Campaign
 from pymoo_hdte.discrepancy._records.line_fit import CHANNELS
 from pymoo_hdte.discrepancy._selection.candidate import Candidate
-from pymoo_hdte.discrepancy._selection.excess import Excess, Vote
+from pymoo_hdte.discrepancy._selection.excess import Excess, HeldOutTest
 from pymoo_hdte.discrepancy._selection.fitting import Fit, Response
 from pymoo_hdte.discrepancy._selection.rules import RULES, Rules
 from pymoo_hdte.drive import DriveEffect
@@ -123,7 +123,7 @@ class Data(Observations):
             self.base, at_bounds, believed.error_orders, together, believed.effects
         )
 
-    def held_out_vote(self, base: Fit, fitted: Fit) -> Vote | None:
+    def held_out_test(self, base: Fit, fitted: Fit) -> HeldOutTest | None:
         """Return what the records kept out of the fit say of two fits; None without any.
 
         Creep in these records is noise or an error of the model: as noise it covers most of what a
@@ -139,7 +139,7 @@ class Data(Observations):
         votes = [version._vote(base, fitted) for version in versions]
         return max(votes, key=lambda vote: (vote.before - vote.after) / max(vote.change, 1e-300))
 
-    def _vote(self, base: Fit, fitted: Fit) -> Vote:
+    def _vote(self, base: Fit, fitted: Fit) -> HeldOutTest:
         """Return what these records say of two fits."""
         before, after = (
             self.whiten(
@@ -149,7 +149,7 @@ class Data(Observations):
             for fit in (base, fitted)
         )
         change = after - before
-        return Vote(float(before @ before), float(after @ after), float(change @ change))
+        return HeldOutTest(float(before @ before), float(after @ after), float(change @ change))
 
     @cached_property
     def held_out(self) -> Data | None:

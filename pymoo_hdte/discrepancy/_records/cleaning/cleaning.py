@@ -12,7 +12,6 @@ from scipy.stats import norm
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy._records.campaign import Campaign
 from pymoo_hdte.discrepancy._records.cleaning.drift import without_drift
-from pymoo_hdte.discrepancy._records.cleaning.faults import WINDOWS
 from pymoo_hdte.discrepancy._records.cleaning.findings import (
     FAILED,
     NoiseFinding,
@@ -34,6 +33,7 @@ from pymoo_hdte.discrepancy._records.cleaning.repair import (
 )
 from pymoo_hdte.discrepancy._records.cleaning.session_zero import with_one_zero
 from pymoo_hdte.discrepancy._records.cleaning.settling import SETTLED, unsettled_rows
+from pymoo_hdte.discrepancy._records.cleaning.spikes_and_jumps import WINDOWS
 from pymoo_hdte.discrepancy._records.line_basis import mean_speed
 from pymoo_hdte.discrepancy._records.records import RunningRecord, TorsionRecord
 from pymoo_hdte.discrepancy._selection.rules import RULES, Rules

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pymoo_hdte.discrepancy._records.believed import Rig
-from pymoo_hdte.discrepancy._records.cleaning.faults import scatter
 from pymoo_hdte.discrepancy._records.cleaning.findings import NoiseFinding, RowFault
+from pymoo_hdte.discrepancy._records.cleaning.spikes_and_jumps import scatter
 from pymoo_hdte.discrepancy._records.line_basis import LineFit, centred
 from pymoo_hdte.discrepancy._records.records import ReadingError, RunningRecord
 from pymoo_hdte.discrepancy._selection.rules import Rules

@@ -18,7 +18,9 @@ from scipy.ndimage import binary_dilation, median_filter
 
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy._records.cleaning.drift import torque_drifts
-from pymoo_hdte.discrepancy._records.cleaning.faults import (
+from pymoo_hdte.discrepancy._records.cleaning.findings import FAILED, RowFault
+from pymoo_hdte.discrepancy._records.cleaning.settling import settling, unsettled_rows
+from pymoo_hdte.discrepancy._records.cleaning.spikes_and_jumps import (
     WINDOWS,
     Step,
     UnitSteps,
@@ -26,8 +28,6 @@ from pymoo_hdte.discrepancy._records.cleaning.faults import (
     spikes_on_course,
     step,
 )
-from pymoo_hdte.discrepancy._records.cleaning.findings import FAILED, RowFault
-from pymoo_hdte.discrepancy._records.cleaning.settling import settling, unsettled_rows
 from pymoo_hdte.discrepancy._records.line_basis import LineFit, spans_a_turn
 from pymoo_hdte.discrepancy._records.records import (
     FEWEST_SAMPLES,

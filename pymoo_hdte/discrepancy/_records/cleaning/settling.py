@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from pymoo_hdte.discrepancy._records.cleaning.faults import scatter
+from pymoo_hdte.discrepancy._records.cleaning.spikes_and_jumps import scatter
 from pymoo_hdte.discrepancy._records.line_basis import LineFit, decays
 from pymoo_hdte.discrepancy._records.records import RunningRecord
 from pymoo_hdte.discrepancy._selection.rules import Rules

@@ -5,14 +5,13 @@ from itertools import product
 import numpy as np
 import pytest
 
-from experiments.comparing.intervals import a12_intervals, mean_intervals
 from experiments.comparing.runs import (
     AS_PRINTED,
     FIRST_STEP,
     OptimisationRun,
     robust_problem,
 )
-from experiments.comparing.statistics import effect_size
+from experiments.comparing.statistics import a12_intervals, effect_size, mean_intervals
 from experiments.paper.anytime.data import (
     EVERYONE,
     FULL,

@@ -19,7 +19,6 @@ from experiments.studies.blind.rig.files import write_campaign_folder
 from experiments.studies.blind.rig.forms import FORMS, LISTED, UNLISTED, draw_effect
 from experiments.studies.blind.rig.hidden import equipped
 from experiments.studies.blind.rig.machine import EXTRA, SENSOR, ThirdBody, linear_part
-from experiments.studies.blind.rig.response import means, response
 from experiments.studies.blind.rig.runs import Condition, locked_torsion, plant_of, run
 from experiments.studies.blind.rig.session import (
     ARCSEC,
@@ -31,7 +30,7 @@ from experiments.studies.blind.rig.session import (
     sweep,
     sweep_torque,
 )
-from experiments.studies.blind.rig.visible import LEAST, features, orders_seen
+from experiments.studies.blind.rig.visible import LEAST, features, means, orders_seen, response
 from experiments.studies.blind.truth import one_name
 from experiments.studies.virtual_rig.hidden_forms import HiddenEffect
 from experiments.studies.virtual_rig.rig import TrueRig

@@ -22,13 +22,11 @@ from experiments.runner.result import MISSED, NOT_SHOWN, SHOWN
 from experiments.studies.blind import campaigns
 from experiments.studies.blind import experiment as blind
 from experiments.studies.blind import scoring as blind_scoring
-from experiments.studies.blind.campaigns import campaign_of, hiding, rows_of
+from experiments.studies.blind.campaigns import campaign_of, hiding, rows_of, stressed
 from experiments.studies.blind.cases import STRESSES, Case, all_cases
-from experiments.studies.blind.codes import NAMES, PORTS, STATUSES, code_of_set, words_of_set
 from experiments.studies.blind.data import format_outcomes, format_seconds, outcome, read_outcomes
-from experiments.studies.blind.figures import confusion_matrix
+from experiments.studies.blind.experiment import confusion_matrix
 from experiments.studies.blind.outcome import Outcome
-from experiments.studies.blind.reliability import reliability
 from experiments.studies.blind.rig.forms import FORMS, LISTED, UNLISTED
 from experiments.studies.blind.rig.runs import Condition
 from experiments.studies.blind.rig.session import ARCSEC, SHEET, draw_circumstances
@@ -41,7 +39,6 @@ from experiments.studies.blind.scoring import (
     truly_moved,
     verdict_scores,
 )
-from experiments.studies.blind.stresses import stressed
 from experiments.studies.blind.tables import must_reach_table
 from experiments.studies.blind.targets import (
     ALARM,
@@ -51,7 +48,9 @@ from experiments.studies.blind.targets import (
     NOT_RUN,
     WRONG,
     demands,
+    reliability,
 )
+from experiments.studies.blind.truth import NAMES, PORTS, STATUSES, code_of_set, words_of_set
 from pymoo_hdte.discrepancy._evidence.order_lines.evidence import Data, start_parameters
 from pymoo_hdte.discrepancy._evidence.order_lines.features import measure
 from pymoo_hdte.discrepancy._selection.candidate import Layout, out_of_tolerance

@@ -16,8 +16,7 @@ from experiments.studies.cards.data import (
     read_hardness,
 )
 from experiments.studies.cards.hardness import Hardness, hardness, modality_of, weights_of
-from experiments.studies.cards.separation import separations
-from experiments.studies.cards.tables import separation_table
+from experiments.studies.cards.tables import separation_table, separations
 from experiments.studies.contest.peers_data import Scores
 from experiments.studies.contest.problems import CARDS
 from pymoo_hdte.problems import RobustToy

@@ -6,7 +6,7 @@ from moocore import is_nondominated
 from swarm_problems import Parabolas
 
 from experiments.comparing.contestants import CONTESTANTS
-from experiments.studies.contest.job import ContestRun, front_among
+from experiments.studies.contest.peers_data import ContestRun, front_among
 from experiments.studies.contest.problems import problem_of
 from experiments.studies.contest.reduced_swarms import SWARM_VARIANTS
 

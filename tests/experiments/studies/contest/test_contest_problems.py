@@ -13,8 +13,7 @@ from experiments.studies.contest.benchmark_fronts import (
     front_of,
     wfg_front,
 )
-from experiments.studies.contest.moved_zdt import INTERIOR, MovedZDT
-from experiments.studies.contest.problems import BENCHMARKS, problem_of
+from experiments.studies.contest.problems import BENCHMARKS, INTERIOR, MovedZDT, problem_of
 
 TWO_OBJECTIVES = [name for name in BENCHMARKS if not name.startswith(("DTLZ", "RobustDTE"))]
 

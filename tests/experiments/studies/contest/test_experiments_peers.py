@@ -11,9 +11,9 @@ from experiments.comparing.indicators import CORNER, IndicatorsAgainst
 from experiments.runner.campaign import Campaign
 from experiments.runner.registry import Context
 from experiments.studies.contest import peers, swarm_parts
-from experiments.studies.contest.job import ContestRun
 from experiments.studies.contest.peers_data import (
     MEASURES,
+    ContestRun,
     Scores,
     committed_scores,
     contest_scores,
@@ -22,13 +22,14 @@ from experiments.studies.contest.peers_data import (
     measure,
     read_scores,
 )
-from experiments.studies.contest.peers_rivals import (
+from experiments.studies.contest.peers_tables import (
     FAITHFUL,
+    OURS,
     must_reach_table,
     nearest_rival_table,
+    ranks_tables,
     subsets_table,
 )
-from experiments.studies.contest.peers_tables import OURS, ranks_tables
 from experiments.studies.contest.problems import BENCHMARKS
 from experiments.studies.contest.reduced_swarms import SWARM_VARIANTS
 from pymoo_hdte.checks import InvalidInput

@@ -4,8 +4,12 @@ import numpy as np
 import pytest
 
 from experiments.studies.fronts import tolerance_front
-from experiments.studies.fronts.agreement import disagreement
-from experiments.studies.fronts.level_search import LevelSearch, on_level, without_local_optima
+from experiments.studies.fronts.tolerance_front import (
+    LevelSearch,
+    disagreement,
+    on_level,
+    without_local_optima,
+)
 from pymoo_hdte.problems import RobustToy
 from pymoo_hdte.problems.reference import ReferenceFront
 

@@ -22,7 +22,6 @@ from experiments.runner.result import Result
 from experiments.studies.reliability import data
 from experiments.studies.reliability import experiment as reliability
 from experiments.studies.reliability import kill as reliability_kill
-from experiments.studies.reliability.commands import Wrong
 from experiments.studies.reliability.data import (
     FUZZ,
     KILL,
@@ -45,7 +44,7 @@ from experiments.studies.reliability.fuzz import (
     outcome,
     outcomes_of_process,
 )
-from experiments.studies.reliability.inputs import KINDS, THROUGH_COMMANDS
+from experiments.studies.reliability.inputs import KINDS, THROUGH_COMMANDS, Wrong
 from experiments.studies.reliability.mutations import Link, mutated, put
 from experiments.studies.reliability.text import BYTES, TEXTS
 
@@ -253,18 +252,16 @@ def test_a_full_disk_is_one_sentence_and_code_1(tmp_path, monkeypatch, capsys):
         raise OSError(28, "No space left on device", str(tmp_path))
 
     monkeypatch.setattr("experiments.command_line.save", full)
-    monkeypatch.setattr(
-        "experiments.studies.measured.emps.run", lambda context: Result("", "", "done")
-    )
-    assert main(["emps", "--workers", "1", "--out", str(tmp_path)]) == 1
-    assert "emps: [Errno 28] No space left on device" in capsys.readouterr().err
+    monkeypatch.setattr("experiments.studies.dte_map.run", lambda context: Result("", "", "done"))
+    assert main(["dte_map", "--workers", "1", "--out", str(tmp_path)]) == 1
+    assert "dte_map: [Errno 28] No space left on device" in capsys.readouterr().err
 
 
 def test_a_folder_without_permission_is_refused_before_anything_runs(tmp_path, monkeypatch, capsys):
     # As root, who may write anywhere, the answer of the system has to be made up.
     monkeypatch.setattr(os, "access", lambda path, mode: False)
     with redirect_stdout(io.StringIO()), pytest.raises(SystemExit) as stopped:
-        main(["emps", "--out", str(tmp_path)])
+        main(["dte_map", "--out", str(tmp_path)])
     assert stopped.value.code == 2
     assert f"--out {tmp_path} cannot be written to" in capsys.readouterr().err
 

@@ -7,6 +7,9 @@ from experiments.runner.campaign import Campaign
 from experiments.runner.registry import Context
 from experiments.runner.result import MISSED, NOT_SHOWN, SHOWN
 from experiments.studies.robust.data import (
+    CHAOSPY,
+    OPENTURNS,
+    OURS,
     SEEDS,
     STOP_NUMBERS,
     Outcome,
@@ -16,9 +19,8 @@ from experiments.studies.robust.data import (
     read_outcome,
     stops_text,
 )
-from experiments.studies.robust.experiment import run
+from experiments.studies.robust.experiment import needed_table, run, stops_table
 from experiments.studies.robust.functions import FUNCTIONS, G_WEIGHTS
-from experiments.studies.robust.job import CHAOSPY, OPENTURNS, OURS
 from experiments.studies.robust.ours import Growth
 from experiments.studies.robust.rivals import (
     CHAOSPY_WAYS,
@@ -27,7 +29,6 @@ from experiments.studies.robust.rivals import (
     terms_up_to,
     until_it_stays,
 )
-from experiments.studies.robust.tables import needed_table, stops_table
 from experiments.studies.robust.task import Task
 from pymoo_hdte.problems import robust_problem
 

@@ -8,12 +8,9 @@ import pytest
 from experiments.runner.campaign import Campaign
 from experiments.runner.registry import Context
 from experiments.runner.result import MISSED, NOT_SHOWN, SHOWN
-from experiments.studies.suites import anew as suites_anew
 from experiments.studies.suites import experiment
-from experiments.studies.suites.anew import BBOB_RUNS, SUITE_RUNS, anew_table
-from experiments.studies.suites.bbob.coco import MARKS
-from experiments.studies.suites.bbob.published import BEST, CITED, curves
-from experiments.studies.suites.bbob_tables import duels, reached
+from experiments.studies.suites.bbob_tables import BEST, CITED, curves, duels, reached
+from experiments.studies.suites.coco import MARKS
 from experiments.studies.suites.data import (
     Outcome,
     bbob_text,
@@ -22,14 +19,20 @@ from experiments.studies.suites.data import (
     suites_text,
 )
 from experiments.studies.suites.demands import demands, in_one_sentence
+from experiments.studies.suites.experiment import BBOB_RUNS, SUITE_RUNS, anew_table
 from experiments.studies.suites.jobs import BbobRun
 from experiments.studies.suites.parts import part_tests, parts_table
 from experiments.studies.suites.peers import OURS
 from experiments.studies.suites.problems import SUITES
 from experiments.studies.suites.protocol import BESIDE_PEERS, FULL, OF_PARTS, SHARES, STORED
 from experiments.studies.suites.reduced import WHOLE
-from experiments.studies.suites.suite_tables import feasible_beside, feasible_runs, ranks
-from experiments.studies.suites.together import ranks_together, signs_together
+from experiments.studies.suites.suite_tables import (
+    feasible_beside,
+    feasible_runs,
+    ranks,
+    ranks_together,
+    signs_together,
+)
 
 RIVALS = ("NSGA-II", "SMS-EMOA", "C-TAEA")
 
@@ -244,8 +247,8 @@ def test_the_stored_outcome_gives_the_report_and_repeats(tmp_path):
 def test_two_zeros_beside_each_other_check_nothing(tmp_path, monkeypatch):
     # On ZCAT1 with three objectives so short a run reaches no hypervolume, stored and anew.
     run = next(one for one in SUITE_RUNS if one.problem == "ZCAT1_3")
-    monkeypatch.setattr(suites_anew, "SUITE_RUNS", (run,))
-    monkeypatch.setattr(suites_anew, "find_spec", lambda _: None)
+    monkeypatch.setattr(experiment, "SUITE_RUNS", (run,))
+    monkeypatch.setattr(experiment, "find_spec", lambda _: None)
     outcome = outcome_for(Context(1, None, None))
     place = run.problem, run.algorithm, *run.budgets, run.seed
     spent, hypervolume, distance, solutions = outcome.suites[place]

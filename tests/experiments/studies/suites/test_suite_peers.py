@@ -8,9 +8,8 @@ from pymoo.problems.multi.zdt import ZDT1
 
 from experiments.runner import registry
 from experiments.runner.registry import ExtraMissing
-from experiments.studies.suites import own_time
-from experiments.studies.suites.bbob import coco
-from experiments.studies.suites.bbob.coco import MARKS, TARGETS, shares
+from experiments.studies.suites import coco, own_time
+from experiments.studies.suites.coco import MARKS, TARGETS, shares
 from experiments.studies.suites.jobs import BbobRun, SuiteRun, measured
 from experiments.studies.suites.peers import BBOB_PEERS, OURS, PEERS, takes
 from experiments.studies.suites.problems import front_of, problem_of

@@ -107,7 +107,10 @@ class Ripple:
     @property
     def words(self) -> str:
         """Its order, cycles per input turn, and meaning for the gear, in words."""
-        remarks = "; ".join(filter(None, (_per_input_turn(self.order, self.ratio), self.meaning)))
+        turns = _per_input_turn(self.order, self.ratio)
+        if turns and turns in self.meaning:
+            turns = ""
+        remarks = "; ".join(filter(None, (turns, self.meaning)))
         return f"{self.order:.5g} ({remarks})" if remarks else f"{self.order:.5g}"
 
     @property
@@ -274,13 +277,13 @@ def _limits(
         limits.append(_one_way(name, terms))
     if lost:
         limits.append(
-            f"{named([ripple.order for ripple in lost])} is seen, but to take it away makes the "
-            f"{terms.of_records} of the held-out records no smaller: it is not named."
+            f"{named([ripple.order for ripple in lost])} is seen, but removing it does not "
+            f"reduce the {terms.of_records} of the held-out records: it is not named."
         )
     if search.undecided:
         limits.append(
-            f"{named(search.undecided)} is seen at one speed or is weak, so that "
-            "these records do not tell it from a frequency: it is not named."
+            f"{named(search.undecided)} is seen at one speed only or is weak, so "
+            "it may be a fixed frequency: it is not named."
         )
     if search.fixed:
         lines = ", ".join(f"{frequency:.3g}" for frequency in search.fixed)
@@ -298,8 +301,8 @@ def _per_input_turn(order: float, ratio: float) -> str:
 
 def _one_way(port: str, terms: Terms = OF_FORCES) -> str:
     return (
-        f"The {port} shows its {terms.lines} in one direction only: {terms.cause} cannot be told "
-        "from friction that varies with the position."
+        f"The {port} shows its {terms.lines} in one direction only, where {terms.cause} looks "
+        "like friction that varies with the position."
     )
 
 

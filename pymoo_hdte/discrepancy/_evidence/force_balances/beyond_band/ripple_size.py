@@ -208,7 +208,7 @@ def over_speed(seen: SeenOrder, bands: Sequence[HighBand], speed: Values) -> Val
 
 def trend_of(speeds: Values, rules: Rules) -> str:
     """Return sentences on how an amplitude changes with the speed, and on its possible cause."""
-    unknown = "How it changes with the speed cannot be told."
+    unknown = "How it changes with speed remains open."
     if len(speeds) < 4 or speeds[-1, 0] <= rules.growth_ratio * speeds[0, 0]:
         return unknown
     # Relative to the middle, so that slope and level are uncorrelated.

@@ -1,1 +1,0 @@
-"""Problems of bbob-biobj, and shares of their targets that were published."""
