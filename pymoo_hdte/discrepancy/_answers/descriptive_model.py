@@ -305,7 +305,7 @@ class _Design:
         for port in self.mechanism.ports:
             if port.read:
                 continue
-            laws = {
+            laws: dict[str, list[Any]] = {
                 "viscous_friction": [LinearDamper(1.0)] if not port.damping.value else [],
                 "coulomb_friction": [CoulombFriction(1.0)],
                 "gravity": [Gravity(1.0, 0.0), Gravity(1.0, np.pi / 2.0)],
