@@ -23,6 +23,7 @@ from scipy.stats import t
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy._evidence.force_balances.candidates import mechanism_candidates
 from pymoo_hdte.discrepancy._evidence.force_balances.evidence import MeasuredData, measured_data
+from pymoo_hdte.discrepancy._evidence.force_balances.intervals import Spread
 from pymoo_hdte.discrepancy._evidence.force_balances.orders import position_orders
 from pymoo_hdte.discrepancy._evidence.force_balances.unexplained import (
     fitted_values,
@@ -62,8 +63,8 @@ _SUBSAMPLE = 200
 """Rows of a motion on which it is seen whether a law is linear in an unknown."""
 _SAME = 1e-6
 """Share up to which two forces count as equal."""
-_SIX = ("viscous_friction", "coulomb_friction", "force_offset", "gravity", "linear_stiffness")
-"""Effects that least squares with six terms has, beside the inertia and the damper."""
+_SIMPLE = ("viscous_friction", "coulomb_friction", "force_offset", "gravity", "linear_stiffness")
+"""Effects that least squares with six terms has, beside the quantities of the mechanism."""
 _OF_BASE = ("inertia", "damping", "stiffness")
 """Kinds of quantities that may leave their limits; a gain is the scale of all forces."""
 
@@ -77,7 +78,8 @@ class DescribedValue:
     value : float
         SI.
     interval95 : (float, float) or None
-        By the jackknife over the blocks of time.
+        By the jackknife over the blocks of time; of a quantity that keeps the value of the
+        accepted fit, that of the fit.
     unit : str
     """
 
@@ -581,11 +583,9 @@ def descriptive_model(title: str, finding: MechanismFinding) -> DescriptiveModel
     six = _Selection(design).six_terms()[-1]
     design.offer(_candidates(finding, design, six))
     selection = _Selection(design)
-    simple = [
-        *(term for term in design.base if not term.quantity.startswith("stiffness")),
-        *_simple(design.terms),
-    ]
-    accepted = [*design.within, *design.accepted]
+    simple = [*design.base, *_simple(design.terms)]
+    within = [one for one in design.within if not any(one.excludes(law) for law in design.accepted)]
+    accepted = [*within, *design.accepted]
     terms, further = (selection.grown(start) for start in (simple, accepted))
     if _falls(selection.of(terms), selection.of(further)):
         terms = further
@@ -593,7 +593,7 @@ def descriptive_model(title: str, finding: MechanismFinding) -> DescriptiveModel
     laws = [law for term in terms for law in term.laws(coefficients[-1])]
     values = {name: float(coefficients[-1, 1 + row]) for row, name in enumerate(design.quantities)}
     model = MechanismModel(
-        f"{title}, descriptive",
+        f"{title} (describes, does not diagnose)",
         *_mechanism(finding.mechanism, values, (*finding.believed, *laws, *finding.ripples.laws)),
         finding.cutoff,
     )
@@ -641,7 +641,7 @@ def _candidates(finding: MechanismFinding, design: _Design, six: Values) -> list
 def _simple(terms: Sequence[_Term]) -> list[_Term]:
     """Return the terms of least squares with six terms: a spring where gravity cannot pull."""
     found: list[_Term] = []
-    for name in _SIX:
+    for name in _SIMPLE:
         for term in terms:
             candidate = term.candidate
             if candidate is None or candidate.name != name or candidate.form:
@@ -721,14 +721,28 @@ def _values(
         for term in terms
         if term.quantity
     }
-    found = {}
+    found, held = {}, _intervals_of_verdict(design.finding)
     for row, name in enumerate(design.quantities):
-        column, interval = coefficients[:, 1 + row], None
+        column, interval = coefficients[:, 1 + row], held.get(name)
         value = float(column[-1])
+        if name in limits:
+            interval = None
         if name in limits and not np.isclose(value, limits[name], rtol=1e-9, atol=0.0).any():
             lower, upper = np.clip(_interval(column), *limits[name]).tolist()
             interval = lower, upper
         found[name] = DescribedValue(value, interval, base_unit(design.mechanism, name))
+    return found
+
+
+def _intervals_of_verdict(finding: MechanismFinding) -> dict[str, tuple[float, float]]:
+    """Return the intervals of the accepted fit, at whose values a quantity is held."""
+    fitted = finding.accepted
+    spread, found = Spread(finding.data, fitted), {}
+    for row, (parameter, value) in enumerate(zip(fitted.parameters, fitted.values, strict=True)):
+        half = float(spread.reach[row] * max(spread.covariance[row, row], 0.0) ** 0.5)
+        if fitted.bound_sides[row] == 0.0:
+            ends = max(value - half, parameter.lower), min(value + half, parameter.upper)
+            found[parameter.name] = float(ends[0]), float(ends[1])
     return found
 
 
