@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import dct
 
+from pymoo_hdte.discrepancy._answers.descriptive_model import descriptive_model
 from pymoo_hdte.discrepancy._verdicts.mechanism_finding import MechanismFinding
 from pymoo_hdte.mechanism import Record
 from pymoo_hdte.mechanism.motion import margin_of, motion_of, smooth
@@ -119,7 +120,7 @@ class Answer:
 def answers(finding: MechanismFinding) -> list[Answer]:
     """Return the answers of all tools on a mechanism of one coordinate and one input."""
     given = []
-    for tool in (least_squares, sparse_regression, narmax):
+    for tool in (least_squares, six_terms, descriptive, sparse_regression, narmax):
         began = time.process_time()
         answer = tool(finding)
         given.append(Answer(*answer, time.process_time() - began))
@@ -132,11 +133,29 @@ Said = tuple[str, str, frozenset[str] | None, float | None, float | None]
 def least_squares(finding: MechanismFinding) -> Said:
     """Fit inertia, viscous and Coulomb friction, an offset, and the spring that is believed."""
     names = ["a", "v", "sign v", "1", *(["q"] if _sprung(finding) else [])]
+    return _least_squares("least squares", finding, names)
+
+
+def six_terms(finding: MechanismFinding) -> Said:
+    """Fit what a practitioner fits to a joint: the same, and gravity whether it can pull or not."""
+    return _least_squares("six terms", finding, ["a", "v", "sign v", "sin q", "cos q", "1"])
+
+
+def _least_squares(tool: str, finding: MechanismFinding, names: Sequence[str]) -> Said:
     train, test = terms_of(finding, "train", names), terms_of(finding, "held_out", names)
     values: Values = np.linalg.lstsq(train.columns, train.force, rcond=None)[0].astype(float)
-    of_force = test.explained(values)
     named = frozenset({"coulomb_friction"})
-    return "least squares", _in_words(names, values), named, of_force, None
+    return tool, _in_words(names, values), named, test.explained(values), None
+
+
+def descriptive(finding: MechanismFinding) -> Said:
+    """Describe the records by all terms that predict better, whatever the verdict (our own)."""
+    model = descriptive_model("", finding)
+    (coordinate,) = finding.mechanism.coordinates
+    left = [one.descriptive**2 for one in model.held_out if one.quantity == coordinate]
+    words = " + ".join(dict.fromkeys(effect.name for effect, _ in model.effects)).replace("_", " ")
+    of_force = 1.0 - float(np.mean(left)) / terms_of(finding, "held_out", ["1"]).power
+    return "descriptive model", words or "nothing", None, of_force, None
 
 
 def sparse_regression(finding: MechanismFinding) -> Said:
