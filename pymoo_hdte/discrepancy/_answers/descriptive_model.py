@@ -59,7 +59,7 @@ _ROWS_PER_PERIOD = 5.0
 """Rows of a balance in a period of the cutoff: 2.5 times as many as determine it."""
 _RIDGE = 1e-10
 """Keeps apart columns that are the same in some blocks, in units of their own power."""
-_SUBSAMPLE = 200
+_SUBSAMPLE = 1000
 """Rows of a motion on which it is seen whether a law is linear in an unknown."""
 _SAME = 1e-6
 """Share up to which two forces count as equal."""
@@ -341,7 +341,8 @@ class _Design:
         """
         try:
             free, bends = self._linear(candidate, start)
-        except (InvalidInput, FloatingPointError):
+        except InvalidInput:
+            # A law does not take the steps by which it is tried.
             return None
         shape = tuple(0.0 if place in free else value for place, value in enumerate(start))
         if not accepted and (not free or (known is not None and shape in known)):
@@ -385,7 +386,8 @@ class _Design:
         together = here
         for place in range(len(scales)):
             once, twice = force({place: 0.5}), force({place: 1.0})
-            if np.abs(twice - 2.0 * once + here).max() > _SAME * size:
+            unseen = np.abs(twice - here).max() <= _SAME * size
+            if unseen or np.abs(twice - 2.0 * once + here).max() > _SAME * size:
                 continue
             joint = force({**dict.fromkeys(free, 0.5), place: 0.5})
             if np.abs(joint - together - once + here).max() <= _SAME * size:
