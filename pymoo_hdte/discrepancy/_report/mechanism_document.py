@@ -175,6 +175,12 @@ def limits(finding: MechanismFinding) -> list[str]:
         for one in finding.mechanism.inputs
         if not one.scaled
     ]
+    found += [
+        f"The inertial force of {name} is smaller than what the model leaves of its balance: a "
+        "simulation of its motion tells little, and the held-out force balance is what validates."
+        for name in finding.mechanism.coordinates
+        if name in finding.judged_by_balance and finding.simulated
+    ]
     found += _not_validated(finding)
     if not any(record.role == "held_out" for record in finding.records):
         found.append("No record was held out: the correction is not validated.")
@@ -192,6 +198,9 @@ def _not_validated(finding: MechanismFinding) -> list[str]:
         return []
     sizes = []
     for name in finding.mechanism.coordinates:
+        if name in finding.judged_by_balance:
+            sizes.append(f"the force balance of {name} comes no nearer to zero")
+            continue
         before, after, _ = np.mean([one.powers(name) for one in finding.simulated], axis=0) ** 0.5
         sizes.append(f"{name} by simulation, {before:.3g} without it and {after:.3g} with it")
     return [

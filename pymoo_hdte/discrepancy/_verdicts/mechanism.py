@@ -35,8 +35,10 @@ from pymoo_hdte.discrepancy._selection.rules import RULES, Rules
 from pymoo_hdte.discrepancy._selection.verdict import Verdict
 from pymoo_hdte.discrepancy._verdicts.held_out import (
     Progress,
+    balance_votes,
     simulate_held_out,
     voted,
+    without_mass,
 )
 from pymoo_hdte.discrepancy._verdicts.mechanism_choice import judged
 from pymoo_hdte.discrepancy._verdicts.mechanism_finding import MechanismFinding
@@ -105,8 +107,10 @@ def examine_mechanism(
     # A ripple beyond the band moves nothing that could be measured, and takes a solver many steps.
     fits = verdict.base, verdict.accepted
     simulated = simulate_held_out(mechanism, records, data, fits, known, progress)
-    verdict = voted(verdict, simulated)
-    finding = MechanismFinding(mechanism, records, cutoff, data, verdict, ripples, simulated)
+    light = without_mass(mechanism, data, verdict.accepted)
+    judges = light if verdict.accepted is not verdict.base else ()
+    verdict = voted(verdict, simulated, balance_votes(mechanism, records, data, fits, judges))
+    finding = MechanismFinding(mechanism, records, cutoff, data, verdict, ripples, simulated, light)
     if verdict.accepted is verdict.base:
         return finding
     return replace(finding, verdict=verdict.proven(worse=grown(prove_measured(finding))))
