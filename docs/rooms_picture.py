@@ -1,6 +1,7 @@
 """Draw docs/rooms.png, a picture of the package's architecture, made from its imports.
 
-A room is a folder; modules outside all folders, which every room may use, are not drawn.
+A room is a folder with all below its second level; modules outside all folders, which every room
+may use, are not drawn.
 An arrow means "imports from"; one that follows from others (a over b over c) is left out.
 """
 
@@ -54,7 +55,7 @@ def _file(module: str) -> Path:
 
 def _room(path: Path) -> str:
     folder = path.relative_to(ROOT).parent
-    return ".".join(folder.parts) if folder.parts else path.stem
+    return ".".join(folder.parts[:2]) if folder.parts else path.stem
 
 
 def rows(arrows: dict[str, set[str]]) -> list[list[str]]:
@@ -116,7 +117,8 @@ def draw(target: Path = PICTURE) -> None:
             arrowprops={"arrowstyle": "->", "color": "0.45", "shrinkA": 0, "shrinkB": 0},
         )
     for room, (x, y) in place.items():
-        modules = len(list(ROOT.joinpath(*room.split(".")).glob("*.py"))) - 1
+        paths = [path for path in ROOT.rglob("*.py") if path.stem != "__init__"]
+        modules = sum(_room(path) == room for path in paths)
         style = {"boxstyle": "round,pad=0.4", "edgecolor": "0.4"}
         colour = COLOURS.get(room.split(".")[0], OTHER)
         axis.text(

@@ -23,7 +23,7 @@ def _add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _run(options: argparse.Namespace, say: Say) -> Outcome:
-    from pymoo_hdte.discrepancy._records.draft import write_draft
+    from pymoo_hdte.discrepancy._records.drafts.draft import write_draft
     from pymoo_hdte.discrepancy._report.proposals import described, proposals
 
     if described(options.folder) is not None:

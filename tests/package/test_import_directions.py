@@ -21,6 +21,7 @@ LOWEST_FIRST = (
         "discrepancy._selection",
         "discrepancy._records",
         "discrepancy._records.cleaning",
+        "discrepancy._records.drafts",
         "discrepancy._evidence",
         "discrepancy._evidence.order_lines",
         "discrepancy._evidence.force_balances.beyond_band",

@@ -32,8 +32,8 @@ from pymoo_hdte.discrepancy._evidence.force_balances.unexplained import (
 from pymoo_hdte.discrepancy._records.rig_model import MechanismModel
 from pymoo_hdte.discrepancy._records.rig_records import SPLIT
 from pymoo_hdte.discrepancy._selection.candidate import Candidate
-from pymoo_hdte.discrepancy._verdicts.held_out import laws_of
 from pymoo_hdte.discrepancy._verdicts.mechanism_finding import MechanismFinding
+from pymoo_hdte.discrepancy._verdicts.mechanism_simulation import laws_of
 from pymoo_hdte.effects.effect import effect_named
 from pymoo_hdte.effects.friction import CoulombFriction
 from pymoo_hdte.effects.gravity import Gravity

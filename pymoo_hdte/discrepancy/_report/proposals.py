@@ -12,7 +12,7 @@ from pymoo_hdte._io.encodings import decoded
 from pymoo_hdte._io.toml import read_toml
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy._records.campaign_keys import CAMPAIGN_FILE
-from pymoo_hdte.discrepancy._records.rig_draft import EDIT
+from pymoo_hdte.discrepancy._records.drafts.rig_draft import EDIT
 from pymoo_hdte.discrepancy._records.rig_files import RIG_FILE
 from pymoo_hdte.discrepancy._report.folder import FOLDER
 

@@ -12,7 +12,7 @@ from pymoo_hdte.discrepancy import (
     read_rig,
 )
 from pymoo_hdte.discrepancy._answers.descriptive_model import DESCRIPTIVE_FILE
-from pymoo_hdte.discrepancy._verdicts.held_out import laws_of
+from pymoo_hdte.discrepancy._verdicts.mechanism_simulation import laws_of
 from pymoo_hdte.mechanism import BelievedValue, Input, Mechanism, Port, Record
 from pymoo_hdte.mechanism.balances import ForceBalance, quantity_names
 

@@ -16,10 +16,10 @@ from pymoo_hdte._io.unstated import read_unstated
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.cli import command_line as cli
 from pymoo_hdte.discrepancy import read_campaign, read_rig, write_campaign
-from pymoo_hdte.discrepancy._records.column_roles import Log, find_roles
-from pymoo_hdte.discrepancy._records.column_titles import read_title
-from pymoo_hdte.discrepancy._records.draft import draft_of, write_draft
-from pymoo_hdte.discrepancy._records.log_folder import read_log_folder
+from pymoo_hdte.discrepancy._records.drafts.column_roles import Log, find_roles
+from pymoo_hdte.discrepancy._records.drafts.column_titles import read_title
+from pymoo_hdte.discrepancy._records.drafts.draft import draft_of, write_draft
+from pymoo_hdte.discrepancy._records.drafts.log_folder import read_log_folder
 
 RATE = 200.0
 MASS, DAMPING, DRY = 0.4, 2.0, 1.5
@@ -159,7 +159,7 @@ def test_counts_of_an_encoder_are_told_by_an_angle_beside_it(tmp_path):
     columns = [signals["time"], counts, signals["position"] + 1e-3, signals["torque"]]
     write(tmp_path / "log.csv", columns, ["t", "encoder_inc", "angle_rad", "torque"])
     log = read_log_folder(tmp_path).log
-    from pymoo_hdte.discrepancy._records.column_roles import _Finder
+    from pymoo_hdte.discrepancy._records.drafts.column_roles import _Finder
 
     unit, sure, options, _ = _Finder(log)._counts("encoder_inc", None)
     assert (unit, sure, options["counts_per_turn"]) == ("counts", True, 65536.0)
@@ -291,7 +291,7 @@ def test_a_link_that_leads_nowhere_is_not_followed(tmp_path):
 
 def test_a_file_that_appears_meanwhile_is_not_replaced(tmp_path, monkeypatch):
     folder = a_log(tmp_path / "log")
-    from pymoo_hdte.discrepancy._records import draft as module
+    from pymoo_hdte.discrepancy._records.drafts import draft as module
 
     made = module.draft_of
 
@@ -348,8 +348,8 @@ def test_titles_of_any_characters_cannot_leave_their_comments(titles, tmp_path_f
     table = read_unstated(folder / "log.npz")
     from dataclasses import replace
 
-    from pymoo_hdte.discrepancy._records.log_folder import LogFolder
-    from pymoo_hdte.discrepancy._records.rig_draft import rig_text
+    from pymoo_hdte.discrepancy._records.drafts.log_folder import LogFolder
+    from pymoo_hdte.discrepancy._records.drafts.rig_draft import rig_text
 
     known = replace(table, titles=dict(zip(table.columns, titles, strict=True)))
     logs = LogFolder(folder, Log([known]), (known,), {}, (), tuple(titles))

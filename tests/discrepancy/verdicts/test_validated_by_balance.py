@@ -51,7 +51,7 @@ def test_a_mass_below_the_residual_is_judged_by_its_balance():
     for analysis in (light, heavy):
         assert "gravity" in [one.name for one in analysis.finding.accepted.candidates]
     # Both are told, whatever judges.
-    assert [gap.kind for gap in light.prove()] == ["simulation", "balance"]
+    assert [gap.kind for gap in light.validate()] == ["simulation", "balance"]
 
 
 @pytest.mark.nightly
@@ -68,5 +68,5 @@ def test_what_the_balance_confirms_is_not_denied(name, effect):
         pytest.skip(f"needs {LOGS / name}, which is no part of the project")
     analysis = analyse(read_rig(LOGS / name))
     assert effect in [one.name for one in analysis.finding.accepted.candidates]
-    before, after = next((g.before, g.after) for g in analysis.prove() if g.kind == "balance")
+    before, after = next((g.before, g.after) for g in analysis.validate() if g.kind == "balance")
     assert after < before

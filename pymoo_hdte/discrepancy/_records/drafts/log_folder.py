@@ -10,7 +10,7 @@ import numpy as np
 
 from pymoo_hdte._io.unstated import ENDINGS, UnstatedTable, read_unstated
 from pymoo_hdte.checks import InvalidInput
-from pymoo_hdte.discrepancy._records.column_roles import STILL, Log, Name, Values
+from pymoo_hdte.discrepancy._records.drafts.column_roles import STILL, Log, Name, Values
 
 _LENGTHS = 0.01
 """By which the rows of files that hold one record may differ, relative."""

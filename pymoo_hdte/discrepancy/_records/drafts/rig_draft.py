@@ -13,9 +13,15 @@ import numpy as np
 from pymoo_hdte._io.toml import toml_text
 from pymoo_hdte._io.unstated import UnstatedTable
 from pymoo_hdte.checks import InvalidInput, complaints_of
-from pymoo_hdte.discrepancy._records.column_roles import Balance, ColumnGuess, Name, Roles, Values
-from pymoo_hdte.discrepancy._records.column_titles import read_title
-from pymoo_hdte.discrepancy._records.log_folder import LogFolder
+from pymoo_hdte.discrepancy._records.drafts.column_roles import (
+    Balance,
+    ColumnGuess,
+    Name,
+    Roles,
+    Values,
+)
+from pymoo_hdte.discrepancy._records.drafts.column_titles import read_title
+from pymoo_hdte.discrepancy._records.drafts.log_folder import LogFolder
 from pymoo_hdte.discrepancy._records.rig_files import RIG_FILE, read_rig
 from pymoo_hdte.units import UNITS
 

@@ -10,11 +10,11 @@ from typing import Any
 
 from pymoo_hdte._io.whole_file import write_whole
 from pymoo_hdte.checks import InvalidInput
-from pymoo_hdte.discrepancy._records.campaign_draft import campaign_text, is_bench
 from pymoo_hdte.discrepancy._records.campaign_keys import CAMPAIGN_FILE
-from pymoo_hdte.discrepancy._records.column_roles import Roles, find_roles
-from pymoo_hdte.discrepancy._records.log_folder import LogFolder, read_log_folder
-from pymoo_hdte.discrepancy._records.rig_draft import EDIT, rig_text
+from pymoo_hdte.discrepancy._records.drafts.campaign_draft import campaign_text, is_bench
+from pymoo_hdte.discrepancy._records.drafts.column_roles import Roles, find_roles
+from pymoo_hdte.discrepancy._records.drafts.log_folder import LogFolder, read_log_folder
+from pymoo_hdte.discrepancy._records.drafts.rig_draft import EDIT, rig_text
 from pymoo_hdte.discrepancy._records.rig_files import RIG_FILE
 
 
@@ -58,7 +58,7 @@ class Draft:
         ]
         if edits:
             lines = ", ".join(map(str, edits))
-            sentences.append(f"Correct or confirm what is marked {EDIT}, in lines {lines}.")
+            sentences.append(f"Correct or confirm what is marked {EDIT}: line {lines}.")
         sentences.append(
             f"Then: pymoo-hdte discrepancy {self.logs.folder} --out {self.logs.folder / 'report'}"
         )

@@ -15,9 +15,9 @@ from pymoo_hdte.checks import InvalidInput, complaints_of
 from pymoo_hdte.discrepancy._records.campaign import RATED_STIFFNESS, RATED_TORQUE
 from pymoo_hdte.discrepancy._records.campaign_files import read_campaign
 from pymoo_hdte.discrepancy._records.campaign_keys import CAMPAIGN_FILE
-from pymoo_hdte.discrepancy._records.column_roles import ColumnGuess, Roles
-from pymoo_hdte.discrepancy._records.log_folder import LogFolder
-from pymoo_hdte.discrepancy._records.rig_draft import (
+from pymoo_hdte.discrepancy._records.drafts.column_roles import ColumnGuess, Roles
+from pymoo_hdte.discrepancy._records.drafts.log_folder import LogFolder
+from pymoo_hdte.discrepancy._records.drafts.rig_draft import (
     EDIT,
     channel_text,
     guess_text,

@@ -17,7 +17,7 @@ from scipy.ndimage import uniform_filter1d
 
 from pymoo_hdte._io.layout import CHANNEL_UNITS, COUNTS
 from pymoo_hdte._io.unstated import UnstatedTable
-from pymoo_hdte.discrepancy._records.column_titles import read_title
+from pymoo_hdte.discrepancy._records.drafts.column_titles import read_title
 from pymoo_hdte.mechanism.motion import noise_of
 from pymoo_hdte.units import UNITS
 

@@ -1,0 +1,1 @@
+"""Drafts of rig.toml and campaign.toml, guessed from the files of a folder."""
