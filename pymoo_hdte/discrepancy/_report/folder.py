@@ -5,9 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 from pymoo_hdte._reports.folder import ReportFolder
+from pymoo_hdte.discrepancy._answers.descriptive_model import DESCRIPTIVE_FILE
 from pymoo_hdte.discrepancy._answers.revision_drive import MODEL_FILE, SHEET_FILE
 
-FOLDER = ReportFolder("verdict.json", optional=(MODEL_FILE, SHEET_FILE))
+FOLDER = ReportFolder("verdict.json", optional=(MODEL_FILE, SHEET_FILE, DESCRIPTIVE_FILE))
 
 
 def check_report_folder(out: str | Path) -> None:
