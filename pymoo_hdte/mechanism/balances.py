@@ -63,7 +63,7 @@ class ForceBalance:
         Hz, up to which the motion is known. Force sensors are compared with the motion up to ten
         samples in a period.
     known : sequence of LawAt
-        Known laws; with dry friction among them rests are left out, see `moving_rows`.
+        Known laws; dry friction among them may hold a port at rest, see `moving_rows`.
 
     Attributes
     ----------
@@ -113,13 +113,15 @@ class ForceBalance:
             for actuation in mechanism.inputs
         }
         self._inputs = {name: signal[self._rows] for name, signal in signals.items()}
+        speed = {name: motion.speed[self._rows] for name, motion in self.motions.items()}
         self.ports = self._port_motions(
             {name: motion.position[self._rows] for name, motion in self.motions.items()},
-            {name: motion.speed[self._rows] for name, motion in self.motions.items()},
+            speed,
             self._inputs,
         )
         step = record.step * stride
-        self.moving = moving_rows(mechanism, record, cutoff, self.ports, step, known)
+        speeds = {name: speed[name] for name in mechanism.coordinates}
+        self.moving = moving_rows(mechanism, record, cutoff, speeds, self.ports, step, known)
         frequency = frequencies(self.moving.count, step)
         self._bins = int(np.count_nonzero(frequency <= highest))
         self.frequency = frequency[: self._bins]
