@@ -167,3 +167,19 @@ class Record:
     def step(self) -> float:
         """Mean time between samples, s."""
         return float((self.time[-1] - self.time[0]) / (len(self.time) - 1))
+
+
+def delayed(signal: NDArray[np.float64], step: float, delay: float) -> NDArray[np.float64]:
+    """Return a signal, (n,), later by a delay, on a cubic spline; its ends are held.
+
+    Parameters
+    ----------
+    signal : ndarray, shape (n,)
+    step, delay : float
+        s. A negative delay makes it earlier.
+    """
+    if delay == 0.0:
+        return signal
+    places = np.arange(len(signal))
+    moments = np.clip(places - delay / step, 0.0, len(signal) - 1.0)
+    return np.asarray(make_interp_spline(places, signal, 3)(moments))
