@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pymoo_hdte.discrepancy._evidence.force_balances.beyond_band.ripple import NO_RIPPLES, Ripples
+from pymoo_hdte.discrepancy._evidence.force_balances.delay import Delay
 from pymoo_hdte.discrepancy._evidence.force_balances.evidence import MeasuredData
 from pymoo_hdte.discrepancy._evidence.force_balances.unexplained import (
     root_mean_square,
@@ -42,6 +43,8 @@ class MechanismFinding:
         ``"adequate"``, but ``"named"`` without a chosen hypothesis.
     simulated : tuple of SimulatedRecord
         The held-out records by the base and by what the training records named.
+    delays : tuple of Delay
+        Of inputs, in the records as given; with those that the mechanism states taken out.
     """
 
     mechanism: Mechanism
@@ -51,6 +54,7 @@ class MechanismFinding:
     verdict: Verdict
     ripples: Ripples = NO_RIPPLES
     simulated: tuple[SimulatedRecord, ...] = ()
+    delays: tuple[Delay, ...] = ()
 
     @property
     def accepted(self) -> Fit:

@@ -94,9 +94,7 @@ def _delay(data: MeasuredData, name: str, laws: tuple[LawAt, ...]) -> Delay | No
         return None
     # Without each range in turn (Tukey's jackknife), because the residual of a model is not white.
     ranges = np.array_split(np.argsort(data.frequency, kind="stable"), _RANGES)
-    changes = np.array(
-        [_change(force, slope, columns, np.setdiff1d(every, one)) for one in ranges]
-    )
+    changes = np.array([_change(force, slope, columns, np.setdiff1d(every, one)) for one in ranges])
     variance = (_RANGES - 1.0) / _RANGES * np.sum((changes - changes.mean()) ** 2)
     spread = float(t.ppf(0.975, _RANGES - 1) * variance**0.5)
     slowest = max(one.record.step for one in data.spectra)
@@ -122,9 +120,7 @@ def _columns(data: MeasuredData, name: str, laws: tuple[LawAt, ...]) -> Values:
     """Return the whitened forces, (n, columns), of all that is fitted with a delay."""
     quantities = [one.name for one in data.base if one.name != f"gain of {name}"]
     slopes = [
-        data._linear[1][:, place]
-        for place, one in enumerate(data.base)
-        if one.name in quantities
+        data._linear[1][:, place] for place, one in enumerate(data.base) if one.name in quantities
     ]
     forces = [_whitened(data, [one.forces([law]) for one in data.spectra]) for law in laws]
     shapes = [list(_shapes(one, data)) for one in data.spectra]
