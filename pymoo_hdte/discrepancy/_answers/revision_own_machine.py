@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from pymoo_hdte._io.toml import toml_text, toml_with_lines
-from pymoo_hdte.discrepancy._verdicts.machine import MachineFinding
+from pymoo_hdte.discrepancy._verdicts.own_machine import MachineFinding
 from pymoo_hdte.mechanism import LawAt
 from pymoo_hdte.mechanism.effects import read_law, table_of
 
