@@ -171,7 +171,7 @@ class Record:
         Parameters
         ----------
         delays : mapping of str to float
-            By the name of a channel of a force; a negative delay makes it earlier.
+            s, by the name of a channel of a force; a negative delay makes it earlier.
 
         Raises
         ------
