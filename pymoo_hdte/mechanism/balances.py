@@ -27,7 +27,7 @@ from pymoo_hdte.mechanism.port_motion import (
     motion_at_port,
     torsion_noise,
 )
-from pymoo_hdte.mechanism.records import Record
+from pymoo_hdte.mechanism.records import Record, delayed
 from pymoo_hdte.mechanism.rests import moving_rows
 from pymoo_hdte.mechanism.working_rate import frequencies, highest_known, working_rows
 
@@ -63,7 +63,7 @@ class ForceBalance:
         Hz, up to which the motion is known. Force sensors are compared with the motion up to ten
         samples in a period.
     known : sequence of LawAt
-        Known laws; with dry friction among them rests are left out, see `moving_rows`.
+        Known laws; dry friction among them may hold a port at rest, see `moving_rows`.
 
     Attributes
     ----------
@@ -113,13 +113,15 @@ class ForceBalance:
             for actuation in mechanism.inputs
         }
         self._inputs = {name: signal[self._rows] for name, signal in signals.items()}
+        speed = {name: motion.speed[self._rows] for name, motion in self.motions.items()}
         self.ports = self._port_motions(
             {name: motion.position[self._rows] for name, motion in self.motions.items()},
-            {name: motion.speed[self._rows] for name, motion in self.motions.items()},
+            speed,
             self._inputs,
         )
         step = record.step * stride
-        self.moving = moving_rows(mechanism, record, cutoff, self.ports, step, known)
+        speeds = {name: speed[name] for name in mechanism.coordinates}
+        self.moving = moving_rows(mechanism, record, cutoff, speeds, self.ports, step, known)
         frequency = frequencies(self.moving.count, step)
         self._bins = int(np.count_nonzero(frequency <= highest))
         self.frequency = frequency[: self._bins]
@@ -162,6 +164,32 @@ class ForceBalance:
             force = self._law_coefficients(effect, here, zero / here if zero else 0.0)
             for name, share in self._rows_of(port).items():
                 coefficients[names.index(name)] += share * force
+        return coefficients
+
+    def of_port(self, port: str, signal: Values) -> Values:
+        """Return the coefficients, (n_balances, n_bins), of a force (n,) at a port, SI."""
+        names = balance_names(self.mechanism)
+        coefficients = np.zeros((len(names), self._bins))
+        for name, share in self._rows_of(self.mechanism.port(port)).items():
+            coefficients[names.index(name)] = share * self._transform(signal)
+        return coefficients
+
+    def of_input(self, name: str, delay: float = 0.0) -> Values:
+        """Return the coefficients, (n_balances, n_bins), of an input per unit of its gain.
+
+        Parameters
+        ----------
+        name : str
+        delay : float
+            Time by which it acts later than its channel says, s.
+        """
+        names, record = balance_names(self.mechanism), self.record
+        (actuation,) = (one for one in self.mechanism.inputs if one.name == name)
+        coefficients = np.zeros((len(names), self._bins))
+        highest = highest_known(self.mechanism, record, self.cutoff)
+        signal = smooth(delayed(record.channel(name), record.step, delay), record.step, highest)
+        for coordinate, share in actuation.acts.items():
+            coefficients[names.index(coordinate)] = share * self._transform(signal[self._rows])
         return coefficients
 
     def _law_coefficients(self, effect: LawAt, stiffness: float, shift: float) -> Values:

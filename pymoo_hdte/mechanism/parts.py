@@ -70,6 +70,8 @@ class Input:
         False where the gain of the only input is not known at all. It is then 1, and inertias,
         stiffnesses, dampings and forces, those of known effects as well, are in units of the
         signal: their ratios are determined, their sizes not.
+    delay : float or None
+        Time by which it acts later than its channel says, s; None if it is to be estimated.
 
     Examples
     --------
@@ -81,6 +83,7 @@ class Input:
     acts: Mapping[str, float]
     gain: BelievedValue = field(default=BelievedValue(1.0))
     scaled: bool = True
+    delay: float | None = 0.0
 
 
 @dataclass(frozen=True)

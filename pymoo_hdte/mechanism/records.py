@@ -163,7 +163,65 @@ class Record:
             self.name, self.role, self.time[0] + self.step * between, channels, self.noise
         )
 
+    def with_delays(self, delays: Mapping[str, float]) -> Record:
+        """Return the record with channels later by their delays, s, and a remark about each.
+
+        Rows at either end that a delay leaves without a sample are left out.
+
+        Parameters
+        ----------
+        delays : mapping of str to float
+            s, by the name of a channel of a force; a negative delay makes it earlier.
+
+        Raises
+        ------
+        InvalidInput
+            If too few samples remain, or there is no such channel.
+        """
+        taken = {name: delay for name, delay in delays.items() if delay}
+        early, late = (
+            math.ceil(max([0.0, *(sign * delay for delay in taken.values())]) / self.step)
+            for sign in (1.0, -1.0)
+        )
+        rows = slice(early, len(self.time) - late)
+        channels = {
+            name: delayed(channel, self.step, taken.get(name, 0.0))[rows]
+            for name, channel in self.channels.items()
+        }
+        told = [
+            f"{name} is taken to act {1e3 * abs(delay):.4g} ms "
+            f"{'later' if delay > 0.0 else 'earlier'} than its column says."
+            for name, delay in taken.items()
+        ]
+        return Record(
+            self.name,
+            self.role,
+            self.time[rows],
+            channels,
+            # As recorded: between two samples the curve has less noise than they have.
+            {name: noise_of(self.channel(name), jumps=True) for name in taken} | dict(self.noise),
+            self.dropped,
+            (*self.remarks, *told),
+            self.interpolated,
+        )
+
     @property
     def step(self) -> float:
         """Mean time between samples, s."""
         return float((self.time[-1] - self.time[0]) / (len(self.time) - 1))
+
+
+def delayed(signal: NDArray[np.float64], step: float, delay: float) -> NDArray[np.float64]:
+    """Return a signal, (n,), later by a delay, on a cubic spline; its ends are held.
+
+    Parameters
+    ----------
+    signal : ndarray, shape (n,)
+    step, delay : float
+        s. A negative delay makes it earlier.
+    """
+    if delay == 0.0:
+        return signal
+    places = np.arange(len(signal))
+    moments = np.clip(places - delay / step, 0.0, len(signal) - 1.0)
+    return np.asarray(make_interp_spline(places, signal, 3)(moments))

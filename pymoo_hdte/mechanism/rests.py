@@ -1,11 +1,13 @@
-"""Rests: where a port stands still, dry friction may have any force up to that of its breakaway.
+"""Rests: where a machine stands still, dry friction may have any force up to its breakaway.
 
 A joint without compliance does not tell which: a law of the speed would give it the sign of noise.
+Such rows bound the friction and determine no force. They are left out whether friction is known or
+still looked for, so that mechanisms with and without it are compared on the same rows.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -83,13 +85,15 @@ def moving_rows(
     mechanism: Mechanism,
     record: Record,
     cutoff: float,
+    speed: dict[str, Values],
     ports: dict[str, PortMotion],
     step: float,
     known: Sequence[LawAt],
 ) -> MovingRows:
-    """Return the rows of the motion of ports with their weights: 0 at rest, 1 while all move.
+    """Return the rows of the motion of ports with their weights: 0 at rest, 1 elsewhere.
 
-    A rest lasts a period of the cutoff at least; a reversal is none.
+    At rest all coordinates stand still, or a port that known friction can hold. A rest lasts a
+    period of the cutoff at least; a reversal is none.
 
     Parameters
     ----------
@@ -98,21 +102,28 @@ def moving_rows(
         The record, with the noise of its channels.
     cutoff : float
         Hz, up to which the motion is known.
+    speed : dict of str to ndarray, shape (n,)
+        Speeds of the coordinates, SI.
     ports : dict of str to PortMotion
     step : float
         Time step of the motions, s.
     known : sequence of LawAt
-        Known laws; only ports with a law that can hold them at rest have rests.
+        Known laws.
     """
     period = max(round(1.0 / (cutoff * step)), 2)
-    rests = np.zeros(len(next(iter(ports.values())).speed), dtype=bool)
-    for name in {friction.port for friction in known if friction.law.breakaway > 0.0}:
-        port = mechanism.port(name)
+
+    def still(values: Values, channels: Mapping[str, float]) -> NDArray[np.bool_]:
         noise = [
             share * smoothed_noise(record.noise_of(channel), record.step, cutoff)[1]
-            for channel, share in {**port.motion, **port.followed}.items()
+            for channel, share in channels.items()
         ]
-        rests |= _long(np.abs(ports[name].speed) < _STILL * np.hypot.reduce(noise), period)
+        return np.abs(values) < _STILL * np.hypot.reduce(noise)
+
+    standing = [still(values, {name: 1.0}) for name, values in speed.items()]
+    rests = _long(np.logical_and.reduce(standing), period)
+    for name in {friction.port for friction in known if friction.law.breakaway > 0.0}:
+        port = mechanism.port(name)
+        rests |= _long(still(ports[name].speed, {**port.motion, **port.followed}), period)
     around_rests = _spread(rests, round((_FADES + 0.5) * period))
     window = np.hanning(period + 2)
     edges = len(window) // 2, len(window) - 1 - len(window) // 2

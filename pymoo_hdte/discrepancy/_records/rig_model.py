@@ -92,6 +92,7 @@ def model_text(model: MechanismModel) -> str:
     top["inputs"] = {
         signal.name: {"acts": signal.acts}
         | ({"gain": _believed_table(signal.gain)} if signal.scaled else {})
+        | ({} if signal.delay == 0.0 else {"delay": _stated_delay(signal)})
         for signal in mechanism.inputs
     }
     # The reader takes finite numbers only: a loop without saturation has no limit there.
@@ -105,6 +106,10 @@ def model_text(model: MechanismModel) -> str:
     # Refuse now a text that could not be read back later.
     model_from_fields(Fields(top, "model"), "model")
     return toml_text(top)
+
+
+def _stated_delay(signal: Input) -> float | str:
+    return "estimated" if signal.delay is None else signal.delay
 
 
 def _believed_table(believed: BelievedValue) -> dict[str, float]:
@@ -152,7 +157,7 @@ def _mechanism(top: Fields, file: str) -> Mechanism:
         acts = _shares(table, "acts", f"{file}.inputs.{name}", inertias)
         scaled = table.has("gain")
         gain = _believed(table, "gain") if scaled else BelievedValue(1.0)
-        inputs.append(Input(name, acts, gain, scaled))
+        inputs.append(Input(name, acts, gain, scaled, _delay(table)))
         table.finish()
     input_names = [signal.name for signal in inputs]
     ports = [
@@ -169,6 +174,14 @@ def _mechanism(top: Fields, file: str) -> Mechanism:
         gains = {f"gain of {signal.name}": f"{file}.inputs.{signal.name}.gain" for signal in inputs}
         place = gains.get(error.field, f"{file}: {error.field}")
         raise InvalidInput(place, error.value, error.allowed) from None
+
+
+def _delay(table: Fields) -> float | None:
+    """Take the delay of an input, s; None where it is to be estimated."""
+    if not table.has("delay"):
+        return 0.0
+    stated = table.take("delay", "a number of seconds, or 'estimated'")
+    return None if stated == "estimated" else real_number(table._name("delay"), stated)
 
 
 def _tables_by_name(top: Fields, field: str, file: str) -> dict[str, Fields]:

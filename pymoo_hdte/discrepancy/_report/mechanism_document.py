@@ -186,6 +186,7 @@ def limits(finding: MechanismFinding) -> list[str]:
         for name in finding.mechanism.coordinates
         if name in finding.judged_by_balance and finding.simulated
     ]
+    sentences += _delays_told(finding)
     sentences += _not_validated(finding)
     if not any(record.role == "held_out" for record in finding.records):
         sentences.append("No record was held out: the correction is not validated.")
@@ -194,6 +195,21 @@ def limits(finding: MechanismFinding) -> list[str]:
         if names:
             sentences.append(f"At the bound of its tolerance: {', '.join(names)}.")
     return [*sentences, *finding.ripples.limits]
+
+
+def _delays_told(finding: MechanismFinding) -> list[str]:
+    """Return a sentence on each delay of an input whose interval excludes zero."""
+    sentences = []
+    for delay in finding.delays:
+        if delay.evident:
+            middle, spread = 1e3 * abs(delay.value), 1e3 * delay.spread
+            sentences.append(
+                f"{delay.input} acts {middle:.3g} ms {'later' if delay.value > 0.0 else 'earlier'} "
+                f"than its column says ({middle - spread:.3g} to {middle + spread:.3g}, "
+                f"{abs(delay.samples):.2g} samples), by the phase of the force balance. It is "
+                f"not corrected; inputs.{delay.input}.delay in the rig's file does so."
+            )
+    return sentences
 
 
 def _not_validated(finding: MechanismFinding) -> list[str]:

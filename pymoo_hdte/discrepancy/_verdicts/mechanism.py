@@ -15,6 +15,7 @@ from functools import partial
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy._evidence.force_balances.beyond_band.ripple import Ripples, find_ripples
 from pymoo_hdte.discrepancy._evidence.force_balances.candidates import mechanism_candidates
+from pymoo_hdte.discrepancy._evidence.force_balances.delay import Delay, delays
 from pymoo_hdte.discrepancy._evidence.force_balances.evidence import MeasuredData, measured_data
 from pymoo_hdte.discrepancy._evidence.force_balances.orders import position_orders
 from pymoo_hdte.discrepancy._evidence.force_balances.preconditions import (
@@ -94,6 +95,7 @@ def examine_mechanism(
         raise InvalidInput("number of train records", 0, "at least 1")
     check_signals(mechanism, records)
     cutoff = usual_cutoff(mechanism, train, rules) if cutoff is None else cutoff
+    mechanism, records = _in_time(mechanism, records, cutoff, known, rules)
     sampled, records = records, fine_enough(records, cutoff)
     check_sampling(mechanism, records, cutoff)
     train = [record for record in records if record.role == "train"]
@@ -111,12 +113,43 @@ def examine_mechanism(
     judges = light if verdict.accepted is not verdict.base else ()
     balances = held_out_balances(mechanism, records, data, fits, judges)
     verdict = mechanism_after_held_out_test(verdict, simulated, balances)
-    finding = MechanismFinding(mechanism, records, cutoff, data, verdict, ripples, simulated, light)
+    late = tuple(delays(data, tuple(verdict.accepted.effects)))
+    finding = MechanismFinding(
+        mechanism, records, cutoff, data, verdict, ripples, simulated, light, late
+    )
     if verdict.accepted is verdict.base:
         return finding
     return replace(
         finding, verdict=verdict.after_held_out_test(worse=grown(validate_mechanism(finding)))
     )
+
+
+def _in_time(
+    mechanism: Mechanism,
+    records: Sequence[Record],
+    cutoff: float,
+    known: Sequence[LawAt],
+    rules: Rules,
+) -> tuple[Mechanism, Sequence[Record]]:
+    """Return a mechanism without unknown delays, and records in which every input acts at once."""
+    found: dict[str, Delay] = {}
+    if any(actuator.delay is None for actuator in mechanism.inputs):
+        fine = fine_enough(records, cutoff)
+        check_sampling(mechanism, fine, cutoff)
+        train = [record for record in fine if record.role == "train"]
+        sensors = measured_data(mechanism, train, cutoff, known, rules)
+        data = sensors.with_residual_as_noise(fit(sensors).residuals)
+        found = {delay.input: delay for delay in delays(data)}
+    taken = {
+        actuator.name: (found[actuator.name].value if actuator.name in found else 0.0)
+        if actuator.delay is None
+        else actuator.delay
+        for actuator in mechanism.inputs
+    }
+    if not found and not any(taken.values()):
+        return mechanism, records
+    inputs = [replace(actuator, delay=taken[actuator.name]) for actuator in mechanism.inputs]
+    return replace(mechanism, inputs=inputs), [record.with_delays(taken) for record in records]
 
 
 def _beyond(

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pymoo_hdte.discrepancy._evidence.force_balances.beyond_band.ripple import NO_RIPPLES, Ripples
+from pymoo_hdte.discrepancy._evidence.force_balances.delay import Delay
 from pymoo_hdte.discrepancy._evidence.force_balances.evidence import MeasuredData
 from pymoo_hdte.discrepancy._evidence.force_balances.unexplained import (
     root_mean_square,
@@ -45,6 +46,8 @@ class MechanismFinding:
     judged_by_balance : frozenset of str
         Coordinates of which the force balance is validated, since their mass is too small for a
         simulation: see `without_mass`.
+    delays : tuple of Delay
+        Of inputs, in the records as given; with those that the mechanism states taken out.
     """
 
     mechanism: Mechanism
@@ -55,6 +58,7 @@ class MechanismFinding:
     ripples: Ripples = NO_RIPPLES
     simulated: tuple[SimulatedRecord, ...] = ()
     judged_by_balance: frozenset[str] = frozenset()
+    delays: tuple[Delay, ...] = ()
 
     @property
     def accepted(self) -> Fit:

@@ -8,7 +8,7 @@ from pymoo_hdte.discrepancy._evidence.force_balances.unexplained import root_mea
 from pymoo_hdte.discrepancy._report.mechanism_document import limits
 from pymoo_hdte.discrepancy._selection.fitting import fit
 from pymoo_hdte.discrepancy._verdicts.mechanism import examine_mechanism
-from pymoo_hdte.effects.friction import CoulombFriction, NonlinearDrag
+from pymoo_hdte.effects.friction import CoulombFriction
 from pymoo_hdte.effects.law import PortState, periodic_phase
 from pymoo_hdte.mechanism import BelievedValue, Input, LawAt, Mechanism, Port, Record
 from pymoo_hdte.mechanism.balances import ForceBalance
@@ -83,14 +83,61 @@ def test_rows_that_are_left_out_count_neither_for_intervals_nor_for_chi_square()
     assert noise == pytest.approx(0.2 * (2.0 * CUTOFF * STEP) ** 0.5, rel=0.15)
 
 
-def test_only_rests_under_known_dry_friction_are_left_out():
+def standing(share):
+    """Return a record that stands still for such a share of its time, held below breakaway."""
+    moves = record_of(0.0)
+    count = len(moves.time)
+    rows = round(count * share / (1.0 - share))
+    held = 0.8 * LEVEL * np.sin(0.7 * STEP * np.arange(rows))
+    noise = np.random.default_rng(5).standard_normal((2, rows))
+    before = {"q": 1e-5 * noise[0], "torque": held + 0.02 * noise[1]}
+    channels = {name: np.concatenate([before[name], moves.channels[name]]) for name in before}
+    return Record("standing", "train", STEP * np.arange(count + rows), channels)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.2, 1.0 / 3.0])
+def test_a_joint_that_stands_still_has_the_same_friction(share):
+    finding = examine_mechanism(JOINT, [standing(share)], CUTOFF)
+    assert finding.verdict.status == "named"
+    (effect,) = finding.accepted.effects
+    assert effect.name == "coulomb_friction"
+    fitted = finding.accepted
+    spread = np.diag(fitted.covariance) ** 0.5
+    assert np.all(np.abs(fitted.values - [INERTIA, DAMPING, LEVEL]) < 4.0 * spread)
+    assert spread[2] < 0.02 * LEVEL
+
+
+def test_friction_is_fitted_to_the_same_rows_whether_it_is_known_or_not():
+    record = standing(0.3)
+    unknown, known = (ForceBalance(JOINT, record, CUTOFF, laws) for laws in ([], [DRY]))
+    assert unknown.left_out > 0.29 * len(record.time)
+    assert np.array_equal(unknown.moving.weight, known.moving.weight)
+
+
+def test_a_machine_of_which_a_part_moves_is_not_at_rest():
+    """Only known friction may hold a single port: torsion tests lock the output."""
     resting = record_of(1.0)
-    time, noise = resting.time, 1e-5 * np.random.default_rng(1).standard_normal(len(resting.time))
+    noise = 1e-5 * np.random.default_rng(2).standard_normal(len(resting.time))
+    channels = {
+        **resting.channels,
+        "load": noise + 0.05 * np.sin(8.0 * resting.time),
+    }
+    drive = Mechanism(
+        {"q": BelievedValue(0.6, 0.5), "load": BelievedValue(1.0, 0.5)},
+        [Port("bearing", {"q": 1.0}), Port("shaft", {"q": 1.0, "load": -1.0})],
+        [Input("torque", {"q": 1.0})],
+    )
+    record = Record("locked", "train", resting.time, channels)
+    assert ForceBalance(drive, record, CUTOFF).left_out == 0
+    assert ForceBalance(drive, record, CUTOFF, [DRY]).left_out > 0
+
+
+def test_a_motion_without_rests_keeps_every_row():
+    time = record_of(1.0).time
+    noise = 1e-5 * np.random.default_rng(1).standard_normal(len(time))
     swing = {"q": np.sin(2.0 * time) + noise, "torque": np.cos(2.0 * time) + noise}
-    turning = Record("turning", "train", time, swing)
-    drag = LawAt("nonlinear_drag", "bearing", NonlinearDrag(1.0))
-    for record, known in ((turning, [DRY]), (resting, []), (resting, [drag])):
-        balance = ForceBalance(JOINT, record, CUTOFF, known)
+    for known in ([DRY], []):
+        balance = ForceBalance(JOINT, Record("turning", "train", time, swing), CUTOFF, known)
         assert balance.left_out == 0
         assert np.all(balance.moving.weight == 1.0)
     # Of a record that moves once nothing is left out: it would tell nothing at all.

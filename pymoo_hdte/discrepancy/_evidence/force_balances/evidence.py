@@ -176,7 +176,7 @@ def measured_data(
     cutoff : float
         Frequency up to which the motion is known, Hz.
     known : sequence of LawAt
-        Effects that the mechanism has; rows in which one of them holds a port at rest are left out.
+        Effects that the mechanism has. Rows at rest are left out, see `moving_rows`.
     rules : Rules
         Thresholds of the verdict on the records.
 

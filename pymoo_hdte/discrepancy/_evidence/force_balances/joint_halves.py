@@ -165,7 +165,7 @@ def torsion_half(joint: Joint, records: Sequence[Record], known: Sequence[LawAt]
     )
     gear = replace(joint.gear, motion={motor: 1.0}, followed={load: -1.0}, error=error, gear=None)
     inputs = [
-        Input(signal.name, {motor: signal.acts[motor]}, signal.gain, signal.scaled)
+        Input(signal.name, {motor: signal.acts[motor]}, signal.gain, signal.scaled, signal.delay)
         for signal in joint.mechanism.inputs
         if signal.acts.get(motor)
     ]
