@@ -191,9 +191,7 @@ MILD = Nuisances(
 LEVELS = {"mild": MILD}
 
 
-def bench_with(
-    about: Circumstances, nuisances: Nuisances, generators: Generators
-) -> Circumstances:
+def bench_with(about: Circumstances, nuisances: Nuisances, generators: Generators) -> Circumstances:
     """Return the circumstances of a session on a bench with nuisances.
 
     Parameters
