@@ -47,8 +47,7 @@ def nuisances_of(bench: str) -> Nuisances:
         return LEVELS[bench]
     group, given, number = bench.partition("=")
     if group not in GROUPS:
-        known = ", ".join((IDEAL_BENCH, *LEVELS, *GROUPS))
-        raise InvalidInput(f"unknown bench {bench!r}, known: {known}")
+        raise InvalidInput("bench", bench, ", ".join((IDEAL_BENCH, *LEVELS, *GROUPS)))
     if group == "sensor_at_brake":
         return Nuisances(sensor_at_brake=True)
     alone = MILD.alone(group)
@@ -57,7 +56,7 @@ def nuisances_of(bench: str) -> Nuisances:
     try:
         return replace(alone, **{GROUPS[group][0]: float(number)})
     except ValueError:
-        raise InvalidInput(f"{number!r} of bench {bench!r} is no number") from None
+        raise InvalidInput("bench", bench, f"{group}= and a number") from None
 
 
 @dataclass(frozen=True)

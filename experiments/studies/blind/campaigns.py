@@ -77,7 +77,8 @@ def hiding(case: Case, nuisances: Nuisances = IDEAL) -> Hiding:
         nuisances = replace(nuisances, shaft_stiffness=0.0, shaft_damping=0.0)
     if nuisances.groups:
         about = bench_with(about, nuisances, lambda group: case.generator(f"nuisance {group}"))
-        session, twin = shown(about, effects), shown(about, ())
+        twin = shown(about, ())
+        session = shown(about, effects) if effects else twin
     return Hiding(case, about, tuple(effects), session, twin, nuisances)
 
 

@@ -155,8 +155,10 @@ def run(
     linear = linear_part(machine)
     plant = plant_of(machine, linear, condition, load, start, clock)
     ripples = plant.rows[plant.rows[:, 0] == el.RIPPLE, 2]
-    finest = max(HIGHEST_ORDER, float(ripples.max(initial=0.0)))
-    substeps = condition.substeps_for(finest) * refined
+    finest = float(ripples.max(initial=0.0))
+    substeps = condition.substeps * refined
+    if finest > HIGHEST_ORDER:
+        substeps = condition.substeps_for(finest) * refined
     modes = np.abs(np.linalg.eigvals(linear.system).real)
     settling = max(
         SETTLED / modes[modes > 1e-6].min(), SETTLED_TURNS * 2.0 * math.pi / abs(condition.speed)
