@@ -241,9 +241,8 @@ for name, deflection in (("wide", 4e-3), ("less", 3e-3), ("narrow", 1.5e-3), ("h
 analysis = analyse(Oscillator(stiffness, frequency, 0.85, 0.2, noise, tests))
 print(f"{analysis.verdict.status}: {analysis.revised_model().effects[0]}, {friction} N is hidden")
 print(analysis.locate().sentence)
-print(
-    f"prediction error, in standard deviations of the noise: {analysis.prove().overall.after:.2f}"
-)
+error = analysis.validate().overall
+print(f"prediction error, in standard deviations of the noise: {error.after:.2f}")
 
 # %%
 # A part of an algorithm

@@ -82,7 +82,7 @@ def _analysed(options: argparse.Namespace, believed: ModelFiles, say: Say) -> di
     say("locating the misfit")
     analysis.locate()
     say("validating it on the held-out records")
-    analysis.prove()
+    analysis.validate()
     say("choosing the next test and writing the report")
     document = analysis.report(options.out)
     for hint in document.get("sensor_hints", ()):

@@ -54,22 +54,22 @@ def _choice(
 ) -> Choice:
     choose = WeightedUtopia(PREFERENCES[preference])
     (old_designs, old_values), (new_designs, new_values) = fronts
-    first, second = choose.do(old_values), choose.do(new_values)
-    before, after = old_designs[first] / old.nominal, new_designs[second] / new.nominal
+    old_row, new_row = choose.do(old_values), choose.do(new_values)
+    before, after = old_designs[old_row] / old.nominal, new_designs[new_row] / new.nominal
     # The factors lie in a box that is the same for both; rounding must not lead out of it.
     same = np.clip(before * new.nominal, new.xl, new.xu)
     return Choice(
         preference,
         before=before,
         after=after,
-        free_before=_free(old, old_designs[first]),
-        free_after=_free(new, new_designs[second]),
+        free_before=_without_influence(old, old_designs[old_row]),
+        free_after=_without_influence(new, new_designs[new_row]),
         distance=float(deviation_degree(after[None, :], before)[0]),
-        promised=old_values[first],
+        promised=old_values[old_row],
         delivered=new.evaluate(same[None, :])[0],
-        reached=new_values[second],
+        reached=new_values[new_row],
     )
 
 
-def _free(problem: RobustDTE, design: Values) -> NDArray[np.bool_]:
+def _without_influence(problem: RobustDTE, design: Values) -> NDArray[np.bool_]:
     return without_influence(problem.evaluate, problem.xl, problem.xu, design)

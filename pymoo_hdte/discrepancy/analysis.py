@@ -24,7 +24,7 @@ from pymoo_hdte.discrepancy._records.campaign import Campaign
 from pymoo_hdte.discrepancy._records.rig_files import MeasuredMechanism
 from pymoo_hdte.discrepancy._records.rig_model import MechanismModel
 from pymoo_hdte.discrepancy._report.folder import check_report_folder
-from pymoo_hdte.discrepancy._report.words import doubts
+from pymoo_hdte.discrepancy._report.words import caveats
 from pymoo_hdte.discrepancy._selection.rules import RULES, Rules
 from pymoo_hdte.discrepancy._selection.verdict import Verdict
 from pymoo_hdte.discrepancy._verdicts.drive import examine_drive
@@ -40,8 +40,11 @@ from pymoo_hdte.discrepancy._verdicts.machine import (
 )
 from pymoo_hdte.discrepancy._verdicts.mechanism import examine_mechanism
 from pymoo_hdte.discrepancy._verdicts.mechanism_finding import MechanismFinding
-from pymoo_hdte.discrepancy._verdicts.validation_drive import Proof, prove
-from pymoo_hdte.discrepancy._verdicts.validation_mechanism import MeasuredGap, prove_measured
+from pymoo_hdte.discrepancy._verdicts.validation_drive import Validation, validate_drive
+from pymoo_hdte.discrepancy._verdicts.validation_mechanism import (
+    MechanismPredictionError,
+    validate_mechanism,
+)
 from pymoo_hdte.drive import DriveModel
 from pymoo_hdte.effects.effect import Effect, register
 
@@ -147,9 +150,8 @@ class Analysis(ABC):
 
     Examples
     --------
-    >>> analysis = analyse(read_campaign("campaign"))  # doctest: +SKIP
-    >>> analysis.verdict.status, analysis.locate().sentence  # doctest: +SKIP
-    >>> analysis.report("report")  # doctest: +SKIP
+    >>> issubclass(DriveAnalysis, Analysis), issubclass(MachineAnalysis, Analysis)
+    (True, True)
     """
 
     finding: Any
@@ -160,9 +162,9 @@ class Analysis(ABC):
         return cast(Verdict, self.finding.verdict)
 
     @property
-    def doubts(self) -> tuple[str, ...]:
+    def caveats(self) -> tuple[str, ...]:
         """The reasons of the verdict in words: what forbids to name its effects plainly."""
-        return tuple(doubts(self.verdict))
+        return tuple(caveats(self.verdict))
 
     @ONE_THREAD
     def report(self, out: str | Path) -> dict[str, Any]:
@@ -193,7 +195,7 @@ class Analysis(ABC):
         """Return where the model is wrong, in words as well."""
 
     @abstractmethod
-    def prove(self) -> Any:
+    def validate(self) -> Any:
         """Return the errors on held-out records before and after the correction."""
 
     @abstractmethod
@@ -216,6 +218,11 @@ class DriveAnalysis(Analysis):
     ----------
     finding : DriveFinding
         Campaign, features of its records and verdict.
+
+    Examples
+    --------
+    >>> analysis = analyse(read_campaign("campaign"))  # doctest: +SKIP
+    >>> problem = RobustDTE(model=analysis.revised_model())  # doctest: +SKIP
     """
 
     finding: DriveFinding
@@ -229,17 +236,17 @@ class DriveAnalysis(Analysis):
         return self.finding.campaign
 
     @property
-    def doubts(self) -> tuple[str, ...]:
+    def caveats(self) -> tuple[str, ...]:
         """The reasons of the verdict in words, lines of the static error by their orders."""
-        return tuple(doubts(self.verdict, self.campaign.believed.error_orders))
+        return tuple(caveats(self.verdict, self.campaign.believed.error_orders))
 
     def locate(self) -> Location:
         """Return where the believed model is wrong: by record, channel and order, and in words."""
         return self._location
 
-    def prove(self) -> Proof | None:
-        """Return the gap on the held-out records before and after; None without such records."""
-        return self._proof
+    def validate(self) -> Validation | None:
+        """Return the errors on the held-out records before and after; None without such records."""
+        return self._validation
 
     def next_experiment(self) -> Proposal:
         """Return the test that best resolves what is still uncertain."""
@@ -260,7 +267,7 @@ class DriveAnalysis(Analysis):
         from pymoo_hdte.discrepancy._report.write import write_report
         from pymoo_hdte.discrepancy._robust_optimum import optimum_shift
 
-        answers = self.locate(), self.prove(), self.next_experiment()
+        answers = self.locate(), self.validate(), self.next_experiment()
         return write_report(self.finding, *answers, optimum_shift, out)
 
     @cached_property
@@ -270,8 +277,8 @@ class DriveAnalysis(Analysis):
 
     @cached_property
     @ONE_THREAD
-    def _proof(self) -> Proof | None:
-        return prove(self.finding)
+    def _validation(self) -> Validation | None:
+        return validate_drive(self.finding)
 
     @cached_property
     @ONE_THREAD
@@ -288,6 +295,11 @@ class MechanismAnalysis(Analysis):
         The mechanism as it is believed, and its records.
     finding : MechanismFinding
         Force balances of the records, verdict, and unexplained residual.
+
+    Examples
+    --------
+    >>> analysis = analyse(read_rig("my_rig"))  # doctest: +SKIP
+    >>> analysis.revised_model().effects  # doctest: +SKIP
     """
 
     finding: MechanismFinding
@@ -299,9 +311,9 @@ class MechanismAnalysis(Analysis):
         """Return in which force balance the believed model is wrong, and by how much."""
         return locate_in_mechanism(self.finding)
 
-    def prove(self) -> tuple[MeasuredGap, ...]:
-        """Return the gaps on the held-out records before and after; none without such records."""
-        return self._gaps
+    def validate(self) -> tuple[MechanismPredictionError, ...]:
+        """Return the errors on the held-out records before and after; none without such records."""
+        return self._errors
 
     def next_experiment(self) -> NextTest:
         """Return the repetition of a record that best resolves what is still uncertain."""
@@ -315,7 +327,7 @@ class MechanismAnalysis(Analysis):
         # Plotting is slow to import, and only a report needs it.
         from pymoo_hdte.discrepancy._report.mechanism import write_mechanism_report
 
-        answers = self.prove(), self.next_experiment()
+        answers = self.validate(), self.next_experiment()
         return write_mechanism_report(
             self.measured.title, self.finding, *answers, out, joint=self._beside
         )
@@ -327,8 +339,8 @@ class MechanismAnalysis(Analysis):
 
     @cached_property
     @ONE_THREAD
-    def _gaps(self) -> tuple[MeasuredGap, ...]:
-        return prove_measured(self.finding)
+    def _errors(self) -> tuple[MechanismPredictionError, ...]:
+        return validate_mechanism(self.finding)
 
     @cached_property
     @ONE_THREAD
@@ -339,7 +351,7 @@ class MechanismAnalysis(Analysis):
 class JointAnalysis(MechanismAnalysis):
     """The analysis of a joint with two encoders; made by `analyse`.
 
-    Its verdict, location, proof and next experiment are those of the balance of torques.
+    Its verdict, location, validation and next experiment are those of the balance of torques.
 
     Attributes
     ----------
@@ -380,6 +392,22 @@ class MachineAnalysis(Analysis):
     machine : Machine
     finding : MachineFinding
         Evidence and verdict.
+
+    Examples
+    --------
+    >>> from types import SimpleNamespace
+    >>> from pymoo_hdte.effects import unknown
+    >>> class Pulls(ModelEvidence):
+    ...     base = (unknown("stiffness", 90.0, 110.0, 100.0),)
+    ...     def residuals(self, values, effects):
+    ...         return [{"force": (values["stiffness"] - 98.0) * np.ones(8)}]
+    ...     def sizes(self, fitted):
+    ...         return {}
+    >>> record = SimpleNamespace(name="pull", role="train")
+    >>> machine = SimpleNamespace(records=[record], evidence=lambda records: Pulls())
+    >>> analysis = analyse(machine)
+    >>> analysis.verdict.status, round(analysis.revised_model().values["stiffness"], 1)
+    ('adequate', 98.0)
     """
 
     finding: MachineFinding
@@ -391,7 +419,7 @@ class MachineAnalysis(Analysis):
         """Return in which channels and records the model is wrong, and by how much."""
         return locate_in_parts(self.finding)
 
-    def prove(self) -> HeldOutErrors | None:
+    def validate(self) -> HeldOutErrors | None:
         """Return the errors on the held-out records; None without such records."""
         return held_out_errors(self.finding)
 
@@ -406,5 +434,5 @@ class MachineAnalysis(Analysis):
     def _write(self, out: str | Path) -> dict[str, Any]:
         from pymoo_hdte.discrepancy._report.machine import write_machine_report
 
-        answers = self.locate(), self.prove(), self.next_experiment()
+        answers = self.locate(), self.validate(), self.next_experiment()
         return write_machine_report(self.finding, *answers, out)

@@ -215,6 +215,7 @@ with open(sys.argv[1], "wb") as file:
 """
 
 
+@pytest.mark.nightly
 def test_same_bytes_in_another_process_and_after_pickling_halfway(tmp_path):
     uninterrupted = run(AMPMOPSO(), n_gen=120, seed=7)
     expected = uninterrupted.X.tobytes(), uninterrupted.F.tobytes()
@@ -310,6 +311,7 @@ def test_evaluation_limit_terminates_and_sets_the_schedules():
     assert digest(by_evaluations) == digest(run(swarm, n_gen=20))
 
 
+@pytest.mark.nightly
 def test_default_termination_works():
     result = minimize(Parabolas(), AMPMOPSO(**SMALL), seed=1)
     assert result.algorithm.generations == 1000

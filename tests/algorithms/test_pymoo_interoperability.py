@@ -85,6 +85,7 @@ def test_the_package_s_name_imports_nothing_else():
     assert done.stdout.split() == ["pymoo_hdte"]
 
 
+@pytest.mark.nightly
 def test_problem_and_swarm_load_only_those_parts_of_scipy_that_they_use():
     """SciPy's signals and statistics alone take longer to load than all of a pymoo study."""
     code = (

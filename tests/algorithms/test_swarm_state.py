@@ -150,7 +150,7 @@ def test_a_population_evaluated_again_replaces_what_was_true_before(swarm):
         pytest.param(ElitistSwarm, "bnh", marks=pytest.mark.nightly),
         pytest.param(ElitistSwarm, "tnk", marks=pytest.mark.nightly),
         (ElitistSwarm, "dascmop1"),
-        (AMPMOPSO, "bnh"),
+        pytest.param(AMPMOPSO, "bnh", marks=pytest.mark.nightly),
     ],
 )
 def test_pymoo_s_adaptive_constraint_handling_takes_our_swarms(make, name):

@@ -96,16 +96,28 @@ def test_limits_to_order_enclose_the_design_by_the_tolerance(document):
         assert band["upper"] == pytest.approx(1.05 * value)
 
 
-def test_the_command_writes_what_the_study_says_and_prints_it(tmp_path, capsys):
-    out, again, cycle = tmp_path / "out", tmp_path / "again", tmp_path / "cycle.csv"
+def put_cycle(folder):
+    cycle = folder / "cycle.csv"
     cycle.write_text("speed_rpm,load_Nm,weight\n200,40,1\n2000,40,3\n")
-    arguments = ("--cycle", cycle, "--model", "published", "--out", out, "--json")
+    return cycle
+
+
+def test_the_command_writes_what_it_prints(tmp_path, capsys):
+    out = tmp_path / "out"
+    arguments = ("--cycle", put_cycle(tmp_path), "--model", "published", "--out", out, "--json")
     assert optimise("hs_20_100", *arguments, *QUICK) == 0
     document = json.loads(capsys.readouterr().out)
     assert [row["share"] for row in document["settings"]["conditions"]] == [0.25, 0.75]
     assert document == json.loads((out / "optimum.json").read_text())
     # As printed the model has no trade-off.
     assert any("next to nothing to gain" in one for one in document["limits"])
+
+
+@pytest.mark.nightly
+def test_the_command_writes_the_bytes_of_the_study(tmp_path):
+    out, again, cycle = tmp_path / "out", tmp_path / "again", put_cycle(tmp_path)
+    arguments = ("--cycle", cycle, "--model", "published", "--out", out, "--quiet")
+    assert optimise("hs_20_100", *arguments, *QUICK) == 0
     settings = replace(SETTINGS, conditions=load_conditions(cycle))
     study = run_design_study(preset("published"), "balanced", settings)
     optimum_report.write_optimum_report(study, (), again)

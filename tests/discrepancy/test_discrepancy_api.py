@@ -88,7 +88,7 @@ def test_a_drive_from_verdict_to_report(analysis, reported):
     out, document = reported
     assert analysis.verdict.status == document["status"] == "named"
     assert document["location"] == as_written(analysis.locate().summary())
-    assert document["held_out"] == as_written(analysis.prove().as_dict())
+    assert document["held_out"] == as_written(analysis.validate().as_dict())
     assert document["next_experiment"] == as_written(analysis.next_experiment().as_dict())
     assert next(iter(document.items())) == ("schema_version", 1)
     sheet = load_datasheet(out / "revised_model_sheet.toml")
@@ -102,7 +102,7 @@ def test_a_mechanism_from_verdict_to_report(tmp_path):
     document = of_mechanism.report(tmp_path / "report")
     assert of_mechanism.verdict.status == document["status"] == "named"
     assert document["location"] == of_mechanism.locate().summary()
-    assert document["held_out"] == [gap.as_dict() for gap in of_mechanism.prove()]
+    assert document["held_out"] == [error.as_dict() for error in of_mechanism.validate()]
     assert document["next_experiment"] == of_mechanism.next_experiment().as_dict()
     assert next(iter(document.items())) == ("schema_version", 1)
     written = read_mechanism_model(tmp_path / "report" / "revised_model.toml")
@@ -113,15 +113,15 @@ def test_nothing_is_worked_out_twice(analysis, reported, monkeypatch):
     def again(*_):
         raise AssertionError("worked out twice")
 
-    for name in ("locate", "prove", "next_experiment"):
+    for name in ("locate", "validate_drive", "next_experiment"):
         monkeypatch.setattr(drive_analysis, name, again)
     assert analysis.locate() is analysis.locate()
-    assert analysis.prove() is analysis.prove()
+    assert analysis.validate() is analysis.validate()
     assert analysis.next_experiment() is analysis.next_experiment()
 
 
 def test_other_things_are_not_analysed():
-    with pytest.raises(InvalidInput, match="measured is 'str', allowed: a Campaign or"):
+    with pytest.raises(InvalidInput, match="measured is 'str', allowed: a Campaign, a"):
         analyse("campaign")
 
 

@@ -74,7 +74,7 @@ def test_dry_friction_is_named_with_its_level(analysis):
 
 
 def test_held_out_test_is_predicted_to_the_noise(analysis):
-    errors = analysis.prove()
+    errors = analysis.validate()
     assert errors.overall.before > 5.0
     assert errors.overall.after == pytest.approx(1.0, abs=0.3)
 

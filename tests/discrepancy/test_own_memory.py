@@ -94,6 +94,7 @@ def test_report_tells_its_values_and_sentence(report):
         )
 
 
+@pytest.mark.nightly
 def test_revised_model_holds_it_as_it_was_fitted(report, measured, analysis):
     with registered(GRIPPING_SEAL):
         model = read_mechanism_model(report / "revised_model.toml")

@@ -1,12 +1,14 @@
-"""Every value at both of its bounds goes through fit, proof, report and revised model."""
+"""Every value at both of its bounds goes through fit, validation, report and revised model."""
 
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pytest
 from analysed_campaigns import ripple_analysis
 from made_verdicts import made_verdict
 from measured_oscillator import nothing, with_held_out
+from night import others_at_night
 
 from pymoo_hdte.discrepancy import read_mechanism_model
 from pymoo_hdte.discrepancy._answers.next_test_mechanism import next_test
@@ -17,13 +19,14 @@ from pymoo_hdte.discrepancy._report.mechanism import write_mechanism_report
 from pymoo_hdte.discrepancy._selection.fitting import fit
 from pymoo_hdte.discrepancy._verdicts.held_out import simulate_held_out
 from pymoo_hdte.discrepancy._verdicts.mechanism_finding import MechanismFinding
-from pymoo_hdte.discrepancy._verdicts.validation_drive import prove
-from pymoo_hdte.discrepancy._verdicts.validation_mechanism import prove_measured
+from pymoo_hdte.discrepancy._verdicts.validation_drive import validate_drive
+from pymoo_hdte.discrepancy._verdicts.validation_mechanism import validate_mechanism
 from pymoo_hdte.mechanism import BelievedValue, Input, Mechanism, Port
 from pymoo_hdte.mechanism.believed import LARGEST_FACTOR, SMALLEST_SHARE
 
 CUTOFF = 20.0
 QUANTITIES = ("inertia of x", "stiffness of spring", "damping of spring", "gain of force")
+LIMITS = {"tolerance": 1.0, "factor": LARGEST_FACTOR}
 BOUNDS = pytest.mark.parametrize("bound", ["lower", "upper"])
 
 
@@ -37,12 +40,20 @@ def oscillator(**limits):
     )
 
 
-@pytest.mark.parametrize("limits", [{"tolerance": 1.0}, {"factor": LARGEST_FACTOR}], ids=str)
-@pytest.mark.parametrize("quantity", QUANTITIES)
-@BOUNDS
-def test_a_mechanism_is_proved_reported_and_believed_again(quantity, bound, limits, tmp_path):
+@pytest.mark.parametrize(
+    "case",
+    others_at_night(
+        product(QUANTITIES, ("lower", "upper"), ("tolerance", "factor")),
+        # Zero is the bound at which something may end; a factor bounds all quantities alike.
+        *product(QUANTITIES, ("lower",), ("tolerance",)),
+        ("stiffness of spring", "upper", "factor"),
+    ),
+    ids="-".join,
+)
+def test_a_mechanism_is_proved_reported_and_believed_again(case, tmp_path):
     """An inertia that a fit took to zero ended the analysis: "inertia of x is 0.0"."""
-    mechanism, records = oscillator(**limits), tuple(with_held_out(nothing))
+    quantity, bound, kind = case
+    mechanism, records = oscillator(**{kind: LIMITS[kind]}), tuple(with_held_out(nothing))
     data = measured_data(mechanism, records[:1], CUTOFF)
     start = np.array([getattr(p, bound if p.name == quantity else "start") for p in data.base])
     base = fit(data, (), start, steps=0)
@@ -53,7 +64,7 @@ def test_a_mechanism_is_proved_reported_and_believed_again(quantity, bound, limi
     finding = MechanismFinding(mechanism, records, CUTOFF, data, verdict, simulated=simulated)
     out = tmp_path / "report"
     document = write_mechanism_report(
-        "rig", finding, prove_measured(finding), next_test(finding), out
+        "rig", finding, validate_mechanism(finding), next_test(finding), out
     )
     told = document["base"][quantity]
     assert told["at_bound"]
@@ -85,8 +96,8 @@ def test_a_drive_is_proved_and_revised(bound):
         values[row] = getattr(parameter, bound)
         chosen = replace(finding.verdict.chosen, fit=replace(fitted, values=values))
         there = replace(finding, verdict=replace(finding.verdict, chosen=chosen))
-        proof = prove(there)
-        assert np.isfinite([gap.after for gap in proof.channels.values()]).all()
+        validation = validate_drive(there)
+        assert np.isfinite([error.after for error in validation.channels.values()]).all()
         model = drive_model(finding.campaign, chosen.fit, "revised", "at a bound")
         assert np.all(np.isfinite(model.dte_arcsec(model.nominal[None])))
 

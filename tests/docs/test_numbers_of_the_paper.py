@@ -8,6 +8,7 @@ from experiments.paper_page import PAGE, in_short, page
 from pymoo_hdte.problems import RobustDTE
 
 
+@pytest.mark.nightly
 def test_the_page_is_what_the_experiments_say():
     written = PAGE.read_text(encoding="utf-8").splitlines()
     assert written == page().splitlines(), "run python -m experiments.paper_page"

@@ -143,6 +143,7 @@ def with_loop(name, law):
     return replace(model, effects=(*model.effects, LawAtPort("bouc_wen_hysteresis", "mesh", law)))
 
 
+@pytest.mark.nightly
 def test_a_drive_that_runs_on_repeats_itself_as_an_integrator_finds():
     """Where a loop turns back its torque has a corner, which needs more harmonics."""
     model = with_loop("resonant", BoucWen(1.0, YIELD, 1.0, 0.8))

@@ -55,7 +55,7 @@ def with_effects(model, *effects):
     return replace(model, effects=(*model.effects, *effects))
 
 
-@pytest.mark.parametrize("name", PRESETS)
+@pytest.mark.parametrize("name", others_at_night(PRESETS, "calibrated"))
 def test_presets_agree_with_the_integrator_though_the_angle_is_free(name):
     """Hill's method, which prescribes the angle, is off by 2e-3 on ``resonant``."""
     model = preset(name)
@@ -67,7 +67,7 @@ def test_presets_agree_with_the_integrator_though_the_angle_is_free(name):
 
 
 @pytest.mark.parametrize(
-    "effect", others_at_night(MEMORYLESS, *MEMORYLESS[::3]), ids=lambda effect: effect.name
+    "effect", others_at_night(MEMORYLESS, *MEMORYLESS[::6]), ids=lambda effect: effect.name
 )
 def test_every_law_agrees_with_the_integrator_along_the_whole_turn(effect):
     model = with_effects(preset("resonant"), effect)

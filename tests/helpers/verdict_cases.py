@@ -53,20 +53,24 @@ def ranking_fits_decide(patch):
     patch.setattr(Search, "finished", lambda self, one, *starts: one)
 
 
-def no_proof(patch):
+def no_validation(patch):
     """The held-out records have no say."""
     reasons_of = verdict.reasons_of
 
     patch.setattr(
-        verdict, "reasons_of", lambda search, chosen, vote: reasons_of(search, chosen, None)
+        verdict,
+        "reasons_of",
+        lambda search, chosen, held_out_test: reasons_of(search, chosen, None),
     )
-    patch.setattr(verdict.Verdict, "proven", lambda self, *vote, **errors: self)
+    patch.setattr(
+        verdict.Verdict, "after_held_out_test", lambda self, *held_out_test, **errors: self
+    )
 
 
-def no_doubts(patch):
+def no_caveats(patch):
     """Neither the held-out records nor bounds and intervals have a say."""
-    no_proof(patch)
-    patch.setattr(verdict, "reasons_of", lambda search, chosen, vote: [])
+    no_validation(patch)
+    patch.setattr(verdict, "reasons_of", lambda search, chosen, held_out_test: [])
 
 
 def one_parameter_at_a_time(patch):

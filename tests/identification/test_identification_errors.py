@@ -139,6 +139,7 @@ def test_standard_error_of_the_std_is_that_of_normal_samples(rng):
     assert stds.std() == pytest.approx(sample.std_error, rel=0.03)
 
 
+@pytest.mark.nightly
 def test_a_planted_correlation_is_found_on_200_campaigns(rng):
     matrix = np.eye(13)
     matrix[2, 9] = matrix[9, 2] = 0.92

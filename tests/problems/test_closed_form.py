@@ -131,6 +131,7 @@ def test_a_surrogate_of_the_simulator_finds_them_within_its_band(name):
     assert np.all(np.mean(np.abs(F - known) <= band + 1e-9, axis=0) >= 0.95)
 
 
+@pytest.mark.nightly
 def test_pymoos_problem_made_robust_is_ours():
     ours, theirs = RobustSrinivas(0.5), Robust(get_problem("srn"), scatter=0.5, progress=False)
     X = designs(ours, 50)

@@ -83,6 +83,7 @@ def test_at_a_fixed_tolerance_they_are_the_exact_moments(surrogate, moments, tol
         assert mine[:, :2] / scale == pytest.approx(theirs / scale, abs=1e-10)
 
 
+@pytest.mark.nightly
 def test_they_agree_with_chaospys_quadrature(surrogate, moments):
     low, high = NOISE.support
     theta = chaospy.TruncNormal(lower=low, upper=high, mu=NOISE.mean, sigma=NOISE.std)

@@ -8,12 +8,12 @@ from experiments.studies.blind.cases import Case
 from experiments.studies.blind.scoring import MOST_IN_CLASS
 from experiments.studies.blind.truth import ERROR, may_be_named, one_name, to_be_named
 from pymoo_hdte.discrepancy._selection.verdict import EXPLAINED
-from pymoo_hdte.discrepancy._verdicts.validation_drive import Gap
+from pymoo_hdte.discrepancy._verdicts.validation_drive import PredictionError
 
 CONFIDENT = ("named", "parameter")
 """Statuses that give a single answer."""
 OPENED = 1.5
-"""Multiple of the noise floor beyond which the revision has opened a gap."""
+"""Multiple of the noise floor beyond which the revision has raised an error."""
 
 
 @dataclass(frozen=True)
@@ -183,31 +183,33 @@ class Outcome:
             return None
         return after / max(before, error)
 
-    def gap(self, name: str) -> Gap | None:
-        """Return one of `experiments.studies.blind.scoring.GAPS`; None where nothing was proved."""
+    def error(self, name: str) -> PredictionError | None:
+        """Return one of `experiments.studies.blind.scoring.GAPS`; None without held-out records."""
         if f"{name}_before" not in self.numbers:
             return None
         before, after, floor = (self.numbers[f"{name}_{s}"] for s in ("before", "after", "floor"))
-        return Gap(before, after, floor, "")
+        return PredictionError(before, after, floor, "")
 
     def shrinkage(self, name: str) -> float | None:
-        """Return how far one of the gaps shrinks; None where there is none, 0 after a failure.
+        """Return how far one of the errors shrinks; None where there is none, 0 after a failure.
 
-        A gap that the revision opened shrank by -1.
+        An error that the revision raised shrank by -1.
         """
         if self.status == ERROR:
             return 0.0
-        gap = self.gap(name)
-        if gap is None or gap.shrinkage is not None:
-            return None if gap is None else gap.shrinkage
+        error = self.error(name)
+        if error is None or error.shrinkage is not None:
+            return None if error is None else error.shrinkage
         return None if self.closed(name, OPENED) else -1.0
 
     def open_before(self, name: str, multiple: float) -> bool:
-        """Return whether one of the gaps was beyond a multiple of the noise floor, or unknown."""
-        gap = self.gap(name)
-        return self.status == ERROR or (gap is not None and gap.before > multiple * gap.noise_floor)
+        """Return whether one of the errors was beyond a multiple of the noise floor, or unknown."""
+        error = self.error(name)
+        return self.status == ERROR or (
+            error is not None and error.before > multiple * error.noise_floor
+        )
 
     def closed(self, name: str, multiple: float) -> bool:
-        """Return whether one of the gaps ends within a multiple of the noise floor."""
-        gap = self.gap(name)
-        return gap is not None and gap.after <= multiple * gap.noise_floor
+        """Return whether one of the errors ends within a multiple of the noise floor."""
+        error = self.error(name)
+        return error is not None and error.after <= multiple * error.noise_floor

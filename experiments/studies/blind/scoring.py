@@ -46,7 +46,7 @@ from pymoo_hdte.discrepancy._selection.hypothesis import Hypothesis
 from pymoo_hdte.discrepancy._selection.verdict import Verdict
 from pymoo_hdte.discrepancy._verdicts.drive import examine_drive
 from pymoo_hdte.discrepancy._verdicts.drive_finding import DriveFinding
-from pymoo_hdte.discrepancy._verdicts.validation_drive import Proof, prove
+from pymoo_hdte.discrepancy._verdicts.validation_drive import Validation, validate_drive
 
 PARTS = ("analyse", "locate", "prove", "next_experiment")
 RIVALS = ("largest_residual_rule", "sparse_regression")
@@ -58,7 +58,7 @@ REVISED = ("single", "pair", "triple")
 LOCATED = ("none", "unlisted", *REVISED)
 """Kinds whose flagged cells are compared with the cells truly moved."""
 GAPS = ("transmission_error", "leading", "overall")
-"""Gaps on held-out records: that of the verdict's document, that of the channel in which the base
+"""Errors on held-out records: that of the verdict's document, that of the channel in which the base
 stands out of the noise most, and that of all features."""
 DETERMINED = 0.5
 """Standard error, in tolerances, up to which the records and not the bounds say what a parameter
@@ -86,7 +86,7 @@ NUMBERS = (
     "bias_of_all_after",
     "quantities",
     "quantities_covered",
-    *(f"{gap}_{state}" for gap in GAPS for state in ("before", "after", "floor")),
+    *(f"{error}_{state}" for error in GAPS for state in ("before", "after", "floor")),
 )
 COLUMNS = (*VERDICT_COLUMNS, *NUMBERS, *RIVALS)
 
@@ -136,7 +136,7 @@ def score(case: Case, tools: Mapping[str, Tool]) -> tuple[Scores, tuple[float, .
     campaign = campaign_of(hidden, hidden.session)
     analysis, analysed = _timed(examine_drive, campaign)
     location, located = _timed(locate, analysis)
-    proof, proved = _timed(prove, analysis)
+    validation, validated = _timed(validate_drive, analysis)
     _, proposed = _timed(next_experiment, analysis)
     verdict = analysis.verdict
     scores = verdict_scores(case, verdict)
@@ -147,11 +147,11 @@ def score(case: Case, tools: Mapping[str, Tool]) -> tuple[Scores, tuple[float, .
         scores |= location_scores(truly_moved(analysis, twin), location.flagged)
         if case.kind in REVISED:
             scores |= bias_scores(verdict, twin_fit(twin, analysis.data.features))
-    if proof is not None:
-        scores |= gap_scores(proof)
+    if validation is not None:
+        scores |= error_scores(validation)
     if case.kind in COMPARED:
         scores |= {name: code(_answer(tool, analysis), NAMES) for name, tool in tools.items()}
-    return scores, (analysed, located, proved, proposed)
+    return scores, (analysed, located, validated, proposed)
 
 
 def verdict_scores(case: Case, verdict: Verdict) -> Scores:
@@ -254,14 +254,18 @@ def bias_scores(verdict: Verdict, twin: Fit) -> Scores:
     return scores
 
 
-def gap_scores(proof: Proof) -> Scores:
+def error_scores(validation: Validation) -> Scores:
     """Return before, after and noise floor of `GAPS`."""
-    gaps = (proof.channels["transmission_error"], proof.channels[proof.leading], proof.overall)
+    errors = (
+        validation.channels["transmission_error"],
+        validation.channels[validation.leading],
+        validation.overall,
+    )
     scores = {}
-    for name, gap in zip(GAPS, gaps, strict=True):
-        scores[f"{name}_before"] = gap.before
-        scores[f"{name}_after"] = gap.after
-        scores[f"{name}_floor"] = gap.noise_floor
+    for name, error in zip(GAPS, errors, strict=True):
+        scores[f"{name}_before"] = error.before
+        scores[f"{name}_after"] = error.after
+        scores[f"{name}_floor"] = error.noise_floor
     return scores
 
 

@@ -144,7 +144,7 @@ def effects_table(outcomes: Sequence[Outcome]) -> Table:
                   for status in _OTHERS]  # fmt: skip
         biases = [median([outcome.numbers.get(f"bias_{state}") for outcome in chosen]).value
                   for state in ("before", "after", "error")]  # fmt: skip
-        gaps = [outcome.gap("leading") for outcome in chosen]
+        errors = [outcome.error("leading") for outcome in chosen]
         rows.append((
             _plain(name), len(chosen), right.value, right.low, right.high,
             sum(outcome.wrong_confident for outcome in chosen), *counts,
@@ -152,7 +152,7 @@ def effects_table(outcomes: Sequence[Outcome]) -> Table:
             median([outcome.bias_ratio for outcome in chosen]).value,
             median([outcome.shrinkage("transmission_error") for outcome in chosen]).value,
             median([outcome.shrinkage("leading") for outcome in chosen]).value,
-            median([g.after / g.noise_floor for g in gaps if g is not None]).value,
+            median([g.after / g.noise_floor for g in errors if g is not None]).value,
         ))  # fmt: skip
     columns = (
         Column("hidden"),

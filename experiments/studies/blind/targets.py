@@ -126,8 +126,8 @@ def demands(outcomes: Sequence[Outcome]) -> Iterator[Judged]:
     yield from _covered(share([flag for outcome in outcomes for flag in outcome.covered]))
     f1 = median([outcome.f1 for outcome in single])
     yield Judged("F1 of the flagged cells, median", listed, LEAST_F1, f1)
-    for gap in ("transmission_error", "leading"):
-        yield from _proof(gap, single)
+    for error in ("transmission_error", "leading"):
+        yield from _validation(error, single)
 
 
 def pooled_demands(counts: Counts) -> Iterator[Judged]:
@@ -170,12 +170,14 @@ _GAP_WORDS = {
 }
 
 
-def _proof(gap: str, single: Sequence[Outcome]) -> Iterator[Judged]:
-    where, multiple = f"one listed effect, {_GAP_WORDS[gap]}", FLOOR_MULTIPLE
-    shrunk = median([outcome.shrinkage(gap) for outcome in single])
+def _validation(error: str, single: Sequence[Outcome]) -> Iterator[Judged]:
+    where, multiple = f"one listed effect, {_GAP_WORDS[error]}", FLOOR_MULTIPLE
+    shrunk = median([outcome.shrinkage(error) for outcome in single])
     yield Judged("shrinkage of the held-out gap, median", where, LEAST_SHRINKAGE, shrunk)
     closed = [
-        outcome.closed(gap, multiple) for outcome in single if outcome.open_before(gap, multiple)
+        outcome.closed(error, multiple)
+        for outcome in single
+        if outcome.open_before(error, multiple)
     ]
     what = f"held-out gap within {multiple:g} x the noise floor"
     yield Judged(what, where, LEAST_CLOSED, share(closed))

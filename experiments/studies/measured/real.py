@@ -41,7 +41,7 @@ from experiments.studies.measured.rigs import MEASURED, Study, fitted_values, st
 from pymoo_hdte._io.csv_table import csv_text
 from pymoo_hdte.discrepancy._report.mechanism_values import effects
 from pymoo_hdte.discrepancy._report.torsion import torsion_document
-from pymoo_hdte.discrepancy._verdicts.validation_mechanism import prove_measured
+from pymoo_hdte.discrepancy._verdicts.validation_mechanism import validate_mechanism
 from pymoo_hdte.effects.effect import place_of
 from pymoo_hdte.mechanism.motion import SmoothedMotion
 from pymoo_hdte.mechanism.port_motion import law_force
@@ -62,8 +62,8 @@ def named(machine: Study) -> list[dict[str, Any]]:
 
 def torsion_errors(machine: Study) -> list[str]:
     """Return the errors of the held-out torsion before and after, arcseconds, where measured."""
-    gaps = machine.joint.gaps if machine.joint else ()
-    sizes = ([getattr(gap, side) for gap in gaps] for side in ("before", "after"))
+    errors = machine.joint.errors if machine.joint else ()
+    sizes = ([getattr(error, side) for error in errors] for side in ("before", "after"))
     return [f"{np.sqrt(np.mean(np.square(each))) / ARCSEC:.4g}" if each else "" for each in sizes]
 
 
@@ -74,24 +74,27 @@ def share_in_words(value: float | None) -> str:
 
 def determinations(machine: Study) -> list[str]:
     """Return R2 of force and simulated position by the accepted model, held out."""
-    finding, gaps = machine.finding, [gap for gap in machine.gaps if gap.kind == "balance"]
+    finding, errors = (
+        machine.finding,
+        [error for error in machine.errors if error.kind == "balance"],
+    )
     (name,) = finding.mechanism.coordinates
-    gaps = [gap for gap in gaps if gap.quantity == name]
-    if not gaps:
+    errors = [error for error in errors if error.quantity == name]
+    if not errors:
         return ["", ""]
     power = terms_of(finding, "held_out", ()).power
-    residual = float(np.mean([gap.after**2 for gap in gaps]))
+    residual = float(np.mean([error.after**2 for error in errors]))
     return [f"{1.0 - residual / power:.5f}", f"{explained(machine)[1]:.5f}"]
 
 
 def explained(machine: Study) -> tuple[float, float]:
     """Return R2 of all simulated positions, before and after."""
-    gaps = [gap for gap in machine.gaps if gap.extent is not None]
-    if not gaps:
+    errors = [error for error in machine.errors if error.extent is not None]
+    if not errors:
         return np.nan, np.nan
-    power = np.concatenate([gap.measured - gap.measured.mean() for gap in gaps])
+    power = np.concatenate([error.measured - error.measured.mean() for error in errors])
     residuals = (
-        np.concatenate([gap.measured - getattr(gap, side) for gap in gaps])
+        np.concatenate([error.measured - getattr(error, side) for error in errors])
         for side in ("predicted_before", "predicted_after")
     )
     before, after = (
@@ -104,9 +107,9 @@ def pooled(machine: Study, kind: str, side: int) -> float | None:
     """Return the root mean square over the held-out records, of the first coordinate."""
     name = machine.finding.mechanism.coordinates[0]
     sizes = [
-        (gap.before, gap.after)[side]
-        for gap in machine.gaps
-        if (gap.kind, gap.quantity) == (kind, name)
+        (error.before, error.after)[side]
+        for error in machine.errors
+        if (error.kind, error.quantity) == (kind, name)
     ]
     return float(np.sqrt(np.mean(np.square(sizes)))) if sizes else None
 
@@ -285,14 +288,14 @@ def examined(rig: KnownRig, tools: bool = True, whole: bool = True) -> Examined 
         rows.append(_tool_row(rig, answer))
         seconds.append([rig.name, answer.tool, f"{answer.seconds:.3g}"])
     if whole and rig.name == ARROW:
-        gap = next(
-            gap
-            for gap in prove_measured(machine.finding, whole=True)
-            if gap.determination is not None
+        error = next(
+            error
+            for error in validate_mechanism(machine.finding, whole=True)
+            if error.determination is not None
         )
-        assert gap.determination is not None
-        words = f"the same, {gap.record} without a break"
-        rows.append([TOOL, "", words, "", f"{gap.determination[1]:.5f}"])
+        assert error.determination is not None
+        words = f"the same, {error.record} without a break"
+        rows.append([TOOL, "", words, "", f"{error.determination[1]:.5f}"])
     return Examined(verdict_row(rig, machine), [[rig.name, *row] for row in rows], seconds)
 
 
@@ -301,7 +304,7 @@ def verdict_row(rig: KnownRig, machine: Study) -> list[str]:
     judgement, words = _said(rig, machine)
     off, order = farthest(rig, machine), nearest_order(rig, machine)
     rms = [pooled(machine, kind, side) for kind in ("balance", "simulation") for side in (0, 1)]
-    extents = [gap.extent.length for gap in machine.gaps if gap.extent is not None]
+    extents = [error.extent.length for error in machine.errors if error.extent is not None]
     numbers = [off, order, rig.order, *rms, min(extents, default=None)]
     shown = ["" if number is None else f"{number:.4g}" for number in numbers]
     by_simulation = [f"{value:.5f}" for value in explained(machine)]

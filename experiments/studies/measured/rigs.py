@@ -13,7 +13,10 @@ from pymoo_hdte.discrepancy._report.mechanism_values import effects, quantities
 from pymoo_hdte.discrepancy._verdicts.joint import JointFinding, examine_joint
 from pymoo_hdte.discrepancy._verdicts.mechanism import examine_mechanism
 from pymoo_hdte.discrepancy._verdicts.mechanism_finding import MechanismFinding
-from pymoo_hdte.discrepancy._verdicts.validation_mechanism import MeasuredGap, prove_measured
+from pymoo_hdte.discrepancy._verdicts.validation_mechanism import (
+    MechanismPredictionError,
+    validate_mechanism,
+)
 
 MEASURED = Path(__file__).resolve().parents[4] / "shared" / "measured"
 """Folder of the measurements, which are not part of the project."""
@@ -22,15 +25,15 @@ RIGS = DATA
 
 @dataclass(frozen=True, eq=False)
 class Study:
-    """A rig, what the workflow finds in its records, and the proof.
+    """A rig, what the workflow finds in its records, and the validation.
 
-    Of a joint with two encoders the rig, the finding and the proof are those of its torques;
+    Of a joint with two encoders the rig, the finding and the validation are those of its torques;
     ``joint`` has the torsion as well.
     """
 
     rig: MeasuredMechanism
     finding: MechanismFinding
-    gaps: tuple[MeasuredGap, ...]
+    errors: tuple[MechanismPredictionError, ...]
     joint: JointFinding | None = None
 
     @property
@@ -53,9 +56,9 @@ def study(name: str, folder: str) -> Study | None:
     joint = joint_of(rig.mechanism)
     if joint is None:
         finding = examine_mechanism(rig.mechanism, *believed)
-        return Study(rig, finding, prove_measured(finding))
+        return Study(rig, finding, validate_mechanism(finding))
     halves = examine_joint(joint, *believed)
-    return Study(torques_of(rig), halves.torque, prove_measured(halves.torque), halves)
+    return Study(torques_of(rig), halves.torque, validate_mechanism(halves.torque), halves)
 
 
 def torques_of(rig: MeasuredMechanism) -> MeasuredMechanism:

@@ -90,7 +90,7 @@ def _counted(statuses: Sequence[str]) -> str:
 
 def verdict_row(name: str, analysis: DriveAnalysis) -> list[str]:
     """Return what is said of a rig, in the order of `COLUMNS`."""
-    verdict, proof = analysis.verdict, analysis.prove()
+    verdict, validation = analysis.verdict, analysis.validate()
     accepted = verdict.accepted
     effects = "" if accepted is verdict.base else _labels(accepted.candidates)
     rivals = " or ".join(_labels(hypothesis.candidates) for hypothesis in verdict.equivalent)
@@ -99,12 +99,12 @@ def verdict_row(name: str, analysis: DriveAnalysis) -> list[str]:
         for hypothesis in (verdict.base, accepted)
     ]
     words = [name, verdict.status, effects, rivals, "; ".join(map(in_a_sentence, verdict.reasons))]
-    gaps = [float("nan")] * 5
-    if proof is not None:
-        error = proof.channels["transmission_error"]
-        gaps = [proof.overall.before, proof.overall.after]
-        gaps += [error.before, error.after, error.noise_floor]
-    return [*words, *(f"{number:.5g}" for number in (*fits, *gaps))]
+    errors = [float("nan")] * 5
+    if validation is not None:
+        error = validation.channels["transmission_error"]
+        errors = [validation.overall.before, validation.overall.after]
+        errors += [error.before, error.after, error.noise_floor]
+    return [*words, *(f"{number:.5g}" for number in (*fits, *errors))]
 
 
 def _labels(candidates: Sequence[Candidate]) -> str:

@@ -28,33 +28,39 @@ def near_by(finding: JointFinding) -> list[Hypothesis]:
     verdict, least = torsion.verdict, torsion.data.rules.partial_share
     if verdict.accepted is not verdict.base:
         return list(verdict.equivalent)
-    every = [one for one in (verdict.chosen, *verdict.alternatives) if one is not None]
-    found = [
-        one
-        for one in sorted(every, key=lambda one: one.bic)
-        if all(candidate.releases is None for candidate in one.candidates)
-        and share_removed(torsion.sensors, torsion.data, verdict.base, one.fit) >= least
+    every = [
+        hypothesis
+        for hypothesis in (verdict.chosen, *verdict.alternatives)
+        if hypothesis is not None
     ]
-    return found[:_MOST_TOLD]
+    competing = [
+        hypothesis
+        for hypothesis in sorted(every, key=lambda hypothesis: hypothesis.bic)
+        if all(candidate.releases is None for candidate in hypothesis.candidates)
+        and share_removed(torsion.sensors, torsion.data, verdict.base, hypothesis.fit) >= least
+    ]
+    return competing[:_MOST_TOLD]
 
 
 def open_by_motion(finding: JointFinding) -> list[str]:
     """Return what the motion of the joint leaves open, with what may be wrong of its encoders."""
     torsion, gear = finding.torsion, finding.joint.gear.name
     shaft = torsion.mechanism.ports[0].name
-    found = [
-        *wiring_doubts(finding),
+    sentences = [
+        *wiring_caveats(finding),
         "The zeros of the two encoders are not known: a constant torque ahead of the gear, or a "
         "constant error of it, is part of them. Held-out records are compared about their means.",
     ]
     if not turns_back(torsion.data, shaft):
-        found.append(
+        sentences.append(
             "The joint turns one way only: dry friction ahead of the gear is part of the zeros, "
             "and hysteresis of the gear shows only as far as the torque rises and falls."
         )
     elif not turns_back(torsion.data, gear):
-        found.append("The torque only rises or only falls: hysteresis of the gear does not show.")
-    return found
+        sentences.append(
+            "The torque only rises or only falls: hysteresis of the gear does not show."
+        )
+    return sentences
 
 
 def open_by_twins(finding: JointFinding) -> list[str]:
@@ -64,14 +70,14 @@ def open_by_twins(finding: JointFinding) -> list[str]:
 
 def _in_both(finding: JointFinding) -> list[str]:
     """Return which orders beyond the band vary both the torque and the torsion."""
-    both = [
-        one.order
-        for one, _ in errors_of(finding.torsion.ripples)
-        if any(abs(one.order - r.order) <= r.resolution for r in finding.torque.ripples.lines)
+    shared = [
+        line.order
+        for line, _ in errors_of(finding.torsion.ripples)
+        if any(abs(line.order - r.order) <= r.resolution for r in finding.torque.ripples.lines)
     ]
-    if not both:
+    if not shared:
         return []
-    orders = ", ".join(f"{one:.5g}" for one in both)
+    orders = ", ".join(f"{order:.5g}" for order in shared)
     return [
         f"Order {orders} varies the torque as well: an error of the gear shakes the motor, and its "
         "torque then grows with the square of the speed; a ripple of the motor's torque does not."
@@ -82,7 +88,7 @@ def _delay(finding: JointFinding) -> list[str]:
     """Return that a viscous friction ahead of the gear may be the delay of an encoder."""
     torsion = finding.torsion
     sets = (torsion.verdict.chosen, *near_by(finding))
-    fits = [one.fit for one in sets if one is not None]
+    fits = [hypothesis.fit for hypothesis in sets if hypothesis is not None]
     levels = [
         _slope(finding, effect.law)
         for fit in fits
@@ -93,26 +99,28 @@ def _delay(finding: JointFinding) -> list[str]:
         return []
     late = 1e3 * levels[0] / finding.stiffness
     whole = fitted_values(finding.torque.mechanism, finding.torque.accepted)
-    damping = sum(one for name, one in whole.items() if name.startswith("damping of "))
-    told = (
+    damping = sum(value for name, value in whole.items() if name.startswith("damping of "))
+    text = (
         f"A torsion proportional to the speed may be friction ahead of the gear, "
         f"{levels[0]:.3g} N.m.s/rad, or the load's encoder is read {late:.2g} ms after the "
         "motor's: the angles cannot separate these."
     )
     if 0.0 < damping < levels[0]:
-        told += (
+        text += (
             f" The viscous friction of the whole joint is only {damping:.3g}, so it cannot "
             "all be friction."
         )
-    return [told]
+    return [text]
 
 
 def _slope(finding: JointFinding, law: Law) -> float:
     """Return the torque of a law over the speed at the largest speed, N.m.s/rad."""
     shaft = finding.torsion.mechanism.ports[0].name
-    speed = max(float(np.abs(one.ports[shaft].speed).max()) for one in finding.torsion.data.spectra)
-    rest = np.zeros(1)
-    state = PortState(rest, np.array([speed]), periodic_phase(rest), rest, load=rest)
+    speed = max(
+        float(np.abs(balance.ports[shaft].speed).max()) for balance in finding.torsion.data.spectra
+    )
+    zeros = np.zeros(1)
+    state = PortState(zeros, np.array([speed]), periodic_phase(zeros), zeros, load=zeros)
     return float(law.respond(state).torque[0]) / speed
 
 
@@ -121,38 +129,46 @@ def torsion_test(finding: JointFinding) -> str:
     torsion = finding.torsion
     gear, shaft = finding.joint.gear.name, torsion.mechanism.ports[0].name
     chosen = torsion.verdict.chosen
-    sets = [one for one in (chosen, *near_by(finding)) if one is not None]
-    effects = [one.effect for hypothesis in sets for one in hypothesis.candidates if one.effect]
-    wide = max(float(np.ptp(one.ports[gear].position)) for one in torsion.data.spectra) / ARCSEC
-    found = []
+    sets = [hypothesis for hypothesis in (chosen, *near_by(finding)) if hypothesis is not None]
+    effects = [
+        candidate.effect
+        for hypothesis in sets
+        for candidate in hypothesis.candidates
+        if candidate.effect
+    ]
+    wide = (
+        max(float(np.ptp(balance.ports[gear].position)) for balance in torsion.data.spectra)
+        / ARCSEC
+    )
+    tests = []
     if not turns_back(torsion.data, shaft):
-        found.append(
+        tests.append(
             "Run the same sweep backwards as well: what keeps its sign is compliance or an error "
             "of the gear, what turns it is friction or hysteresis."
         )
-    if any(effect.lags for effect in effects) or not found:
-        found.append(
+    if any(effect.lags for effect in effects) or not tests:
+        tests.append(
             f"Stop at a few angles and reverse slowly until the torsion has changed by some "
             f"{round(0.1 * wide)} arcseconds: friction ahead of the gear turns with the direction "
             "at once, hysteresis only over a torsion of its own."
         )
     if any(effect.with_load for effect in effects):
-        found.append(
+        tests.append(
             "Repeat the sweep with another load: an error of the gear stays over the angle, "
             "compliance, wind-up and friction that grows with the load follow the torque."
         )
     if any(effect.slows for effect in effects):
-        found.append(
+        tests.append(
             "Repeat it at a third of the speed and read the encoders in the other order: a delay "
             "turns its sign, friction does not."
         )
-    return " ".join(found)
+    return " ".join(tests)
 
 
 Values = NDArray[np.float64]
 
 
-def wiring_doubts(finding: JointFinding) -> list[str]:
+def wiring_caveats(finding: JointFinding) -> list[str]:
     """Return what may be wrong with the encoders of a joint, in sentences.
 
     Nothing where the spring alone, or a friction named ahead of the gear, is the better answer.
@@ -167,8 +183,8 @@ def wiring_doubts(finding: JointFinding) -> list[str]:
     motor, load = finding.joint.motor, finding.joint.load
     torque, acceleration, speed, angle, twist = _signals(finding)
     rules, ones = torsion.data.rules, np.ones_like(twist)
-    left = float(torsion.base_misfit[0]) / finding.stiffness
-    if left**2 >= rules.main_share * float(np.var(twist)):
+    misfit = float(torsion.base_misfit[0]) / finding.stiffness
+    if misfit**2 >= rules.main_share * float(np.var(twist)):
         (slope, _), share = _explained(twist, [angle], [ones])
         if share >= rules.explained_share:
             return [
@@ -213,14 +229,15 @@ def _signals(finding: JointFinding) -> tuple[Values, ...]:
     """
     torsion, joint = finding.torsion, finding.joint
     shaft, names = torsion.mechanism.ports[0].name, quantity_names(torsion.mechanism)
-    found = []
+    by_record = []
     for balance in torsion.data.spectra:
         motor, twist = balance.ports[shaft], balance.ports[joint.gear.name].position
         torque = sum(
-            one.gain.value * balance.in_time(balance.terms[0, names.index(f"gain of {one.name}")])
-            for one in torsion.mechanism.inputs
+            actuator.gain.value
+            * balance.in_time(balance.terms[0, names.index(f"gain of {actuator.name}")])
+            for actuator in torsion.mechanism.inputs
         )
         inertial = balance.terms[0, names.index(f"inertia of {joint.motor}")]
         signals = torque, -balance.in_time(inertial), motor.speed, motor.position - twist, twist
-        found.append(np.array(signals))
-    return tuple(np.concatenate(found, axis=1))
+        by_record.append(np.array(signals))
+    return tuple(np.concatenate(by_record, axis=1))

@@ -93,22 +93,22 @@ def next_experiment(finding: DriveFinding) -> Proposal:
     if not hypotheses:
         return _most_uncertain(grid, model)
     separations = np.array([separation(model, hypothesis) for hypothesis in hypotheses])
-    told = np.flatnonzero(separations.max(axis=1) >= least)
-    if not len(told):
+    separable = np.flatnonzero(separations.max(axis=1) >= least)
+    if not len(separable):
         return _no_test(grid, model.label, hypotheses, separations, verdict)
     # One test for all rivals where there is one, or else for the nearest that a test separates.
-    together = separations[told].min(axis=0)
+    together = separations[separable].min(axis=0)
     if together.max() < least:
-        told = told[:1]
-        together = separations[told[0]]
+        separable = separable[:1]
+        together = separations[separable[0]]
     test = int(np.argmax(together))
-    closest = int(told[np.argmin(separations[told, test])])
+    closest = int(separable[np.argmin(separations[separable, test])])
     labels = model.label, hypotheses[closest].label
-    same = any(one.fit is rivals[closest] for one in verdict.equivalent)
+    same = any(hypothesis.fit is rivals[closest] for hypothesis in verdict.equivalent)
     # What two models of a class share is not what a test is to tell apart.
     sets = [chosen.candidates, rivals[closest].candidates]
-    one, other = labels_apart(sets) if same else labels
-    said = _aim(verdict, _in_words(grid, one), _in_words(grid, other), same)
+    preferred, competing = labels_apart(sets) if same else labels
+    said = _aim(verdict, _in_words(grid, preferred), _in_words(grid, competing), same)
     proposed = _proposal(grid, test, said, labels, float(separations[closest, test]))
     never = [k for k in range(len(hypotheses)) if separations[k].max() < least]
     if not never:
@@ -155,21 +155,21 @@ def nearest_rivals(verdict: Verdict) -> list[Fit]:
         *verdict.equivalent,
         *sorted(verdict.alternatives, key=lambda hypothesis: hypothesis.bic),
     ]
-    found: dict[frozenset[tuple[str, str]], Fit] = {}
+    rivals: dict[frozenset[tuple[str, str]], Fit] = {}
     for hypothesis in others:
         # Of nested models the larger one can imitate the chosen one in every test.
         if hypothesis in verdict.equivalent or not names <= hypothesis.names:
-            found.setdefault(hypothesis.names, hypothesis.fit)
-    return list(found.values())[:_RIVALS]
+            rivals.setdefault(hypothesis.names, hypothesis.fit)
+    return list(rivals.values())[:_RIVALS]
 
 
-def _aim(verdict: Verdict, one: str, other: str, same: bool) -> str:
+def _aim(verdict: Verdict, preferred: str, competing: str, same: bool) -> str:
     """Return what a test is for; ``same`` tells whether both models are of one class."""
     if verdict.status == "unlisted":
-        return f"Neither {one} nor {other} explains the data. They differ most in"
+        return f"Neither {preferred} nor {competing} explains the data. They differ most in"
     if same:
-        return f"These data cannot distinguish {one} from {other}. The best test is"
-    return f"These data already favour {one}. The best further test against {other} is"
+        return f"These data cannot distinguish {preferred} from {competing}. The best test is"
+    return f"These data already favour {preferred}. The best further test against {competing} is"
 
 
 def _proposal(
@@ -201,9 +201,9 @@ def _encoder_twin(grid: Grid, chosen: Fit, model: Model) -> Proposal | None:
         turns = round(candidate.order * ratio)
         if turns > LARGEST_TURNS or abs(candidate.order * ratio - turns) > 1e-6:
             continue
-        other = effect_named(candidate.effect.twin)
-        port = other.sought_at[0]
-        name = ENCODER_LINE if port == "sensor" and turns != 1 else other.name
+        twin_effect = effect_named(candidate.effect.twin)
+        port = twin_effect.sought_at[0]
+        name = ENCODER_LINE if port == "sensor" and turns != 1 else twin_effect.name
         twin = f"{name}:{port}@{candidate.order:.4g}"
         parts = chosen.effects_by_candidate
         base = chosen.values[: len(grid.data.base)]

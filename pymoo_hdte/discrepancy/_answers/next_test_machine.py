@@ -47,8 +47,8 @@ def next_repetition(finding: MachineFinding) -> Repetition:
     chosen, competing = verdict.chosen, _nearest(finding)
     record_of, _ = data.layout
     if chosen is None or competing is None:
-        left = verdict.accepted.residuals[: len(record_of)] ** 2
-        most = int(np.argmax(np.bincount(record_of, left)))
+        misfit = verdict.accepted.residuals[: len(record_of)] ** 2
+        most = int(np.argmax(np.bincount(record_of, misfit)))
         name = finding.names[most]
         text = f"Repeat {name} over a wider range: the residual is largest there."
         return Repetition(name, (), 0.0, text)
@@ -63,10 +63,10 @@ def next_repetition(finding: MachineFinding) -> Repetition:
         separations.append(float(unimitated(gram, 1)[0, 0]))
     best = int(np.argmax(separations))
     name, separation = finding.names[best], separations[best]
-    both = f"{in_words(chosen.label)} from {in_words(competing.label)}"
-    text = f"Repeat {name}: it best separates {both} (expected chi-square {separation:.3g})."
+    models = f"{in_words(chosen.label)} from {in_words(competing.label)}"
+    text = f"Repeat {name}: it best separates {models} (expected chi-square {separation:.3g})."
     if separation < verdict.rules.separated_chi_square:
-        text = f"No repetition of these records separates {both}; that takes another test."
+        text = f"No repetition of these records separates {models}; that takes another test."
     return Repetition(name, (chosen.label, competing.label), separation, text)
 
 

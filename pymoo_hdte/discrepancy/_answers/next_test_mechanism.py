@@ -75,11 +75,11 @@ def next_test(finding: MechanismFinding) -> NextTest:
         for port in finding.mechanism.ports
         if not port.read and not turns_back(finding.data, port.name)
     ]
-    first = finding.data.spectra[0].record.name
+    name = finding.data.spectra[0].record.name
     chosen = finding.verdict.chosen
     if one_way:
         return NextTest(
-            first,
+            name,
             1.0,
             -1.0,
             tuple(effect.name for effect in law_effects() if effect.constant_one_way),
@@ -92,7 +92,7 @@ def next_test(finding: MechanismFinding) -> NextTest:
             f"First check the sign of the gain of {' and of '.join(reversed_inputs)}: with the "
             "opposite sign the nominal mechanism alone fits better than any set of effects."
         )
-        return NextTest(first, 1.0, 1.0, (), 0.0, text)
+        return NextTest(name, 1.0, 1.0, (), 0.0, text)
     hypothesis = _nearest(finding)
     if chosen is None or hypothesis is None:
         why = {
@@ -102,8 +102,8 @@ def next_test(finding: MechanismFinding) -> NextTest:
             finding.verdict.status,
             "no competing hypothesis remains, and this validates the result under new conditions",
         )
-        text = f"Repeat {first} {_how(3.0, 1.0)}: {why}."
-        return NextTest(first, 3.0, 1.0, (), 0.0, text)
+        text = f"Repeat {name} {_how(3.0, 1.0)}: {why}."
+        return NextTest(name, 3.0, 1.0, (), 0.0, text)
     return _best_repetition(finding, chosen, hypothesis)
 
 
@@ -115,36 +115,36 @@ def _reversed(finding: MechanismFinding) -> list[str]:
     """
     verdict = finding.verdict
     best = verdict.base if verdict.chosen is None else verdict.chosen.fit
-    left = root_mean_square(finding.data, best.residuals)
-    train = [one.record for one in finding.data.spectra]
-    found = []
-    for one in finding.mechanism.inputs:
-        if one.scaled:
-            opposite = {f"gain of {one.name}": -one.gain.value}
+    unexplained = root_mean_square(finding.data, best.residuals)
+    train = [balance.record for balance in finding.data.spectra]
+    names = []
+    for actuator in finding.mechanism.inputs:
+        if actuator.scaled:
+            opposite = {f"gain of {actuator.name}": -actuator.gain.value}
             mechanism = finding.mechanism.with_values(opposite, exactly=False)
             data = measured_data(
                 mechanism, train, finding.cutoff, finding.data.known, finding.data.rules
             )
-            if np.all(root_mean_square(data, fit(data).residuals) < left):
-                found.append(one.name)
-    return found
+            if np.all(root_mean_square(data, fit(data).residuals) < unexplained):
+                names.append(actuator.name)
+    return names
 
 
 def _nearest(finding: MechanismFinding) -> Hypothesis | None:
     """Return the hypothesis nearest to the chosen one that differs from it."""
     chosen, near_by = finding.verdict.chosen, finding.data.rules.nearest_rival_ratio
     others = [
-        one
-        for one in (*finding.verdict.equivalent, *finding.verdict.alternatives)
-        if chosen is not None and one.names != chosen.names and one.fit.effects
+        hypothesis
+        for hypothesis in (*finding.verdict.equivalent, *finding.verdict.alternatives)
+        if chosen is not None and hypothesis.names != chosen.names and hypothesis.fit.effects
     ]
-    equivalent = [one for one in others if one in finding.verdict.equivalent]
-    near = [
-        one
-        for one in others
-        if chosen is not None and one.fit.chi_square <= near_by * chosen.fit.chi_square
+    equivalent = [hypothesis for hypothesis in others if hypothesis in finding.verdict.equivalent]
+    close = [
+        hypothesis
+        for hypothesis in others
+        if chosen is not None and hypothesis.fit.chi_square <= near_by * chosen.fit.chi_square
     ]
-    return min(equivalent or near, key=lambda one: one.bic, default=None)
+    return min(equivalent or close, key=lambda hypothesis: hypothesis.bic, default=None)
 
 
 def _best_repetition(
@@ -157,15 +157,15 @@ def _best_repetition(
         )
     separation, place, size, rate = best
     name = finding.data.spectra[place].record.name
-    told = f"(1) {in_words(chosen.label)} and (2) {in_words(hypothesis.label)}"
+    models = f"(1) {in_words(chosen.label)} and (2) {in_words(hypothesis.label)}"
     if separation < 1.0:
         description = (
             "No repetition of these records with another travel or at another rate separates "
-            f"{told}; that takes another motion."
+            f"{models}; that takes another motion."
         )
     else:
         description = (
-            f"Repeat {name} {_how(size, rate)}. This separates {told}, whose forces then differ "
+            f"Repeat {name} {_how(size, rate)}. This separates {models}, whose forces then differ "
             f"by {separation:.2g} times the present residual."
         )
     return NextTest(name, size, rate, (chosen.label, hypothesis.label), separation, description)
@@ -199,7 +199,7 @@ def _separation(
 ) -> float:
     """Return the difference of two hypotheses in a repeated record that the base cannot absorb."""
     balance = finding.data.spectra[place]
-    power, rest = 0.0, finding.remainder
+    power, unexplained = 0.0, finding.unexplained
     for row, name in enumerate(finding.data.names):
         difference = np.zeros(len(balance.time))
         imitated = [np.ones(len(balance.time))]
@@ -209,13 +209,13 @@ def _separation(
                 motion = balance.ports[port.name]
                 position, speed = size * motion.position, size * rate * motion.speed
                 imitated += [position, speed, np.gradient(speed)]
-                for sign, one in ((1.0, chosen), (-1.0, hypothesis)):
-                    for effect in one.fit.effects:
+                for sign, compared in ((1.0, chosen), (-1.0, hypothesis)):
+                    for effect in compared.fit.effects:
                         if effect.port == port.name:
                             scaled = PortMotion(position, speed, motion.load)
                             force = law_force(effect.law, scaled, port.stiffness.value)
                             difference += sign * share * force
         base = np.column_stack(imitated)
         residual = difference - base @ np.linalg.lstsq(base, difference, rcond=None)[0]
-        power += float(np.mean(residual**2)) / max(float(rest[row]) ** 2, 1e-300)
+        power += float(np.mean(residual**2)) / max(float(unexplained[row]) ** 2, 1e-300)
     return float(np.sqrt(power))

@@ -93,7 +93,7 @@ class Grid:
         data = replace(finding.data, features=planned, torsion=(sweep,) if largest else ())
         # Slopes without effects serve for all models: they suffice for the uncertainty of a test.
         slopes = Objective(data, ()).slopes_at(finding.verdict.base.values)
-        made = [(one.input_speed, one.load_torque) for one in finding.campaign.running]
+        made = [(record.input_speed, record.load_torque) for record in finding.campaign.running]
         repeats = np.isclose(grid[:, None], made).all(axis=2).any(axis=1)
         return cls(data, speed / REVOLUTION_PER_MINUTE, load, slopes, repeats)
 
@@ -107,8 +107,8 @@ class Grid:
         label = "+".join(candidate.label for candidate in fitted.candidates) or "base"
         influence = objective.jacobian(fitted.values) @ root
         predicted, steady = self._predicted(fitted.values[: len(self.data.base)], fitted.effects)
-        names = {one.name for one in fitted.candidates}
-        names |= {one.name for one in self.data.campaign.believed.effects}
+        names = {candidate.name for candidate in fitted.candidates}
+        names |= {effect.name for effect in self.data.campaign.believed.effects}
         if names & clearances():
             # Such records would not be fitted, whatever holds the flanks in the model: without
             # lines of their own, by their load alone.
@@ -134,12 +134,12 @@ class Grid:
     def _by_test(self, rows: Values) -> Values:
         """Return rows (n, p) of running records, sweep and priors as (n_tests, f, p)."""
         records, size = self.data.features.values.shape
-        found = np.zeros((records + len(self.data.torsion), size, rows.shape[1]))
-        found[:records] = rows[: records * size].reshape(records, size, -1)
+        by_test = np.zeros((records + len(self.data.torsion), size, rows.shape[1]))
+        by_test[:records] = rows[: records * size].reshape(records, size, -1)
         for points in self.data.torsion:
             length = min(len(points.angle) - 1, size)
-            found[records, :length] = rows[records * size : records * size + length]
-        return found
+            by_test[records, :length] = rows[records * size : records * size + length]
+        return by_test
 
     def condition(self, test: int) -> tuple[str, float | None, float | None, str]:
         """Return a test in words, its speed (r/min), its load (N.m) and its kind."""
@@ -153,17 +153,17 @@ class Grid:
         return what, speed, load, "running"
 
 
-def separation(one: Model, other: Model) -> Values:
+def separation(model: Model, rival: Model) -> Values:
     """Return the chi-square of the difference in every test, shape (n_tests,).
 
     Zero where the drive would rattle by one of them: such a record is not fitted.
     """
-    difference = (other.predicted - one.predicted)[..., None]
-    columns = np.concatenate([difference, one.influence, other.influence], axis=2)
+    difference = (rival.predicted - model.predicted)[..., None]
+    columns = np.concatenate([difference, model.influence, rival.influence], axis=2)
     # The unknowns of both models are known to their own uncertainty, the unit of the influence.
     known = np.diag(np.r_[0.0, np.ones(columns.shape[2] - 1)])
-    found = unimitated(np.swapaxes(columns, 1, 2) @ columns + known, 1)[:, 0, 0]
-    return np.where(one.steady & other.steady, found, 0.0)
+    separations = unimitated(np.swapaxes(columns, 1, 2) @ columns + known, 1)[:, 0, 0]
+    return np.where(model.steady & rival.steady, separations, 0.0)
 
 
 def _sweep(reach: float, noise: float) -> TorsionPoints:

@@ -21,24 +21,24 @@ from scipy.special import ndtr
 Values = NDArray[np.float64]
 
 
-def unimitated(gram: Values, kept: int) -> Values:
+def unimitated(gram: Values, count: int) -> Values:
     """Return the Gram matrix of what the other columns cannot imitate of the first ones.
 
     Parameters
     ----------
     gram : ndarray, shape (..., n, n)
         Inner products of all columns, with what is known beforehand of the unknowns added.
-    kept : int
+    count : int
         Number of the first columns; the others may move to imitate them.
 
     Returns
     -------
-    ndarray, shape (..., kept, kept)
+    ndarray, shape (..., count, count)
         Its diagonal is lambda for each of the first columns.
     """
-    cross, moving = gram[..., kept:, :kept], gram[..., kept:, kept:]
+    cross, moving = gram[..., count:, :count], gram[..., count:, count:]
     imitated = np.swapaxes(cross, -1, -2) @ np.linalg.solve(moving, cross)
-    return np.asarray(gram[..., :kept, :kept] - imitated)
+    return np.asarray(gram[..., :count, :count] - imitated)
 
 
 def power(noncentrality: ArrayLike, threshold: float) -> Values:

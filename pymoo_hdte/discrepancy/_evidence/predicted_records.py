@@ -60,7 +60,7 @@ class PredictedRecords:
         return frozenset()
 
     @property
-    def remainder(self) -> float:
+    def model_error_share(self) -> float:
         """Share of the base's excess up to which a residual counts as the model's own error."""
         return self.rules.model_accuracy**2
 

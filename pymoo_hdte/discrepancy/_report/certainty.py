@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pymoo_hdte._reports.html import number, percent
 from pymoo_hdte.discrepancy._evidence.order_lines.evidence import PARTS
 from pymoo_hdte.discrepancy._evidence.order_lines.parameters import labels_by_order, words_of
-from pymoo_hdte.discrepancy._report.words import doubts
+from pymoo_hdte.discrepancy._report.words import caveats
 from pymoo_hdte.discrepancy._selection.hypothesis import (
     Hypothesis,
     adequate,
@@ -47,7 +47,7 @@ def how_sure(finding: DriveFinding) -> str:
             f"{certain} The nearest effect, "
             f"{labels_by_order(verdict.chosen.label, orders)}, explains {share} of the misfit, "
             f"{_too_little(finding, verdict.chosen)}."
-            + "".join(f" Against it: {one}." for one in doubts(verdict, orders))
+            + "".join(f" Against it: {caveat}." for caveat in caveats(verdict, orders))
         )
     return " ".join(_evidence(finding, verdict.chosen, share))
 
@@ -72,10 +72,10 @@ def how_sure_of_records(verdict: Verdict) -> str:
     others = _others(verdict, chosen)
     words = [f"It explains {share} of what the library can explain."]
     if verdict.equivalent:
-        shares = ", ".join(percent(one.explained) for one in verdict.equivalent)
+        shares = ", ".join(percent(hypothesis.explained) for hypothesis in verdict.equivalent)
         words.append(f"The indistinguishable alternatives explain {shares}.")
     elif others:
-        best = max(others, key=lambda one: one.explained)
+        best = max(others, key=lambda hypothesis: hypothesis.explained)
         words.append(_next_best(best, chosen))
     else:
         words.append("No other set of effects came near enough to be compared.")
@@ -140,11 +140,13 @@ def _evidence(finding: DriveFinding, chosen: Hypothesis, share: str) -> list[str
         best = min(others, key=lambda hypothesis: hypothesis.bic)
         words.append(_next_best(best, chosen, orders))
     bounded = [
-        words_of(one.name, orders) if row < chosen.fit.n_base else one.name.replace("_", " ")
-        for row, (one, side) in enumerate(
+        words_of(parameter.name, orders)
+        if row < chosen.fit.n_base
+        else parameter.name.replace("_", " ")
+        for row, (parameter, side) in enumerate(
             zip(chosen.fit.parameters, chosen.fit.bound_sides, strict=True)
         )
-        if one.limited_at(side)
+        if parameter.limited_at(side)
     ]
     if bounded:
         names = ", ".join(bounded)
@@ -168,7 +170,7 @@ def _probably(verdict: Verdict) -> str:
 def _others(verdict: Verdict, chosen: Hypothesis) -> list[Hypothesis]:
     """Return the alternatives that neither contain the chosen set nor are a part of it."""
     return [
-        one
-        for one in verdict.alternatives
-        if not (chosen.names <= one.names or one.names <= chosen.names)
+        hypothesis
+        for hypothesis in verdict.alternatives
+        if not (chosen.names <= hypothesis.names or hypothesis.names <= chosen.names)
     ]

@@ -15,7 +15,7 @@ from pymoo_hdte.discrepancy._answers.where.map import Location
 from pymoo_hdte.discrepancy._answers.where.relevance import relevance
 from pymoo_hdte.discrepancy._evidence.order_lines.evidence import PARTS
 from pymoo_hdte.discrepancy._evidence.order_lines.parameters import base_unit, labels_by_order
-from pymoo_hdte.discrepancy._report.words import doubts, what_is_missing
+from pymoo_hdte.discrepancy._report.words import caveats, what_is_missing
 from pymoo_hdte.discrepancy._selection.candidate import Candidate, labels_apart
 from pymoo_hdte.discrepancy._selection.fitting import Fit
 from pymoo_hdte.discrepancy._selection.hypothesis import (
@@ -65,7 +65,7 @@ def verdict_document(
         "status": verdict.status,
         "sentence": sentence(verdict, orders),
         "probability": verdict.probability,
-        "doubts": doubts(verdict, orders),
+        "doubts": caveats(verdict, orders),
         "reasons": [reason.as_dict() for reason in verdict.reasons],
         "effects": effects_of(verdict),
         "relevance": None if matters is None else matters.as_dict(),
@@ -76,7 +76,7 @@ def verdict_document(
             "parameters": base_parameters(verdict.accepted, verdict.rules),
         },
         "residual_over_noise": residual_of_parts(finding),
-        **with_believed_effects([one.to_dict() for one in finding.campaign.believed.effects]),
+        **with_believed_effects([effect.to_dict() for effect in finding.campaign.believed.effects]),
         "held_out": absent if held_out is None else dict(held_out),
         "next_experiment": proposal.as_dict(),
         "location": location.summary(),
@@ -95,7 +95,7 @@ def with_believed_effects(effects: Sequence[Mapping[str, Any]]) -> dict[str, Any
 
 def believed_in_words(document: Mapping[str, Any]) -> list[str]:
     """Return the believed effects of a verdict's document, each with its numbers."""
-    found = []
+    texts = []
     for effect in document.get("believed_effects", ()):
         parts = [
             f"{name} {value['value']:.4g} {value['unit']}"
@@ -105,8 +105,8 @@ def believed_in_words(document: Mapping[str, Any]) -> list[str]:
             if name not in ("name", "port")
         ]
         where = f" ({effect['port']})" if "port" in effect else ""
-        found.append(f"{effect['name']}{where}: {', '.join(parts)}".replace("_", " "))
-    return found
+        texts.append(f"{effect['name']}{where}: {', '.join(parts)}".replace("_", " "))
+    return texts
 
 
 def sentence(verdict: Verdict, error_orders: Sequence[float] = ()) -> str:
@@ -127,7 +127,7 @@ def sentence(verdict: Verdict, error_orders: Sequence[float] = ()) -> str:
     if verdict.status == "class" and verdict.equivalent:
         what = f"{what} {_or_else([chosen, *verdict.equivalent], error_orders)}"
     if verdict.reasons:
-        against = "; ".join(doubts(verdict, error_orders))
+        against = "; ".join(caveats(verdict, error_orders))
         return f"{what} With caveats: {against}."
     return what
 
@@ -137,12 +137,15 @@ def _or_else(sets: Sequence[Hypothesis], error_orders: Sequence[float]) -> str:
 
     A part of the first is told with it because it leaves doubts alone.
     """
-    labels = labels_apart([one.candidates for one in sets])
-    first, *others = (labels_by_order(one, error_orders) for one in labels)
+    labels = labels_apart([hypothesis.candidates for hypothesis in sets])
+    chosen, *others = (labels_by_order(label, error_orders) for label in labels)
     whole = label_of(sets[0].candidates)
-    alone = [" alone, with caveats" * (label_of(one.candidates) < whole) for one in sets[1:]]
-    listed = " or from ".join(one + how for one, how in zip(others, alone, strict=True))
-    return f"These data cannot distinguish {first} from {listed}."
+    alone = [
+        " alone, with caveats" * (label_of(hypothesis.candidates) < whole)
+        for hypothesis in sets[1:]
+    ]
+    listed = " or from ".join(label + how for label, how in zip(others, alone, strict=True))
+    return f"These data cannot distinguish {chosen} from {listed}."
 
 
 def residual_of_parts(finding: DriveFinding) -> dict[str, dict[str, float]]:
@@ -151,7 +154,7 @@ def residual_of_parts(finding: DriveFinding) -> dict[str, dict[str, float]]:
     Root mean squares of the residuals of the believed drive and of the accepted model; the noise
     is that of the sensors and of the repeatability of the static error.
     """
-    found = {}
+    by_channel = {}
     fits = {"before": finding.verdict.base, "after": finding.verdict.accepted}
     sizes = {}
     for when, fitted in fits.items():
@@ -161,8 +164,8 @@ def residual_of_parts(finding: DriveFinding) -> dict[str, dict[str, float]]:
         sizes[when] = np.where(degrees_of_freedom > 0.0, np.sqrt(np.maximum(ratio, 0.0)), np.nan)
     for place, part in enumerate(PARTS):
         if np.isfinite(sizes["before"][place]):
-            found[part] = {when: float(size[place]) for when, size in sizes.items()}
-    return found
+            by_channel[part] = {when: float(size[place]) for when, size in sizes.items()}
+    return by_channel
 
 
 def effects_of(verdict: Verdict, unit_of: UnitOf = base_unit) -> list[dict[str, Any]]:
@@ -174,11 +177,11 @@ def effects_of(verdict: Verdict, unit_of: UnitOf = base_unit) -> list[dict[str, 
     unit_of : callable
         From an unknown of the base to its SI unit.
     """
-    fitted, found = verdict.accepted, []
+    fitted, documents = verdict.accepted, []
     for candidate, place in fitted.places:
         rows, accuracy = range(place.start, place.stop), _accuracy(candidate, verdict)
         bounded = [fitted.parameters[row].name for row in rows if fitted.bound_sides[row] != 0.0]
-        found.append(
+        documents.append(
             {
                 "name": candidate.name,
                 "port": candidate.port,
@@ -191,7 +194,7 @@ def effects_of(verdict: Verdict, unit_of: UnitOf = base_unit) -> list[dict[str, 
                 "explained": verdict.chosen.explained if verdict.chosen else None,
             }
         )
-    return found
+    return documents
 
 
 def _accuracy(candidate: Candidate, verdict: Verdict) -> float:
@@ -207,8 +210,8 @@ def _accuracy(candidate: Candidate, verdict: Verdict) -> float:
     if chosen is None or candidate.exact or not verdict.leaves_more_than_noise:
         return accuracy
     beyond = chosen.fit.chi_square - adequate(freedom, rules) * freedom
-    left = min(beyond / (verdict.base.chi_square - freedom), 1.0 - rules.explained_share)
-    return float(np.hypot(accuracy, _DEVIATIONS * np.sqrt(left)))
+    unexplained = min(beyond / (verdict.base.chi_square - freedom), 1.0 - rules.explained_share)
+    return float(np.hypot(accuracy, _DEVIATIONS * np.sqrt(unexplained)))
 
 
 def _parameters(
@@ -229,27 +232,31 @@ def _parameters(
 
     The phase is that of amplitude cos(order theta_in + phase), in the direction of the part fitted.
     """
-    found: dict[str, Any] = {}
+    parameters: dict[str, Any] = {}
     if candidate.releases is not None:
-        rows = [[one.name for one in fitted.parameters].index(candidate.releases)]
+        rows = [[parameter.name for parameter in fitted.parameters].index(candidate.releases)]
     values, scale = expected_values(fitted, rules), scale_error(fitted, rules)
     for row in rows:
-        one = fitted.parameters[row]
-        shared = scale if shares_scale(_unit(candidate, one.line or one.name, unit_of)) else 0.0
-        if one.begins_line:
+        parameter = fitted.parameters[row]
+        shared = (
+            scale
+            if shares_scale(_unit(candidate, parameter.line or parameter.name, unit_of))
+            else 0.0
+        )
+        if parameter.begins_line:
             pair = np.array([row, row + 1])
             own = (accuracy * np.hypot(*values[pair]) / _DEVIATIONS) ** 2 * np.eye(2)
             own += (shared / _DEVIATIONS) ** 2 * np.outer(values[pair], values[pair])
             covariance = fitted.covariance[np.ix_(pair, pair)] + own
-            found |= _line(one.line, candidate, values[pair], covariance, unit_of)
-        elif not one.line:
+            parameters |= _line(parameter.line, candidate, values[pair], covariance, unit_of)
+        elif not parameter.line:
             own = float(np.hypot(accuracy, shared) * values[row] / _DEVIATIONS) ** 2
             variance = fitted.covariance[row, row] + own
             # A time or a torsion of a law is above zero, however little the data say of it.
-            least = 0.0 if one.lower > 0.0 else -np.inf
-            unit = _unit(candidate, one.name, unit_of)
-            found[one.name] = quantity(values[row], variance, unit, least)
-    return found
+            least = 0.0 if parameter.lower > 0.0 else -np.inf
+            unit = _unit(candidate, parameter.name, unit_of)
+            parameters[parameter.name] = quantity(values[row], variance, unit, least)
+    return parameters
 
 
 def _unit(candidate: Candidate, name: str, unit_of: UnitOf) -> str:
@@ -266,7 +273,7 @@ def _line(
     """Return amplitude and phase of a line, with intervals, from its cosine and sine parts."""
     cosine, sine = parts
     amplitude, phase = line_with_variance(cosine, sine, covariance)
-    prefix = next(one for one in reversed(HARMONIC_NAMES) if name.startswith(one))
+    prefix = next(harmonic for harmonic in reversed(HARMONIC_NAMES) if name.startswith(harmonic))
     return {
         name: quantity(*amplitude, _unit(candidate, name, unit_of)),
         f"{prefix}phase": quantity(*phase, _unit(candidate, "phase", unit_of)),
@@ -285,14 +292,14 @@ def quantity(value: float, variance: float, unit: str, least: float = -np.inf) -
 
 def base_parameters(fitted: Fit, rules: Rules, unit_of: UnitOf = base_unit) -> dict[str, Any]:
     """Return the base values of a fit with units, intervals and whether they ended at a bound."""
-    found, scale = {}, scale_error(fitted, rules)
+    parameters, scale = {}, scale_error(fitted, rules)
     for row, parameter in enumerate(fitted.parameters[: fitted.n_base]):
         value, unit = fitted.values[row], unit_of(parameter.name)
         shared = scale * value / _DEVIATIONS if shares_scale(unit) else 0.0
         entry = quantity(value, fitted.covariance[row, row] + shared**2, unit)
         entry["interval95"] = _within_bounds(parameter, entry["interval95"], rules)
-        found[parameter.name] = entry | {"at_bound": parameter.name in fitted.at_bounds}
-    return found
+        parameters[parameter.name] = entry | {"at_bound": parameter.name in fitted.at_bounds}
+    return parameters
 
 
 def _within_bounds(parameter: Parameter, interval: list[float], rules: Rules) -> list[float]:
@@ -310,8 +317,8 @@ def alternatives_of(verdict: Verdict) -> list[dict[str, Any]]:
     def evidence(hypothesis: Hypothesis) -> dict[str, Any]:
         return {
             "effects": [
-                {"name": one.name, "port": one.port, "order": one.order}
-                for one in hypothesis.candidates
+                {"name": candidate.name, "port": candidate.port, "order": candidate.order}
+                for candidate in hypothesis.candidates
             ],
             "bic": hypothesis.bic,
             "bic_gap": hypothesis.bic - chosen.bic if chosen else None,
@@ -322,5 +329,6 @@ def alternatives_of(verdict: Verdict) -> list[dict[str, Any]]:
         }
 
     return [
-        evidence(hypothesis) for hypothesis in sorted(verdict.alternatives, key=lambda one: one.bic)
+        evidence(hypothesis)
+        for hypothesis in sorted(verdict.alternatives, key=lambda hypothesis: hypothesis.bic)
     ]

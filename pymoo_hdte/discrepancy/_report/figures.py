@@ -14,7 +14,7 @@ from pymoo_hdte._reports.figures import AFTER, BEFORE, FAINT, GREY
 from pymoo_hdte.discrepancy._answers.where.map import Location
 from pymoo_hdte.discrepancy._records.line_fit import CHANNELS
 from pymoo_hdte.discrepancy._report.optimum import OptimumShift
-from pymoo_hdte.discrepancy._verdicts.validation_drive import Gap, Overlay, Proof
+from pymoo_hdte.discrepancy._verdicts.validation_drive import Overlay, PredictionError, Validation
 
 MAP_COLOURS = "cividis"
 LARGEST_SHOWN = 30.0
@@ -64,16 +64,16 @@ def misfit_map(location: Location) -> Figure:
     return figure
 
 
-def gap_by_channel(proof: Proof) -> Figure:
-    """Draw every channel's gap before and after, in multiples of its noise floor."""
-    gaps = [*proof.channels.values(), proof.overall]
-    labels = [*(WORDS[name] for name in proof.channels), "all together"]
+def error_by_channel(validation: Validation) -> Figure:
+    """Draw every channel's error before and after, in multiples of its noise floor."""
+    errors = [*validation.channels.values(), validation.overall]
+    labels = [*(WORDS[name] for name in validation.channels), "all together"]
     figure = Figure(figsize=(6.4, 2.0), layout="constrained")
     axis = figure.subplots()
-    _dumbbells(axis, gaps, labels, relative=True)
+    _dumbbells(axis, errors, labels, relative=True)
     axis.axvline(1.0, color=GREY, linestyle=":", linewidth=1.5)
     axis.set_xscale("log")
-    # Without a gap the axis would otherwise magnify differences of a few per cent.
+    # Without an error the axis would otherwise magnify differences of a few per cent.
     low, high = axis.get_xlim()
     axis.set_xlim(min(low, 0.5), max(high, 10.0))
     axis.set_xlabel("prediction error on held-out records / noise floor", fontsize=9)
@@ -82,19 +82,19 @@ def gap_by_channel(proof: Proof) -> Figure:
     return figure
 
 
-def gap_by_order(proof: Proof) -> Figure:
-    """Draw the gap of each order line of the transmission error, and the peak-to-peak values."""
+def error_by_order(validation: Validation) -> Figure:
+    """Draw the error of each order line of the transmission error, and the peak-to-peak values."""
     figure = Figure(figsize=(11.0, 3.8), layout="constrained")
     residual, right = figure.subplots(1, 2)
-    _dumbbells(residual, proof.by_order, [_order_word(order) for order in proof.orders])
-    floors = [gap.noise_floor for gap in proof.by_order]
+    _dumbbells(residual, validation.by_order, [_order_word(order) for order in validation.orders])
+    floors = [error.noise_floor for error in validation.by_order]
     residual.plot(floors, range(len(floors)), "|", color=GREY, markersize=9, label="noise floor")
     residual.set_xscale("log")
     residual.set_xlabel("prediction error [arcsec]")
     residual.set_ylabel("order of the input")
     residual.legend(fontsize=8, frameon=False)
-    measured, before, after = proof.dte
-    ends = [proof.dte.min(), proof.dte.max()]
+    measured, before, after = validation.dte
+    ends = [validation.dte.min(), validation.dte.max()]
     right.plot(ends, ends, color=GREY, linewidth=1)
     right.plot(measured, before, "s", color=BEFORE, mfc="none", label="before")
     right.plot(measured, after, "o", color=AFTER, label="after")
@@ -105,12 +105,12 @@ def gap_by_order(proof: Proof) -> Figure:
     return figure
 
 
-def overlay(proof: Proof) -> Figure:
+def overlay(validation: Validation) -> Figure:
     """Draw measured, before and after of the held-out record with the largest error of the base."""
     figure = Figure(figsize=(11.0, 5.6), layout="constrained")
-    panels = figure.subplots(len(proof.overlays), 1, sharex=True, squeeze=False)[:, 0]
-    for axis, one in zip(panels, proof.overlays, strict=True):
-        _draw_overlay(axis, one)
+    panels = figure.subplots(len(validation.overlays), 1, sharex=True, squeeze=False)[:, 0]
+    for axis, overlaid in zip(panels, validation.overlays, strict=True):
+        _draw_overlay(axis, overlaid)
     panels[0].legend(fontsize=8, frameon=False, ncols=4, loc="upper right")
     panels[-1].set_xlabel("input turns")
     return figure
@@ -135,22 +135,30 @@ def optimum_fronts(shift: OptimumShift) -> Figure:
     return figure
 
 
-def _draw_overlay(axis: Axes, one: Overlay) -> None:
-    axis.plot(one.sample_turns, one.samples, ".", color="#A9B2BB", markersize=4, label="samples")
-    axis.plot(one.turns, one.measured, color="black", linewidth=2.2, label="measured order lines")
-    axis.plot(one.turns, one.before, "--", color=BEFORE, linewidth=1.6, label="before")
-    axis.plot(one.turns, one.after, "-.", color=AFTER, linewidth=1.6, label="after")
-    axis.set_ylabel(f"{WORDS[one.channel]} [{one.unit}]")
+def _draw_overlay(axis: Axes, overlaid: Overlay) -> None:
+    axis.plot(
+        overlaid.sample_turns, overlaid.samples, ".", color="#A9B2BB", markersize=4, label="samples"
+    )
+    axis.plot(
+        overlaid.turns,
+        overlaid.measured,
+        color="black",
+        linewidth=2.2,
+        label="measured order lines",
+    )
+    axis.plot(overlaid.turns, overlaid.before, "--", color=BEFORE, linewidth=1.6, label="before")
+    axis.plot(overlaid.turns, overlaid.after, "-.", color=AFTER, linewidth=1.6, label="after")
+    axis.set_ylabel(f"{WORDS[overlaid.channel]} [{overlaid.unit}]")
     _tidy(axis)
 
 
 def _dumbbells(
-    axis: Axes, gaps: Sequence[Gap], labels: Sequence[str], relative: bool = False
+    axis: Axes, errors: Sequence[PredictionError], labels: Sequence[str], relative: bool = False
 ) -> None:
-    units = [gap.noise_floor if relative else 1.0 for gap in gaps]
-    before = [gap.before / unit for gap, unit in zip(gaps, units, strict=True)]
-    after = [gap.after / unit for gap, unit in zip(gaps, units, strict=True)]
-    rows = range(len(gaps))
+    units = [error.noise_floor if relative else 1.0 for error in errors]
+    before = [error.before / unit for error, unit in zip(errors, units, strict=True)]
+    after = [error.after / unit for error, unit in zip(errors, units, strict=True)]
+    rows = range(len(errors))
     axis.hlines(rows, before, after, color="#A9B2BB", linewidth=2)
     axis.plot(before, rows, "s", color=BEFORE, mfc="none", markersize=7, label="before")
     axis.plot(after, rows, "o", color=AFTER, markersize=5, label="after")

@@ -23,7 +23,7 @@ from pymoo_hdte.discrepancy._report.document import (
 )
 from pymoo_hdte.discrepancy._report.folder import FOLDER
 from pymoo_hdte.discrepancy._report.tables import effect_rows, hypothesis_rows
-from pymoo_hdte.discrepancy._report.words import doubts
+from pymoo_hdte.discrepancy._report.words import caveats
 from pymoo_hdte.discrepancy._verdicts.machine import HeldOutErrors, MachineFinding
 from pymoo_hdte.mechanism.effects import table_of
 
@@ -62,7 +62,7 @@ def write_machine_report(
         "status": verdict.status,
         "sentence": _sentence(finding),
         "probability": verdict.probability,
-        "doubts": doubts(verdict),
+        "doubts": caveats(verdict),
         "reasons": [reason.as_dict() for reason in verdict.reasons],
         "effects": effects_of(verdict, unit_of),
         "alternatives": alternatives_of(verdict),
@@ -107,13 +107,13 @@ def error_sentence(finding: MachineFinding, errors: HeldOutErrors | None) -> str
     """Return in words how the error of prediction on held-out records changed."""
     if errors is None:
         return "No record was held out, so the correction is not validated."
-    gap = errors.overall
-    before, after = f"{number(gap.before)} times the noise", number(gap.after)
+    error = errors.overall
+    before, after = f"{number(error.before)} times the noise", number(error.after)
     if not finding.verdict.accepted.candidates:
         return f"Nothing was added. Prediction error on held-out records: {before}."
     words = f"Prediction error on held-out records: {before} before, {after} after."
-    if gap.shrinkage is not None:
-        words += f" The correction removes {percent(min(gap.shrinkage, 1.0))} of the excess."
+    if error.shrinkage is not None:
+        words += f" The correction removes {percent(min(error.shrinkage, 1.0))} of the excess."
     if errors.growths:
         words += f" Worse than before: {', '.join(errors.growths)}."
     return words

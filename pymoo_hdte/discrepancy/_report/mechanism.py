@@ -17,8 +17,8 @@ from pymoo_hdte.discrepancy._report.certainty import how_sure_of_records
 from pymoo_hdte.discrepancy._report.document import believed_in_words
 from pymoo_hdte.discrepancy._report.folder import FOLDER
 from pymoo_hdte.discrepancy._report.mechanism_document import evidence, mechanism_verdict_document
-from pymoo_hdte.discrepancy._report.mechanism_figures import gaps as gaps_figure
 from pymoo_hdte.discrepancy._report.mechanism_figures import (
+    errors_figure,
     misfit_over_frequency,
     misfit_over_motion,
     overlay,
@@ -26,7 +26,7 @@ from pymoo_hdte.discrepancy._report.mechanism_figures import (
 from pymoo_hdte.discrepancy._report.torsion import torsion_document, torsion_picture
 from pymoo_hdte.discrepancy._verdicts.joint import JointFinding, revised_joint
 from pymoo_hdte.discrepancy._verdicts.mechanism_finding import MechanismFinding
-from pymoo_hdte.discrepancy._verdicts.validation_mechanism import MeasuredGap
+from pymoo_hdte.discrepancy._verdicts.validation_mechanism import MechanismPredictionError
 
 _SIZES = 5
 """Parameters on the first screen."""
@@ -35,7 +35,7 @@ _SIZES = 5
 def write_mechanism_report(
     title: str,
     finding: MechanismFinding,
-    gaps: Sequence[MeasuredGap],
+    errors: Sequence[MechanismPredictionError],
     test: NextTest,
     out: str | Path,
     joint: JointFinding | None = None,
@@ -46,7 +46,7 @@ def write_mechanism_report(
     ----------
     title : str
     finding : MechanismFinding
-    gaps : sequence of MeasuredGap
+    errors : sequence of MechanismPredictionError
         Of the held-out records.
     test : NextTest
     out : str or Path
@@ -67,9 +67,9 @@ def write_mechanism_report(
         If it cannot be written.
     """
     FOLDER.check(Path(out))
-    document = mechanism_verdict_document(title, finding, gaps, test)
+    document = mechanism_verdict_document(title, finding, errors, test)
     document["revised_model"] = {"file": MODEL_FILE}
-    document["gap_sentence"] = proof_sentence(finding, gaps)
+    document["gap_sentence"] = validation_sentence(finding, errors)
     revised = revised_mechanism(title, finding)
     if joint is not None:
         revised = revised_joint(title, joint)
@@ -77,7 +77,7 @@ def write_mechanism_report(
         words = f"Torques: {document['sentence']} Torsion: {torsion['sentence']}"
         document |= {"status": joint.status, "sentence": words, "torsion": torsion}
         document["location"]["sentence"] += f" {torsion['location']}"
-    page_text = _page(finding, document, gaps, joint)
+    page_text = _page(finding, document, errors, joint)
     FOLDER.write(Path(out), page_text, document, {MODEL_FILE: model_text(revised)})
     return document
 
@@ -85,18 +85,18 @@ def write_mechanism_report(
 def _page(
     finding: MechanismFinding,
     document: dict[str, Any],
-    gaps: Sequence[MeasuredGap],
+    errors: Sequence[MechanismPredictionError],
     joint: JointFinding | None,
 ) -> str:
     pictures = {
         "torsion": data_uri(torsion_picture(joint)) if joint else "",
         "motion": data_uri(misfit_over_motion(finding)),
         "frequency": data_uri(misfit_over_frequency(finding)),
-        "gaps": data_uri(gaps_figure(gaps)) if gaps else "",
+        "errors": data_uri(errors_figure(errors)) if errors else "",
     }
     rows = _effect_rows(document["effects"])
     sizes = [row for row in rows if not row["parameter"].endswith("phase")]
-    shown = _shown(gaps)
+    shown = _shown(errors)
     pictures["overlay"] = data_uri(overlay(finding, shown)) if shown else ""
     chosen = finding.verdict.chosen
     compared = [evidence(finding, chosen)] if chosen else []
@@ -109,48 +109,52 @@ def _page(
         rows=rows,
         sizes=sizes[:_SIZES],
         more=len(sizes) > _SIZES,
-        gaps=gaps,
+        errors=errors,
         shown=shown,
         pictures=pictures,
         certainty=how_sure_of_records(finding.verdict),
         compared=[*compared, *document["alternatives"]],
-        extent_sentence=extent_sentence(gaps),
+        extent_sentence=extent_sentence(errors),
         believed_effects=believed_in_words(document),
-        believed={name: one.value for name, one in finding.mechanism.quantities.items()},
+        believed={name: value.value for name, value in finding.mechanism.quantities.items()},
     )
 
 
-def _shown(gaps: Sequence[MeasuredGap]) -> MeasuredGap | None:
-    """Return the gap to be drawn over time: of a simulation that did not diverge, if any."""
-    drawn = [gap for gap in gaps if np.isfinite(gap.before) and np.isfinite(gap.after)]
-    return max(drawn, key=lambda gap: (gap.kind == "simulation", gap.before), default=None)
+def _shown(errors: Sequence[MechanismPredictionError]) -> MechanismPredictionError | None:
+    """Return the error to be drawn over time: of a simulation that did not diverge, if any."""
+    drawn = [error for error in errors if np.isfinite(error.before) and np.isfinite(error.after)]
+    return max(drawn, key=lambda error: (error.kind == "simulation", error.before), default=None)
 
 
-def proof_sentence(finding: MechanismFinding, gaps: Sequence[MeasuredGap]) -> str:
+def validation_sentence(
+    finding: MechanismFinding, errors: Sequence[MechanismPredictionError]
+) -> str:
     """Return in words the effect of the correction on records that were not fitted."""
-    if not gaps:
+    if not errors:
         return "No record was held out, so the correction is not validated."
     if not finding.accepted.candidates:
-        words = [f"{gap.quantity} by {gap.kind}: {gap.after:.3g} {gap.unit}" for gap in gaps]
-        return f"Nothing was added. Errors: {', '.join(words)}. {extent_sentence(gaps)}"
+        words = [
+            f"{error.quantity} by {error.kind}: {error.after:.3g} {error.unit}" for error in errors
+        ]
+        return f"Nothing was added. Errors: {', '.join(words)}. {extent_sentence(errors)}"
     words = []
     for kind in ("simulation", "balance"):
-        for quantity in dict.fromkeys(gap.quantity for gap in gaps if gap.kind == kind):
-            of_it = [gap for gap in gaps if (gap.kind, gap.quantity) == (kind, quantity)]
+        for quantity in dict.fromkeys(error.quantity for error in errors if error.kind == kind):
+            of_it = [error for error in errors if (error.kind, error.quantity) == (kind, quantity)]
             before, after = (
-                float(np.sqrt(np.mean([getattr(gap, one) ** 2 for gap in of_it])))
-                for one in ("before", "after")
+                float(np.sqrt(np.mean([getattr(error, side) ** 2 for error in of_it])))
+                for side in ("before", "after")
             )
             change, unit = _change(before, after), of_it[0].unit
             words.append(
                 f"{quantity} by {kind} {change} from {number(before)} to {number(after)} {unit}"
             )
-    return f"Root mean square errors: {'; '.join(words)}. {extent_sentence(gaps)}"
+    return f"Root mean square errors: {'; '.join(words)}. {extent_sentence(errors)}"
 
 
-def extent_sentence(gaps: Sequence[MeasuredGap]) -> str:
+def extent_sentence(errors: Sequence[MechanismPredictionError]) -> str:
     """Return in words how much of the held-out records was simulated."""
-    of_records = {gap.record: gap.extent for gap in gaps if gap.extent is not None}
+    of_records = {error.record: error.extent for error in errors if error.extent is not None}
     words = [
         f"{extent.windows} of {extent.room} windows of {extent.length:.3g} s in {record}"
         for record, extent in of_records.items()
@@ -167,7 +171,7 @@ def _change(before: float, after: float) -> str:
 def _effect_rows(effects: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
     return [
         {
-            "effect": f"{one['name'].replace('_', ' ')} ({one['port']})",
+            "effect": f"{effect['name'].replace('_', ' ')} ({effect['port']})",
             "parameter": name.replace("_", " "),
             "value": parameter["value"],
             "lower": parameter["interval95"][0],
@@ -175,6 +179,6 @@ def _effect_rows(effects: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
             "at_bound": parameter["at_bound"],
             "unit": "" if parameter["unit"] == "1" else parameter["unit"],
         }
-        for one in effects
-        for name, parameter in one["parameters"].items()
+        for effect in effects
+        for name, parameter in effect["parameters"].items()
     ]

@@ -20,8 +20,8 @@ from pymoo_hdte.discrepancy._selection.hypothesis import Hypothesis, label_of
 from pymoo_hdte.discrepancy._selection.reason import NOT_VALIDATED, Reason
 from pymoo_hdte.discrepancy._verdicts.mechanism_finding import MechanismFinding
 from pymoo_hdte.discrepancy._verdicts.validation_mechanism import (
-    MeasuredGap,
-    rests_told,
+    MechanismPredictionError,
+    sentences_on_rest,
 )
 from pymoo_hdte.effects.sentence_blanks import in_words
 from pymoo_hdte.mechanism.effects import table_of
@@ -30,7 +30,10 @@ from pymoo_hdte.mechanism.resampling import share_beyond
 
 
 def mechanism_verdict_document(
-    title: str, finding: MechanismFinding, gaps: Sequence[MeasuredGap], test: NextTest
+    title: str,
+    finding: MechanismFinding,
+    errors: Sequence[MechanismPredictionError],
+    test: NextTest,
 ) -> dict[str, Any]:
     """Return the verdict as plain types.
 
@@ -38,7 +41,7 @@ def mechanism_verdict_document(
     ----------
     title : str
     finding : MechanismFinding
-    gaps : sequence of MeasuredGap
+    errors : sequence of MechanismPredictionError
         Of held-out records; empty where there are none.
     test : NextTest
     """
@@ -52,16 +55,17 @@ def mechanism_verdict_document(
         "effects": [*effects(finding), *ripples(finding)],
         "offered": offered(finding),
         "alternatives": [
-            evidence(finding, one) for one in sorted(verdict.alternatives, key=_by_bic)
+            evidence(finding, hypothesis)
+            for hypothesis in sorted(verdict.alternatives, key=_by_bic)
         ],
         "base": quantities(finding),
         **with_believed_effects([table_of(effect) for effect in finding.believed]),
         "band": band(finding),
         "location": locate_in_mechanism(finding).summary(),
-        "remainder": remainder(finding),
+        "remainder": unexplained(finding),
         "limits": limits(finding),
         "record_remarks": record_remarks(finding),
-        "held_out": [gap.as_dict() for gap in gaps]
+        "held_out": [error.as_dict() for error in errors]
         or {"reason": "no record was held out, so the correction is not validated"},
         "next_experiment": test.as_dict(),
         "versions": {
@@ -90,24 +94,24 @@ def offered(finding: MechanismFinding) -> list[dict[str, Any]]:
     chosen, rules = finding.verdict.chosen, finding.data.rules
     if chosen is None or finding.accepted is not chosen.fit:
         return []
-    found, named = [], label_of(chosen.candidates)
-    for one in sorted(finding.verdict.alternatives, key=_by_bic):
-        more = [each for each in one.candidates if each.label not in named]
-        removes = 1.0 - one.fit.chi_square / chosen.fit.chi_square
-        if len(more) == 1 and named < label_of(one.candidates):
-            gain = chosen.bic - one.bic
+    offers, named = [], label_of(chosen.candidates)
+    for hypothesis in sorted(finding.verdict.alternatives, key=_by_bic):
+        added = [candidate for candidate in hypothesis.candidates if candidate.label not in named]
+        removes = 1.0 - hypothesis.fit.chi_square / chosen.fit.chi_square
+        if len(added) == 1 and named < label_of(hypothesis.candidates):
+            gain = chosen.bic - hypothesis.bic
             if gain > rules.bic_gain and removes > rules.offered_share:
-                found.append({"name": more[0].name, "port": more[0].port, "removes": removes})
-    return found
+                offers.append({"name": added[0].name, "port": added[0].port, "removes": removes})
+    return offers
 
 
-def remainder(finding: MechanismFinding) -> dict[str, Any]:
+def unexplained(finding: MechanismFinding) -> dict[str, Any]:
     """Return the residual of the accepted model, and its share of the misfit in words."""
-    after, noise = finding.remainder, finding.sensor_noise
+    after, noise = finding.unexplained, finding.sensor_noise
     size = ", ".join(
-        f"{one:.3g} {unit_of(finding.mechanism, name)} in the {finding.data.what(name)} "
-        f"({one / max(floor, 1e-300):.2g} times the sensor noise)"
-        for name, one, floor in zip(finding.data.names, after, noise, strict=True)
+        f"{size:.3g} {unit_of(finding.mechanism, name)} in the {finding.data.what(name)} "
+        f"({size / max(floor, 1e-300):.2g} times the sensor noise)"
+        for name, size, floor in zip(finding.data.names, after, noise, strict=True)
     )
     named = bool(finding.accepted.candidates)
     removed = finding.share_removed if named else 0.0
@@ -133,7 +137,7 @@ def band(finding: MechanismFinding) -> dict[str, Any]:
     """
     mechanism, cutoff = finding.mechanism, finding.cutoff
     read = [port.name for port in mechanism.ports if port.read]
-    of_forces = [*(one.name for one in mechanism.inputs), *read]
+    of_forces = [*(actuator.name for actuator in mechanism.inputs), *read]
 
     def largest(names: Sequence[str]) -> float:
         shares = (
@@ -162,27 +166,28 @@ def band(finding: MechanismFinding) -> dict[str, Any]:
 
 def limits(finding: MechanismFinding) -> list[str]:
     """Return the limits of these records, in sentences."""
-    found = [
+    sentences = [
         f"The {port.name} moves in one direction only: these records cannot separate Coulomb "
         "friction from a constant force or a sensor's offset."
         for port in finding.mechanism.ports
         if not port.read and not turns_back(finding.data, port.name)
     ]
-    found += rests_told(finding)
-    found += [
-        f"The force per unit of {one.name} is not known, so masses, springs, dampers and forces "
-        f"are in units of {one.name}: their ratios are determined, their absolute sizes are not."
-        for one in finding.mechanism.inputs
-        if not one.scaled
+    sentences += sentences_on_rest(finding)
+    sentences += [
+        f"The force per unit of {actuator.name} is not known, so masses, springs, dampers and "
+        f"forces are in units of {actuator.name}: their ratios are determined, their absolute "
+        "sizes are not."
+        for actuator in finding.mechanism.inputs
+        if not actuator.scaled
     ]
-    found += _not_validated(finding)
+    sentences += _not_validated(finding)
     if not any(record.role == "held_out" for record in finding.records):
-        found.append("No record was held out: the correction is not validated.")
+        sentences.append("No record was held out: the correction is not validated.")
     if any(finding.accepted.bound_sides[: len(finding.data.base)]):
         names = [n for n in finding.accepted.at_bounds if n in finding.mechanism.quantities]
         if names:
-            found.append(f"At the bound of its tolerance: {', '.join(names)}.")
-    return [*found, *finding.ripples.limits]
+            sentences.append(f"At the bound of its tolerance: {', '.join(names)}.")
+    return [*sentences, *finding.ripples.limits]
 
 
 def _not_validated(finding: MechanismFinding) -> list[str]:
@@ -192,7 +197,9 @@ def _not_validated(finding: MechanismFinding) -> list[str]:
         return []
     sizes = []
     for name in finding.mechanism.coordinates:
-        before, after, _ = np.mean([one.powers(name) for one in finding.simulated], axis=0) ** 0.5
+        before, after, _ = (
+            np.mean([record.powers(name) for record in finding.simulated], axis=0) ** 0.5
+        )
         sizes.append(f"{name} by simulation, {before:.3g} without it and {after:.3g} with it")
     return [
         f"{in_words(chosen.label)} would explain the records that were fitted, but "
@@ -202,36 +209,36 @@ def _not_validated(finding: MechanismFinding) -> list[str]:
 
 def record_remarks(finding: MechanismFinding) -> list[str]:
     """Return how the rows of records were read where they could not be taken as they are."""
-    found = [
+    sentences = [
         f"Rows of {record.name} with values that are not finite: {record.dropped}. They are left "
         "out at the ends and interpolated inside."
         for record in finding.records
         if record.dropped
     ]
-    return found + [f"{r.name}: {remark}" for r in finding.records for remark in r.remarks]
+    return sentences + [f"{r.name}: {remark}" for r in finding.records for remark in r.remarks]
 
 
-def _by_bic(one: Hypothesis) -> float:
-    return one.bic
+def _by_bic(hypothesis: Hypothesis) -> float:
+    return hypothesis.bic
 
 
-def evidence(finding: MechanismFinding, one: Hypothesis) -> dict[str, Any]:
+def evidence(finding: MechanismFinding, hypothesis: Hypothesis) -> dict[str, Any]:
     """Return how a set of effects compares with the chosen one."""
     chosen = finding.verdict.chosen
     return {
-        "effects": [{"name": c.name, "port": c.port} for c in one.candidates],
-        "label": in_words(one.label),
-        "bic_gap": one.bic - chosen.bic if chosen else None,
-        "explained": one.explained,
-        "equivalent": one in finding.verdict.equivalent,
-        "role": _role(finding, one),
+        "effects": [{"name": c.name, "port": c.port} for c in hypothesis.candidates],
+        "label": in_words(hypothesis.label),
+        "bic_gap": hypothesis.bic - chosen.bic if chosen else None,
+        "explained": hypothesis.explained,
+        "equivalent": hypothesis in finding.verdict.equivalent,
+        "role": _role(finding, hypothesis),
     }
 
 
-def _role(finding: MechanismFinding, one: Hypothesis) -> str:
+def _role(finding: MechanismFinding, hypothesis: Hypothesis) -> str:
     chosen = finding.verdict.chosen
-    if one is chosen:
+    if hypothesis is chosen:
         return "chosen"
-    if one in finding.verdict.equivalent:
+    if hypothesis in finding.verdict.equivalent:
         return "as good"
-    return "richer, hardly better" if chosen and one.bic < chosen.bic else "rejected"
+    return "richer, hardly better" if chosen and hypothesis.bic < chosen.bic else "rejected"

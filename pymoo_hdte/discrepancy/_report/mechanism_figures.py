@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from pymoo_hdte._reports.figures import AFTER, BEFORE, GREY
 from pymoo_hdte.discrepancy._verdicts.mechanism_finding import MechanismFinding
-from pymoo_hdte.discrepancy._verdicts.validation_mechanism import MeasuredGap
+from pymoo_hdte.discrepancy._verdicts.validation_mechanism import MechanismPredictionError
 from pymoo_hdte.mechanism.quantity_units import unit_of
 
 Values = NDArray[np.float64]
@@ -72,11 +72,15 @@ def misfit_over_frequency(finding: MechanismFinding) -> Figure:
         order = np.argsort(frequency, kind="stable")
         deviation = np.concatenate(
             [
-                one[part][balance.kept[part]]
-                for one, balance in zip(finding.data.deviation, finding.data.spectra, strict=True)
+                deviation[part][balance.kept[part]]
+                for deviation, balance in zip(
+                    finding.data.deviation, finding.data.spectra, strict=True
+                )
             ]
         )
-        noise = np.concatenate([one.noise[part][one.kept[part]] for one in finding.data.spectra])
+        noise = np.concatenate(
+            [balance.noise[part][balance.kept[part]] for balance in finding.data.spectra]
+        )
         lines = [("before", finding.verdict.base.residuals, BEFORE, "--")]
         if finding.accepted.candidates:
             lines.append(("after", finding.accepted.residuals, AFTER, "-"))
@@ -101,20 +105,20 @@ def misfit_over_frequency(finding: MechanismFinding) -> Figure:
     return figure
 
 
-def overlay(finding: MechanismFinding, gap: MeasuredGap) -> Figure:
+def overlay(finding: MechanismFinding, error: MechanismPredictionError) -> Figure:
     """Draw a held-out record: measured, before and after; below, the differences."""
     figure = Figure(figsize=(8.4, 3.8), layout="constrained")
     upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1))
-    stride = slice(None, None, max(1, len(gap.time) // _POINTS))
-    time = gap.time[stride]
-    upper.plot(time, gap.measured[stride], color=GREY, lw=2.5, label="measured")
-    upper.plot(time, gap.predicted_before[stride], "--", color=BEFORE, label="before")
-    upper.plot(time, gap.predicted_after[stride], "-", color=AFTER, lw=1.0, label="after")
-    upper.set_ylabel(f"{gap.quantity} [{gap.unit}]")
+    stride = slice(None, None, max(1, len(error.time) // _POINTS))
+    time = error.time[stride]
+    upper.plot(time, error.measured[stride], color=GREY, lw=2.5, label="measured")
+    upper.plot(time, error.predicted_before[stride], "--", color=BEFORE, label="before")
+    upper.plot(time, error.predicted_after[stride], "-", color=AFTER, lw=1.0, label="after")
+    upper.set_ylabel(f"{error.quantity} [{error.unit}]")
     # Above the axes, where it hides no curve.
     upper.legend(frameon=False, ncols=3, loc="lower left", bbox_to_anchor=(0.0, 1.0))
-    lower.plot(time, (gap.measured - gap.predicted_before)[stride], "--", color=BEFORE)
-    lower.plot(time, (gap.measured - gap.predicted_after)[stride], "-", color=AFTER)
+    lower.plot(time, (error.measured - error.predicted_before)[stride], "--", color=BEFORE)
+    lower.plot(time, (error.measured - error.predicted_after)[stride], "-", color=AFTER)
     lower.set(xlabel="time [s]", ylabel="difference")
     lower.ticklabel_format(axis="x", useOffset=False)
     for axis in (upper, lower):
@@ -122,20 +126,20 @@ def overlay(finding: MechanismFinding, gap: MeasuredGap) -> Figure:
     return figure
 
 
-def gaps(found: Sequence[MeasuredGap]) -> Figure:
-    """Draw the gaps of held-out records before and after, as ratios to the gap before."""
-    figure = Figure(figsize=(6.4, 0.7 + 0.42 * len(found)), layout="constrained")
+def errors_figure(errors: Sequence[MechanismPredictionError]) -> Figure:
+    """Draw the errors on held-out records before and after, as ratios to the error before."""
+    figure = Figure(figsize=(6.4, 0.7 + 0.42 * len(errors)), layout="constrained")
     axis = figure.subplots()
-    for row, gap in enumerate(found):
-        unit = gap.before if gap.before > 0.0 and np.isfinite(gap.before) else 1.0
-        axis.barh(row - 0.18, gap.before / unit, 0.34, color=BEFORE, hatch="//", edgecolor="white",
-                  label="before" if row == 0 else None)  # fmt: skip
-        axis.barh(row + 0.18, gap.after / unit, 0.34, color=AFTER,
+    for row, error in enumerate(errors):
+        unit = error.before if error.before > 0.0 and np.isfinite(error.before) else 1.0
+        axis.barh(row - 0.18, error.before / unit, 0.34, color=BEFORE, hatch="//",
+                  edgecolor="white", label="before" if row == 0 else None)  # fmt: skip
+        axis.barh(row + 0.18, error.after / unit, 0.34, color=AFTER,
                   label="after" if row == 0 else None)  # fmt: skip
-        axis.plot([gap.noise_floor / unit] * 2, [row - 0.4, row + 0.4], ":", color=GREY,
+        axis.plot([error.noise_floor / unit] * 2, [row - 0.4, row + 0.4], ":", color=GREY,
                   label="sensors" if row == 0 else None)  # fmt: skip
     axis.set_yticks(
-        range(len(found)), [f"{gap.record}: {gap.quantity}, {gap.kind}" for gap in found]
+        range(len(errors)), [f"{error.record}: {error.quantity}, {error.kind}" for error in errors]
     )
     axis.invert_yaxis()
     axis.set(xlabel="prediction error / error before")

@@ -20,13 +20,13 @@ def effects(finding: MechanismFinding) -> list[dict[str, Any]]:
     """Return the accepted effects with values and 95 % intervals."""
     fitted = finding.accepted
     spread = Spread(finding.data, fitted)
-    found = []
+    documents = []
     for candidate, place in fitted.places:
         rows = range(place.start, place.stop)
         parameters = _parameters(fitted, spread, _rows(fitted, candidate, rows))
-        for name, one in parameters.items():
-            one["unit"] = _unit(finding.mechanism, candidate, name)
-        found.append(
+        for name, document in parameters.items():
+            document["unit"] = _unit(finding.mechanism, candidate, name)
+        documents.append(
             {
                 "name": candidate.name,
                 "port": candidate.port,
@@ -37,17 +37,19 @@ def effects(finding: MechanismFinding) -> list[dict[str, Any]]:
                 ],
             }
         )
-    return found
+    return documents
 
 
 def ripples(finding: MechanismFinding) -> list[dict[str, Any]]:
     """Return the ripples beyond the band as effects, with values and 95 % intervals."""
-    found = [effect for one in finding.ripples.lines for effect in one.as_dicts()]
-    for effect in found:
+    documents = [effect for line in finding.ripples.lines for effect in line.as_dicts()]
+    for effect in documents:
         of_shaft = effect_named(effect["name"]).unit
-        for name, one in effect["parameters"].items():
-            one["unit"] = unit_of_number(finding.mechanism, effect["port"], name, of_shaft(name))
-    return found
+        for name, document in effect["parameters"].items():
+            document["unit"] = unit_of_number(
+                finding.mechanism, effect["port"], name, of_shaft(name)
+            )
+    return documents
 
 
 def _unit(mechanism: Mechanism, candidate: Candidate, name: str) -> str:
@@ -60,17 +62,17 @@ def _rows(fitted: Fit, candidate: Candidate, rows: range) -> range:
     """Return the rows of a candidate's parameters, or of the quantity that it frees."""
     if candidate.releases is None:
         return rows
-    place = [one.name for one in fitted.parameters].index(candidate.releases)
+    place = [parameter.name for parameter in fitted.parameters].index(candidate.releases)
     return range(place, place + 1)
 
 
 def quantities(finding: MechanismFinding) -> dict[str, Any]:
     """Return the fitted values of the mechanism with 95 % intervals."""
     spread = Spread(finding.data, finding.accepted)
-    found = _parameters(finding.accepted, spread, range(len(finding.data.base)))
-    for name, one in found.items():
-        one["unit"] = base_unit(finding.mechanism, name)
-    return found
+    by_name = _parameters(finding.accepted, spread, range(len(finding.data.base)))
+    for name, document in by_name.items():
+        document["unit"] = base_unit(finding.mechanism, name)
+    return by_name
 
 
 def _parameters(fitted: Fit, spread: Spread, rows: range) -> dict[str, Any]:
@@ -78,15 +80,15 @@ def _parameters(fitted: Fit, spread: Spread, rows: range) -> dict[str, Any]:
 
     The interval of a value that ended at a bound ends there too, and does not hold: it says so.
     """
-    found: dict[str, Any] = {}
+    by_name: dict[str, Any] = {}
     for row in rows:
         parameter, value = fitted.parameters[row], float(fitted.values[row])
         name, reach = parameter.name, float(spread.reach[row])
         if not parameter.line:
             # The fit could not exceed its bounds.
             bounds = parameter.lower, parameter.upper
-            found[name] = _with_interval(value, spread.covariance[row, row], reach, *bounds)
-            found[name]["at_bound"] = bool(fitted.bound_sides[row])
+            by_name[name] = _with_interval(value, spread.covariance[row, row], reach, *bounds)
+            by_name[name]["at_bound"] = bool(fitted.bound_sides[row])
         if not parameter.begins_line:
             continue
         pair = slice(row, row + 2)
@@ -94,11 +96,11 @@ def _parameters(fitted: Fit, spread: Spread, rows: range) -> dict[str, Any]:
         amplitude, phase = line_with_variance(cosine, sine, spread.covariance[pair, pair])
         reach = float(spread.reach[pair].max())
         name = parameter.line
-        found[name] = _with_interval(*amplitude, reach, lower=0.0)
-        found[f"{name}_phase"] = _with_interval(*phase, reach)
-        for one in (name, f"{name}_phase"):
-            found[one]["at_bound"] = bool(np.any(fitted.bound_sides[pair]))
-    return found
+        by_name[name] = _with_interval(*amplitude, reach, lower=0.0)
+        by_name[f"{name}_phase"] = _with_interval(*phase, reach)
+        for part in (name, f"{name}_phase"):
+            by_name[part]["at_bound"] = bool(np.any(fitted.bound_sides[pair]))
+    return by_name
 
 
 def _with_interval(

@@ -81,7 +81,7 @@ class OptimumShift:
         """How the optimum moved, in words, for the balanced preference."""
         if not self.choices:
             return self.obstacle
-        choice = next(one for one in self.choices if one.preference == "balanced")
+        choice = next(choice for choice in self.choices if choice.preference == "balanced")
         promised, delivered, reached = (
             f"mean {mean:.3g} and standard deviation {std:.3g} arcsec"
             for mean, std in (choice.promised, choice.delivered, choice.reached)

@@ -27,8 +27,8 @@ from pymoo_hdte.discrepancy._selection.fitting import Fit
 from pymoo_hdte.discrepancy._selection.hypothesis import Hypothesis
 from pymoo_hdte.discrepancy._selection.verdict import Verdict
 from pymoo_hdte.discrepancy._verdicts.drive_finding import DriveFinding
-from pymoo_hdte.discrepancy._verdicts.gap import Gap
-from pymoo_hdte.discrepancy._verdicts.validation_drive import Proof
+from pymoo_hdte.discrepancy._verdicts.prediction_error import PredictionError
+from pymoo_hdte.discrepancy._verdicts.validation_drive import Validation
 from pymoo_hdte.effects.sentence_blanks import listed
 from pymoo_hdte.effects.unknowns import HARMONIC_NAMES, Parameter
 from pymoo_hdte.units import ARCSEC, REVOLUTION_PER_MINUTE
@@ -146,23 +146,27 @@ def parameter_rows(finding: DriveFinding) -> list[ParameterRow]:
     ]
 
 
-def metric_rows(proof: Proof | None) -> list[tuple[str, float, float]]:
+def metric_rows(validation: Validation | None) -> list[tuple[str, float, float]]:
     """Return the paper's metrics of the peak-to-peak: name, before, after."""
-    if proof is None or proof.metrics is None:
+    if validation is None or validation.metrics is None:
         return []
-    before, after = proof.metrics
+    before, after = validation.metrics
     rows = [(word, getattr(before, name), getattr(after, name)) for name, word in METRICS.items()]
     ends = zip(
         ("lower", "upper"), before.mean_error_interval, after.mean_error_interval, strict=True
     )
-    return rows + [(f"mean error, {end} end (95 %)", one, two) for end, one, two in ends]
+    return rows + [(f"mean error, {end} end (95 %)", old, new) for end, old, new in ends]
 
 
 def record_rows(
-    campaign: Campaign, proof: Proof | None
-) -> list[tuple[str, str, float, float, int, Gap | None]]:
-    """Return name, role, speed (r/min), load (N.m), rows and, where held out, gap of records."""
-    gaps = {} if proof is None else dict(zip(proof.records, proof.by_record, strict=True))
+    campaign: Campaign, validation: Validation | None
+) -> list[tuple[str, str, float, float, int, PredictionError | None]]:
+    """Return name, role, speed (r/min), load (N.m), rows and, where held out, error of records."""
+    errors = (
+        {}
+        if validation is None
+        else dict(zip(validation.records, validation.by_record, strict=True))
+    )
     return [
         (
             record.name,
@@ -170,7 +174,7 @@ def record_rows(
             record.input_speed / REVOLUTION_PER_MINUTE,
             record.load_torque,
             len(record.time),
-            gaps.get(record.name),
+            errors.get(record.name),
         )
         for record in campaign.running
     ]
@@ -187,15 +191,15 @@ def _parameter_row(
     words = words_of(name, ()) if "." in name else name_by_order(name, orders)
     low, high = (end / size for end in entry["interval95"])
     # Phases and the constant of the encoders have no believed value.
-    free = parameter.name == "offset" or parameter.name.startswith("error_phase_")
+    without_belief = parameter.name == "offset" or parameter.name.startswith("error_phase_")
     return ParameterRow(
         words,
         unit,
-        None if free else parameter.start / size,
+        None if without_belief else parameter.start / size,
         entry["value"] / size,
         (low, high) if has_interval else None,
-        None if free else parameter.lower / size,
-        None if free else parameter.upper / size,
+        None if without_belief else parameter.lower / size,
+        None if without_belief else parameter.upper / size,
         entry["at_bound"],
     )
 
@@ -203,8 +207,12 @@ def _parameter_row(
 def _bounded(fitted: Fit, error_orders: Sequence[float]) -> list[str]:
     """Return the unknowns of a fit that ended at a bound, in words."""
     return [
-        name_by_order(one.name, error_orders) if row < fitted.n_base else one.name.replace("_", " ")
-        for row, (one, side) in enumerate(zip(fitted.parameters, fitted.bound_sides, strict=True))
+        name_by_order(parameter.name, error_orders)
+        if row < fitted.n_base
+        else parameter.name.replace("_", " ")
+        for row, (parameter, side) in enumerate(
+            zip(fitted.parameters, fitted.bound_sides, strict=True)
+        )
         if side != 0.0
     ]
 
@@ -279,15 +287,17 @@ def rows_sentence(findings: RowFindings) -> str:
         records = {fault.record for fault in shown}
         where = next(iter(records)) if len(records) == 1 else f"{len(records)} records"
         words.append(f"{listed(counted)} in {where}: {_treatment(findings)}.")
-    replaced = [one for one in findings.noise if one.replaced]
-    for zero in (one for one in replaced if one.name.endswith("_zero")):
+    replaced = [finding for finding in findings.noise if finding.replaced]
+    for zero in (finding for finding in replaced if finding.name.endswith("_zero")):
         words.append(
             f"The {_name(zero)} drifts, so its uncertainty is taken as {zero.used:.2g} {zero.unit} "
             f"instead of the stated {zero.stated:.2g} {zero.unit}."
         )
-    changed = [one for one in replaced if not one.name.endswith("_zero")]
+    changed = [finding for finding in replaced if not finding.name.endswith("_zero")]
     if changed:
-        ratios = listed([f"{one.used / one.stated:.2g} times ({_name(one)})" for one in changed])
+        ratios = listed(
+            [f"{finding.used / finding.stated:.2g} times ({_name(finding)})" for finding in changed]
+        )
         words.append(f"The noise is {ratios} the stated one; the measured noise is used.")
     sentence = " ".join(words)
     return sentence[:1].upper() + sentence[1:]
@@ -312,7 +322,7 @@ def _treatment(findings: RowFindings) -> str:
     if "new zero" in modelled:
         done.append("records with a new zero are shifted back")
     if "drift" in modelled:
-        largest = max(abs(one.size) for one in findings.faults if one.kind == "drift")
+        largest = max(abs(fault.size) for fault in findings.faults if fault.kind == "drift")
         done.append(f"drifts of up to {largest:.2g} N.m are removed")
     if findings.left_out:
         done.append(f"left out as a whole: {listed(list(findings.left_out))}")
@@ -337,18 +347,25 @@ def _fault_row(fault: RowFault) -> FaultRow:
 
 def noise_rows(findings: RowFindings) -> list[NoiseRow]:
     """Return stated and found noise."""
-    return [_noise_row(one) for one in findings.noise]
+    return [_noise_row(finding) for finding in findings.noise]
 
 
-def _noise_row(one: NoiseFinding) -> NoiseRow:
-    unit, stated = _unit_of(one.unit, one.stated)
-    found = None if one.found is None else _unit_of(one.unit, one.found)[1]
-    return NoiseRow(_name(one), stated, found, _unit_of(one.unit, one.used)[1], unit, one.reason)
+def _noise_row(finding: NoiseFinding) -> NoiseRow:
+    unit, stated = _unit_of(finding.unit, finding.stated)
+    estimate = None if finding.found is None else _unit_of(finding.unit, finding.found)[1]
+    return NoiseRow(
+        _name(finding),
+        stated,
+        estimate,
+        _unit_of(finding.unit, finding.used)[1],
+        unit,
+        finding.reason,
+    )
 
 
 def _unit_of(unit: str, size: float) -> tuple[str, float]:
     return ("arcsec", size / ARCSEC) if unit == "rad" else (unit, size)
 
 
-def _name(one: NoiseFinding) -> str:
-    return one.name.removesuffix("_noise").replace("_", " ")
+def _name(finding: NoiseFinding) -> str:
+    return finding.name.removesuffix("_noise").replace("_", " ")

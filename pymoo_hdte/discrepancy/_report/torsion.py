@@ -24,7 +24,7 @@ from pymoo_hdte.discrepancy._selection.candidate import Candidate
 from pymoo_hdte.discrepancy._selection.reason import NOT_VALIDATED, Reason
 from pymoo_hdte.discrepancy._verdicts.joint import JointFinding
 from pymoo_hdte.discrepancy._verdicts.joint_torsion import KINEMATIC, errors_of
-from pymoo_hdte.discrepancy._verdicts.validation_mechanism import rests_told
+from pymoo_hdte.discrepancy._verdicts.validation_mechanism import sentences_on_rest
 from pymoo_hdte.effects.sentence_blanks import in_words
 from pymoo_hdte.mechanism import LawAt
 from pymoo_hdte.units import ARCSEC
@@ -40,7 +40,7 @@ def torsion_document(finding: JointFinding) -> dict[str, Any]:
     finding : JointFinding
     """
     torsion = finding.torsion
-    alternatives = sorted(torsion.verdict.alternatives, key=lambda one: one.bic)
+    alternatives = sorted(torsion.verdict.alternatives, key=lambda hypothesis: hypothesis.bic)
     return {
         "gear": finding.joint.gear.name,
         "status": torsion.verdict.status,
@@ -49,44 +49,44 @@ def torsion_document(finding: JointFinding) -> dict[str, Any]:
         "effects": _effects(finding),
         "location": _location(finding),
         "offered": offered(torsion),
-        "alternatives": [evidence(torsion, one) for one in alternatives],
-        "not_ruled_out": [in_words(one.label) for one in near_by(finding)],
+        "alternatives": [evidence(torsion, hypothesis) for hypothesis in alternatives],
+        "not_ruled_out": [in_words(hypothesis.label) for hypothesis in near_by(finding)],
         "base": quantities(torsion),
-        "remainder": _remainder(finding),
+        "remainder": _unexplained(finding),
         "limits": torsion_limits(finding),
         "held_out": [
             {
-                "record": gap.record,
-                "before_arcsec": gap.before / ARCSEC,
-                "after_arcsec": gap.after / ARCSEC,
-                "noise_floor_arcsec": gap.noise_floor / ARCSEC,
-                "before_Nm": gap.before * finding.stiffness,
-                "after_Nm": gap.after * finding.stiffness,
-                "shrinkage": gap.shrinkage,
+                "record": error.record,
+                "before_arcsec": error.before / ARCSEC,
+                "after_arcsec": error.after / ARCSEC,
+                "noise_floor_arcsec": error.noise_floor / ARCSEC,
+                "before_Nm": error.before * finding.stiffness,
+                "after_Nm": error.after * finding.stiffness,
+                "shrinkage": error.shrinkage,
             }
-            for gap in finding.gaps
+            for error in finding.errors
         ],
-        "proof": _proof(finding),
+        "proof": _validation(finding),
         "next_experiment": torsion_test(finding),
     }
 
 
 def torsion_limits(finding: JointFinding) -> list[str]:
     """Return what the records cannot tell of the torsion, in sentences."""
-    of_names, of_rest = _unnamed(finding), rests_told(finding.torsion)
+    of_names, of_rest = _unnamed(finding), sentences_on_rest(finding.torsion)
     return [*open_by_motion(finding), *of_names, *of_rest, *open_by_twins(finding)]
 
 
 def _unnamed(finding: JointFinding) -> list[str]:
     """Return which effects explain the torsion that was fitted, where none of them is named."""
-    verdict, near = finding.torsion.verdict, near_by(finding)
-    if verdict.accepted is not verdict.base or not near:
+    verdict, competing = finding.torsion.verdict, near_by(finding)
+    if verdict.accepted is not verdict.base or not competing:
         return []
-    words = "; or ".join(in_words(one.label) for one in near)
-    told = f"The fitted records could be explained by {words}"
+    words = "; or ".join(in_words(hypothesis.label) for hypothesis in competing)
+    text = f"The fitted records could be explained by {words}"
     if verdict.has_reason(NOT_VALIDATED):
-        told += f"; but {in_a_sentence(Reason(NOT_VALIDATED))} with the best of them"
-    return [f"{told}. None is named."]
+        text += f"; but {in_a_sentence(Reason(NOT_VALIDATED))} with the best of them"
+    return [f"{text}. None is named."]
 
 
 def torsion_sentence(finding: JointFinding) -> str:
@@ -94,8 +94,8 @@ def torsion_sentence(finding: JointFinding) -> str:
     torsion, gear = finding.torsion, finding.joint.gear.name
     verdict = torsion.verdict
     lines = " ".join(
-        f"The {gear} errs with its angle, order {one.words}."
-        for one, _ in errors_of(torsion.ripples)
+        f"The {gear} errs with its angle, order {line.words}."
+        for line, _ in errors_of(torsion.ripples)
     )
     if verdict.status == "adequate":
         return f"Nothing is missing in the torsion of the {gear}: its spring explains it."
@@ -103,8 +103,8 @@ def torsion_sentence(finding: JointFinding) -> str:
         return lines
     words = sentence(verdict)
     if verdict.rivals_beyond:
-        words = f"{' '.join(one.sentence for one in verdict.accepted.candidates)} These data "
-        words += "cannot distinguish it from a time delay between the two encoders."
+        words = " ".join(candidate.sentence for candidate in verdict.accepted.candidates)
+        words += " These data cannot distinguish it from a time delay between the two encoders."
     return f"{words} {lines}".strip()
 
 
@@ -113,8 +113,8 @@ def _location(finding: JointFinding) -> str:
     if torsion.verdict.status == "adequate":
         return f"Not in the torsion of the {gear}."
     off, noise = (
-        float(one[0]) / finding.stiffness / ARCSEC
-        for one in (torsion.base_misfit, torsion.sensor_noise)
+        float(torque[0]) / finding.stiffness / ARCSEC
+        for torque in (torsion.base_misfit, torsion.sensor_noise)
     )
     return f"In the torsion of the {gear} (error {off:.3g} arcseconds, sensor noise {noise:.2g})."
 
@@ -122,7 +122,7 @@ def _location(finding: JointFinding) -> str:
 def _effects(finding: JointFinding) -> list[dict[str, Any]]:
     """Return the named effects, angles in arcseconds, with the torsion that their laws make."""
     torsion = finding.torsion
-    found = []
+    documents = []
     parts = zip(
         torsion.accepted.candidates,
         torsion.accepted.effects_by_candidate,
@@ -136,17 +136,20 @@ def _effects(finding: JointFinding) -> list[dict[str, Any]]:
         }
         # A believed value outside its tolerance is no torque of its own.
         size = _size(finding, laws) if laws else {}
-        found.append(entry | {"parameters": parameters, **size})
-    for one, part in errors_of(torsion.ripples):
+        documents.append(entry | {"parameters": parameters, **size})
+    for ripple, part in errors_of(torsion.ripples):
         amplitude, variance = part.values["amplitude"]
         line = {"value": amplitude, "interval95": _about(amplitude, variance)}
-        found.append(
+        documents.append(
             {
                 "name": KINEMATIC,
-                "port": one.port,
-                "sentence": f"The {one.port} errs with its angle, order {one.words}.",
+                "port": ripple.port,
+                "sentence": f"The {ripple.port} errs with its angle, order {ripple.words}.",
                 "parameters": {
-                    "order": {"value": one.order, "interval95": _about(one.order, one.variance)}
+                    "order": {
+                        "value": ripple.order,
+                        "interval95": _about(ripple.order, ripple.variance),
+                    }
                     | {"unit": "1", "at_bound": False},
                     "amplitude": _shown({**line, "at_bound": False}, "arcsec"),
                 },
@@ -155,7 +158,7 @@ def _effects(finding: JointFinding) -> list[dict[str, Any]]:
                 "rms_Nm": amplitude / 2.0**0.5 * finding.stiffness,
             }
         )
-    return found
+    return documents
 
 
 def _about(value: float, variance: float) -> list[float]:
@@ -177,7 +180,7 @@ def _unit(candidate: Candidate, name: str) -> str:
 def _shown(parameter: dict[str, Any], unit: str) -> dict[str, Any]:
     """Return a parameter, which is in SI, in its unit."""
     factor = 1.0 / ARCSEC if unit == "arcsec" else 1.0
-    ends = [factor * one for one in parameter["interval95"]]
+    ends = [factor * end for end in parameter["interval95"]]
     return parameter | {"value": factor * parameter["value"], "interval95": ends, "unit": unit}
 
 
@@ -185,7 +188,11 @@ def _size(finding: JointFinding, laws: tuple[LawAt, ...]) -> dict[str, float]:
     """Return the root mean square of what effects add to the torsion, about its mean."""
     torsion, gear = finding.torsion, finding.joint.gear.name
     values = dict(
-        zip((one.name for one in torsion.accepted.parameters), torsion.accepted.values, strict=True)
+        zip(
+            (parameter.name for parameter in torsion.accepted.parameters),
+            torsion.accepted.values,
+            strict=True,
+        )
     )
     power, count = 0.0, 0
     for balance in torsion.data.spectra:
@@ -196,38 +203,40 @@ def _size(finding: JointFinding, laws: tuple[LawAt, ...]) -> dict[str, float]:
     return {"rms_Nm": size, "rms_arcsec": size / finding.stiffness / ARCSEC}
 
 
-def _remainder(finding: JointFinding) -> dict[str, Any]:
+def _unexplained(finding: JointFinding) -> dict[str, Any]:
     torsion = finding.torsion
-    (left,), (noise,) = torsion.remainder.tolist(), torsion.sensor_noise.tolist()
-    arcseconds = left / finding.stiffness / ARCSEC
+    (unexplained,), (noise,) = torsion.unexplained.tolist(), torsion.sensor_noise.tolist()
+    arcseconds = unexplained / finding.stiffness / ARCSEC
     named = bool(torsion.accepted.candidates)
     removed = torsion.share_removed if named else 0.0
-    words = f"The residual is {arcseconds:.3g} arcseconds of torsion, {left:.3g} N.m"
+    words = f"The residual is {arcseconds:.3g} arcseconds of torsion, {unexplained:.3g} N.m"
     if named:
         words = f"The correction removes {100.0 * removed:.3g} % of the misfit's power and leaves "
-        words += f"{arcseconds:.3g} arcseconds of torsion, {left:.3g} N.m"
-    words += f" over its stiffness ({left / max(noise, 1e-300):.2g} times the sensor noise)."
+        words += f"{arcseconds:.3g} arcseconds of torsion, {unexplained:.3g} N.m"
+    words += f" over its stiffness ({unexplained / max(noise, 1e-300):.2g} times the sensor noise)."
     return {
         "sentence": words,
         "share_removed": removed,
-        "left_Nm": left,
+        "left_Nm": unexplained,
         "left_arcsec": arcseconds,
     }
 
 
-def _proof(finding: JointFinding) -> str:
-    if not finding.gaps:
+def _validation(finding: JointFinding) -> str:
+    if not finding.errors:
         return "No record was held out, so the correction is not validated."
     before, after, floor = (
-        float(np.sqrt(np.mean([getattr(gap, one) ** 2 for gap in finding.gaps]))) / ARCSEC
-        for one in ("before", "after", "noise_floor")
+        float(np.sqrt(np.mean([getattr(error, side) ** 2 for error in finding.errors]))) / ARCSEC
+        for side in ("before", "after", "noise_floor")
     )
-    measured = float(np.sqrt(np.mean([np.var(gap.measured) for gap in finding.gaps]))) / ARCSEC
-    told = f"of {measured:.3g} arcseconds measured; encoder noise is {floor:.2g}"
+    measured = (
+        float(np.sqrt(np.mean([np.var(error.measured) for error in finding.errors]))) / ARCSEC
+    )
+    size = f"of {measured:.3g} arcseconds measured; encoder noise is {floor:.2g}"
     if not finding.torsion.accepted.candidates:
-        return f"Nothing was added. The error of the held-out torsion is {before:.3g} {told}."
+        return f"Nothing was added. The error of the held-out torsion is {before:.3g} {size}."
     how = "falls" if after < before else "does not fall,"
-    return f"The error of the held-out torsion {how} from {before:.3g} to {after:.3g} {told}."
+    return f"The error of the held-out torsion {how} from {before:.3g} to {after:.3g} {size}."
 
 
 _POINTS = 1500
@@ -244,12 +253,14 @@ def torsion_picture(finding: JointFinding) -> Figure:
     fits = [(torsion.verdict.base, BEFORE, ".", "before")]
     if torsion.accepted.candidates:
         fits.append((torsion.accepted, AFTER, "x", "after"))
-    left = [torsion.data.coefficients(fit.residuals) for fit, *_ in fits]
+    coefficients = [torsion.data.coefficients(fit.residuals) for fit, *_ in fits]
     for record, balance in enumerate(torsion.data.spectra):
         motion, rows = balance.ports[gear], balance.record.time
         torque = sum(
-            one.gain.value * one.acts[finding.joint.motor] * balance.record.channels[one.name]
-            for one in torsion.mechanism.inputs
+            actuator.gain.value
+            * actuator.acts[finding.joint.motor]
+            * balance.record.channels[actuator.name]
+            for actuator in torsion.mechanism.inputs
         )
         over = np.interp(balance.time, rows, np.asarray(torque)), motion.shaft
         stride = slice(None, None, max(1, len(balance.time) * len(torsion.data.spectra) // _POINTS))
@@ -258,8 +269,8 @@ def torsion_picture(finding: JointFinding) -> Figure:
                 x[stride], motion.position[stride] / ARCSEC, "-", color=GREY, lw=1.2,
                 label="measured" if record == 0 else None,
             )  # fmt: skip
-            for (_, colour, marker, label), one in zip(fits, left, strict=True):
-                angle = balance.in_time(one[record][0]) / finding.stiffness / ARCSEC
+            for (_, colour, marker, label), spectrum in zip(fits, coefficients, strict=True):
+                angle = balance.in_time(spectrum[record][0]) / finding.stiffness / ARCSEC
                 axes[1, column].plot(
                     x[stride], angle[stride], marker, ms=3, color=colour, alpha=0.6,
                     label=label if record == 0 else None,

@@ -1,10 +1,11 @@
-"""Sentences of the reasons of a verdict, beside each other."""
+"""Sentences of the reasons and limits of a verdict, beside each other."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from pymoo_hdte.discrepancy._evidence.order_lines.parameters import labels_by_order
+from pymoo_hdte._reports.html import number
+from pymoo_hdte.discrepancy._evidence.order_lines.parameters import base_unit, labels_by_order
 from pymoo_hdte.discrepancy._selection import reason as codes
 from pymoo_hdte.discrepancy._selection.candidate import Candidate
 from pymoo_hdte.discrepancy._selection.reason import Reason
@@ -58,6 +59,89 @@ _SENTENCES: dict[str, Callable[[Reason, Label], str]] = {
 }
 
 
+def _sensor_off(reason: Reason) -> str:
+    place, _, kind = reason.effect.rpartition("_torque_")
+    size, unit, shares = 1.0, base_unit(reason.effect), "the mean torques share"
+    if kind == "gain":
+        size, unit, shares = 100.0, "%", "torques, stiffness and inertias share"
+    fitted, stated = (f"{number(size * value, 2)} {unit}" for _, value in reason.numbers)
+    return (
+        f"The fitted {kind} of the {place} torque sensor is off by {fitted} (you stated "
+        f"+-{stated}): check the sensor; {shares} this error."
+    )
+
+
+_LIMITS: dict[str, Callable[[Reason], str]] = {
+    codes.SAME_READING: lambda reason: (
+        "Both angles begin at the same reading in every record. If their counters were zeroed "
+        "there, zeros differ from record to record, and with them the phases of all lines: state "
+        "the zero of each record."
+    ),
+    codes.STANDS_OUT: lambda reason: (
+        f"Record {reason.names[0]} alone has {100.0 * reason.numbers[0][1]:.0f} % of the misfit: "
+        "either the missing effect shows only there, or its sensors or drive differed from the "
+        "others. In that case leave it out."
+    ),
+    codes.NO_HELD_OUT: lambda reason: "No record was held out: the correction is not validated.",
+    codes.NOT_SHOWN: lambda reason: "The held-out records do not show what is named.",
+    codes.HELD_OUT_RATTLES: lambda reason: (
+        "All held-out records rattle: the correction is not validated."
+    ),
+    codes.FLANKS_PART: lambda reason: (
+        "Neither fitted nor predicted, because the load does not hold the tooth flanks "
+        f"together: {', '.join(reason.names)}."
+    ),
+    codes.CLEARANCE_EVIDENT: lambda reason: (
+        "Without load the motion does not repeat with the input, as when tooth flanks part and "
+        "meet again: no hypothesis without a clearance is reported."
+    ),
+    codes.ONE_SPEED: lambda reason: (
+        "All fitted records run at one speed: dry friction, friction that changes with speed "
+        "and damping are indistinguishable."
+    ),
+    codes.ONE_LOAD: lambda reason: (
+        "All fitted records carry one load: it remains open whether an error grows with the load."
+    ),
+    codes.ONE_WAY: lambda reason: (
+        "All fitted records turn one way. Dry friction at the input and a zero error of the "
+        "input torque sensor are separated only by the stated limit of that error, "
+        f"{reason.numbers[0][1]:g} N.m."
+    ),
+    codes.ONE_TIME: lambda reason: (
+        "All fitted records have the same time in the session: no drift can be seen."
+    ),
+    codes.NO_SWEEP: lambda reason: (
+        "No torsion sweep was fitted. Unless the running records pass through zero torque, a "
+        "clearance looks like a soft wind-up, and hysteresis like damping."
+    ),
+    codes.LIKE_A_GAIN: lambda reason: (
+        "Power flows one way through the drive in all fitted records, so friction that grows "
+        "with the load looks like a wrong gain of the input torque sensor: only its stated gain "
+        f"error, {100.0 * reason.numbers[0][1]:g} %, separates them."
+    ),
+    codes.SENSOR_OFF: _sensor_off,
+    codes.UNRESOLVED_LINES: lambda reason: (
+        "The records do not resolve the nominal static error of order "
+        f"{', '.join(reason.names[:-1])}."
+    ),
+    codes.LINES_ABOVE: lambda reason: (
+        f"The nominal static error of order {', '.join(reason.names[:-1])} is not compared: lines "
+        f"are compared up to order {dict(reason.numbers)['highest']:.3g}."
+    ),
+    codes.HARMONIC_ABOVE: lambda reason: (
+        f"Order {2.0 * reason.numbers[0][1]:.4g}, the second harmonic of order "
+        f"{reason.numbers[0][1]:.4g}, is not fitted: it lies above order "
+        f"{dict(reason.numbers)['highest']:.3g}. The residual may be that harmonic"
+        f"{', which may shift the values of the effect' if reason.effect else ''}."
+    ),
+}
+
+
+def limit_sentence(limit: Reason) -> str:
+    """Return a limit of the records as a sentence."""
+    return _LIMITS[limit.code](limit)
+
+
 def what_is_missing(candidates: Sequence[Candidate]) -> str:
     """Return the sentences of effects, values out of tolerance as one.
 
@@ -84,7 +168,7 @@ def in_a_sentence(reason: Reason, label: Label = str) -> str:
     return _SENTENCES[reason.code](reason, label)
 
 
-def doubts(verdict: Verdict, error_orders: Sequence[float] = ()) -> list[str]:
+def caveats(verdict: Verdict, error_orders: Sequence[float] = ()) -> list[str]:
     """Return the reasons of a verdict in words.
 
     Parameters
@@ -94,6 +178,6 @@ def doubts(verdict: Verdict, error_orders: Sequence[float] = ()) -> list[str]:
         Of a drive, the orders of its static error, by which its lines are called.
     """
     return [
-        in_a_sentence(one, lambda label: labels_by_order(label, error_orders))
-        for one in verdict.reasons
+        in_a_sentence(reason, lambda label: labels_by_order(label, error_orders))
+        for reason in verdict.reasons
     ]

@@ -22,8 +22,8 @@ from pymoo_hdte.discrepancy._records.sensor_hints import sensor_hints
 from pymoo_hdte.discrepancy._report.certainty import how_sure
 from pymoo_hdte.discrepancy._report.document import believed_in_words, verdict_document
 from pymoo_hdte.discrepancy._report.figures import (
-    gap_by_channel,
-    gap_by_order,
+    error_by_channel,
+    error_by_order,
     misfit_map,
     misfit_overview,
     optimum_fronts,
@@ -41,8 +41,9 @@ from pymoo_hdte.discrepancy._report.tables import (
     record_rows,
     rows_sentence,
 )
+from pymoo_hdte.discrepancy._report.words import limit_sentence
 from pymoo_hdte.discrepancy._verdicts.drive_finding import DriveFinding
-from pymoo_hdte.discrepancy._verdicts.validation_drive import Proof
+from pymoo_hdte.discrepancy._verdicts.validation_drive import Validation
 from pymoo_hdte.drive import DriveModel
 from pymoo_hdte.drive.toml_text import model_toml, sheet_toml
 
@@ -53,7 +54,7 @@ OptimumOf = Callable[[DriveModel, DriveModel], OptimumShift]
 def write_report(
     finding: DriveFinding,
     location: Location,
-    proof: Proof | None,
+    validation: Validation | None,
     proposal: Proposal,
     optimum_shift: OptimumOf,
     out: str | Path,
@@ -64,7 +65,7 @@ def write_report(
     ----------
     finding : DriveFinding
     location : Location
-    proof : Proof or None
+    validation : Validation or None
         None where no record was held out.
     proposal : Proposal
     optimum_shift : callable
@@ -89,16 +90,18 @@ def write_report(
     """
     FOLDER.check(Path(out))
     document = verdict_document(
-        finding, location, None if proof is None else proof.as_dict(), proposal
+        finding, location, None if validation is None else validation.as_dict(), proposal
     )
-    document["limits"] = campaign_limits(finding)
+    limits = campaign_limits(finding)
+    document["limits"] = [limit_sentence(limit) for limit in limits]
+    document["limit_codes"] = [limit.as_dict() for limit in limits]
     model_files, shift = _revision(finding, optimum_shift)
     document["revised_model"] = {"file": MODEL_FILE if model_files else None}
     document["robust_optimum"] = _shift_document(shift)
-    document["gap_sentence"] = gap_sentence(finding, proof)
+    document["gap_sentence"] = validation_sentence(finding, validation)
     if hints := sensor_hints(finding.campaign):
         document["sensor_hints"] = hints
-    html = _page(finding, location, proof, document, shift)
+    html = _page(finding, location, validation, document, shift)
     FOLDER.write(Path(out), html, document, model_files)
     return document
 
@@ -140,7 +143,7 @@ def _shift_document(shift: OptimumShift) -> dict[str, Any]:
 def _page(
     finding: DriveFinding,
     location: Location,
-    proof: Proof | None,
+    validation: Validation | None,
     document: dict[str, Any],
     shift: OptimumShift,
 ) -> str:
@@ -149,11 +152,11 @@ def _page(
         "overview": data_uri(misfit_overview(location)),
         "map": data_uri(misfit_map(location)),
     }
-    if proof is not None:
+    if validation is not None:
         pictures |= {
-            "channels": data_uri(gap_by_channel(proof)),
-            "orders": data_uri(gap_by_order(proof)),
-            "overlay": data_uri(overlay(proof)),
+            "channels": data_uri(error_by_channel(validation)),
+            "orders": data_uri(error_by_order(validation)),
+            "overlay": data_uri(overlay(validation)),
         }
     if shift.choices:
         pictures["optimum"] = data_uri(optimum_fronts(shift))
@@ -164,15 +167,15 @@ def _page(
         verdict=finding.verdict,
         document=document,
         location=location,
-        proof=proof,
+        validation=validation,
         effects=effect_rows(document["effects"], orders),
         certainty=how_sure(finding),
         next_test=document["next_experiment"]["description"],
         pictures=pictures,
         hypotheses=hypothesis_rows(finding.verdict, orders),
         parameters=parameter_rows(finding),
-        metrics=metric_rows(proof),
-        records=record_rows(finding.campaign, proof),
+        metrics=metric_rows(validation),
+        records=record_rows(finding.campaign, validation),
         rows_found=" ".join(
             [rows_sentence(finding.rows), *document.get("sensor_hints", [])]
         ).strip(),
@@ -188,42 +191,47 @@ _SHOWN = 3
 """Most records that a sentence names."""
 
 
-def gap_sentence(finding: DriveFinding, proof: Proof | None) -> str:
+def validation_sentence(finding: DriveFinding, validation: Validation | None) -> str:
     """Return how much the prediction error on held-out records shrank, in words."""
-    if proof is None:
+    if validation is None:
         return "No record was held out, so the correction is not validated."
-    gap = proof.channels[proof.leading]
-    records = f"{len(proof.records)} held-out record{'s' if len(proof.records) > 1 else ''}"
-    where = f"{records}, {proof.leading.replace('_', ' ')}"
-    noise = f"(noise alone: {number(gap.noise_floor)})"
+    leading = validation.channels[validation.leading]
+    plural = "s" if len(validation.records) > 1 else ""
+    records = f"{len(validation.records)} held-out record{plural}"
+    where = f"{records}, {validation.leading.replace('_', ' ')}"
+    noise = f"(noise alone: {number(leading.noise_floor)})"
     if not finding.verdict.accepted.candidates:
-        size = f"{number(gap.before)} {gap.unit} {noise}"
+        size = f"{number(leading.before)} {leading.unit} {noise}"
         return f"Nothing was added. On {where}: prediction error {size}."
-    words = f"On {where}: prediction error {number(gap.before)} {gap.unit} before, "
-    words += f"{number(gap.after)} after {noise}"
-    if gap.shrinkage is not None:
-        words += f"; the correction removes {percent(min(gap.shrinkage, 1.0))} of the excess"
-    error = proof.channels["transmission_error"]
-    if error is not gap:
+    words = f"On {where}: prediction error {number(leading.before)} {leading.unit} before, "
+    words += f"{number(leading.after)} after {noise}"
+    if leading.shrinkage is not None:
+        words += f"; the correction removes {percent(min(leading.shrinkage, 1.0))} of the excess"
+    error = validation.channels["transmission_error"]
+    if error is not leading:
         words += (
             f". Transmission error: {number(error.before)} {error.unit} before, "
             f"{number(error.after)} after (noise alone: {number(error.noise_floor)})"
         )
-    return f"{words}.{_worse(proof)}"
+    return f"{words}.{_worse(validation)}"
 
 
-def _worse(proof: Proof) -> str:
+def _worse(validation: Validation) -> str:
     """Return what the correction made worse, with its numbers; nothing where nothing is worse."""
-    gaps = {name.replace("_", " "): gap for name, gap in proof.channels.items()}
-    gaps["all channels together"] = proof.overall
+    errors = {name.replace("_", " "): error for name, error in validation.channels.items()}
+    errors["all channels together"] = validation.overall
     parts = [
-        f"{name} {number(gap.before)} before, {number(gap.after)} after, in {gap.unit}"
-        for name, gap in gaps.items()
-        if gap.worse
+        f"{name} {number(error.before)} before, {number(error.after)} after, in {error.unit}"
+        for name, error in errors.items()
+        if error.worse
     ]
-    records = [name for name, gap in zip(proof.records, proof.by_record, strict=True) if gap.worse]
+    records = [
+        name
+        for name, error in zip(validation.records, validation.by_record, strict=True)
+        if error.worse
+    ]
     if len(records) > _SHOWN:
-        parts.append(f"transmission error of {len(records)} of {len(proof.records)} records")
+        parts.append(f"transmission error of {len(records)} of {len(validation.records)} records")
     elif records:
         parts.append(f"transmission error of {', '.join(records)}")
     return f" Worse than before: {'; '.join(parts)}." if parts else ""

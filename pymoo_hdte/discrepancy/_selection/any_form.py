@@ -275,11 +275,11 @@ class AnyForm:
             ):
                 error = rules.second_form_share
             elif any(candidate.remembers for candidate in hypothesis.candidates):
-                error = self.data.remainder
+                error = self.data.model_error_share
             elif not to_noise:
                 # Corrections are of first order, so that their own error is of second order.
                 share = (hypothesis.fit.chi_square - self.degrees_of_freedom) / self.excess
-                error = min(max(error, share**2), self.data.remainder)
+                error = min(max(error, share**2), self.data.model_error_share)
         least = max(rules.single_effect_gain, error * self.excess)
         return least if to_noise else max(least, rules.explained_part_share * unexplained.excess)
 

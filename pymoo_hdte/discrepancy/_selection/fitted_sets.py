@@ -376,7 +376,7 @@ def is_significant(
         for candidate in member
         for present in simpler.candidates
     )
-    least = rules.second_form_share if same_port else data.remainder
+    least = rules.second_form_share if same_port else data.model_error_share
     for part in (slice(None), parts[0]):
         whole, residual, remaining = (
             np.sum(by_part.of_parts[part]) for by_part in (before, between, final)

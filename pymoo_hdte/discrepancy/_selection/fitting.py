@@ -94,9 +94,9 @@ class Fit:
     def bound_sides(self) -> Vector:
         """-1 for parameters at their lower bound, 1 at the upper one, 0 elsewhere; shape (n,)."""
         layout = Layout(self.parameters)
-        near = 1e-3 * layout.array("scale")
-        above = self.values >= layout.array("upper") - near
-        below = self.values <= layout.array("lower") + near
+        margin = 1e-3 * layout.array("scale")
+        above = self.values >= layout.array("upper") - margin
+        below = self.values <= layout.array("lower") + margin
         return above.astype(float) - below.astype(float)
 
     @cached_property
@@ -123,7 +123,7 @@ class Fit:
         """
         information = self.jacobian.T @ self.jacobian * np.outer(self._widths, self._widths) / 12.0
         _, narrowed = np.linalg.slogdet(information + np.eye(len(information)))
-        tried = sum(np.log(one.among) for one in self.candidates)
+        tried = sum(np.log(candidate.among) for candidate in self.candidates)
         return self.chi_square + float(narrowed + 2.0 * tried)
 
     @property
@@ -153,9 +153,9 @@ def fit(
     most = data.rules.fit_evaluations if steps is None else steps
     start = objective.start if start is None else start
     begin = start.minimum if isinstance(start, Fit) else start
-    ends = [one.minimum for one in known]
-    found = minimum(objective, begin, most, settled, ends, hopeless)
-    return Fit(objective.candidates, objective.parameters, *found)
+    ends = [fitted.minimum for fitted in known]
+    end = minimum(objective, begin, most, settled, ends, hopeless)
+    return Fit(objective.candidates, objective.parameters, *end)
 
 
 class Residuals(Protocol):
@@ -192,7 +192,7 @@ class Evidence(Protocol):
         ...
 
     @property
-    def remainder(self) -> float:
+    def model_error_share(self) -> float:
         """Share of the base's excess up to which a residual is attributed to no effect."""
         ...
 
@@ -251,15 +251,22 @@ class Unknowns:
         self.candidates = tuple(candidates)
         added = [parameter for candidate in candidates for parameter in candidate.parameters]
         freed = {candidate.releases for candidate in candidates}
-        kept = [_without_tolerance(one) if one.name in freed else one for one in base]
-        self.parameters = (*kept, *added)
+        bounded_base = [
+            _without_tolerance(parameter) if parameter.name in freed else parameter
+            for parameter in base
+        ]
+        self.parameters = (*bounded_base, *added)
         layout = Layout(self.parameters)
         self.scale, self.start = layout.array("scale"), layout.array("start")
         self.lower, self.upper = layout.array("lower"), layout.array("upper")
         self.prior = layout.array("prior")
         self.bounded = np.isfinite(self.prior)
-        place = {one.name: k for k, one in enumerate(base)}
-        lines = [(place[one.phase_of], place[one.name]) for one in base if one.phase_of]
+        place = {parameter.name: k for k, parameter in enumerate(base)}
+        lines = [
+            (place[parameter.phase_of], place[parameter.name])
+            for parameter in base
+            if parameter.phase_of
+        ]
         self.lines = np.array(lines, dtype=np.int_).reshape(-1, 2)
 
     def steps(self, values: Vector) -> Vector:
@@ -286,10 +293,12 @@ def built(
     )
 
 
-def places(candidates: Sequence[Candidate], first: int = 0) -> list[tuple[Candidate, slice]]:
-    """Return each candidate with the places of its values, the first of all being ``first``."""
-    ends = np.cumsum([first, *(len(one.parameters) for one in candidates)]).tolist()
-    return [(one, slice(*ends[place : place + 2])) for place, one in enumerate(candidates)]
+def places(candidates: Sequence[Candidate], begin: int = 0) -> list[tuple[Candidate, slice]]:
+    """Return each candidate with the places of its values, the first of all at ``begin``."""
+    ends = np.cumsum([begin, *(len(candidate.parameters) for candidate in candidates)]).tolist()
+    return [
+        (candidate, slice(*ends[place : place + 2])) for place, candidate in enumerate(candidates)
+    ]
 
 
 def _without_tolerance(parameter: Parameter) -> Parameter:

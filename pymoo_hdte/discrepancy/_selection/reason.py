@@ -34,9 +34,45 @@ AT_TOLERANCE = "at_tolerance"
 """The base value that ``effect`` names ended at the bound of its tolerance."""
 
 
+SAME_READING = "same_reading"
+"""Both angles begin at one reading in every record."""
+STANDS_OUT = "stands_out"
+"""One record, that ``numbers`` names, has a share of the misfit above one half."""
+NO_HELD_OUT = "no_held_out"
+"""No record was held out."""
+NOT_SHOWN = "not_shown"
+"""The held-out records do not show what is named."""
+HELD_OUT_RATTLES = "held_out_rattles"
+"""All held-out records rattle."""
+FLANKS_PART = "flanks_part"
+"""The load of the records that ``numbers`` names does not hold the flanks together, N.m."""
+CLEARANCE_EVIDENT = "clearance_evident"
+"""Without load the motion does not repeat with the input."""
+ONE_SPEED = "one_speed"
+"""All fitted records run at one speed."""
+ONE_LOAD = "one_load"
+"""All fitted records carry one load."""
+ONE_WAY = "one_way"
+"""All fitted records turn one way; the number is the stated zero of the input torque, N.m."""
+ONE_TIME = "one_time"
+"""All fitted records have one time in the session."""
+NO_SWEEP = "no_sweep"
+"""No torsion sweep was fitted."""
+LIKE_A_GAIN = "like_a_gain"
+"""Power flows one way, so that friction by load looks like a gain; the number is the stated one."""
+SENSOR_OFF = "sensor_off"
+"""The gain or zero that ``effect`` names is ``fitted`` and contradicts what is ``stated``, SI."""
+UNRESOLVED_LINES = "unresolved_lines"
+"""Lines of the nominal static error that records do not resolve; the numbers are their orders."""
+LINES_ABOVE = "lines_above"
+"""Lines of the nominal static error above the ``highest`` order that is compared."""
+HARMONIC_ABOVE = "harmonic_above"
+"""The second harmonic of ``order`` lies above the ``highest``; ``effect`` is what is named."""
+
+
 @dataclass(frozen=True)
 class Reason:
-    """Why the effects of a verdict are not named without qualification.
+    """Why the effects of a verdict are not named without qualification, or what stays open.
 
     Attributes
     ----------

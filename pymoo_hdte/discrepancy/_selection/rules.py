@@ -168,7 +168,7 @@ class Rules:
     one_load_range: float = rule(0.1, at_least=0.0, at_most=1.0)
     undetermined_share: float = rule(0.8, at_most=1.0)
 
-    # What does the proof say, and what is to be measured next?
+    # What does the validation say, and what is to be measured next?
     least_gap_share: float = rule(0.1, at_least=0.0)
     worse_share: float = rule(0.05, at_least=0.0)
     separated_chi_square: float = rule(9.0)

@@ -68,7 +68,7 @@ class Verdict:
         Thresholds of the verdict.
     reasons : tuple of Reason
         What forbids to name the chosen effects plainly; with ``"partial"`` and ``"class"`` they are
-        certain as far as they go. In words they are ``doubts`` of an analysis.
+        certain as far as they go. In words they are ``caveats`` of an analysis.
     shown_in_held_out : bool
         Whether the records kept out of the fit, if there are any, show what is chosen.
     probability : float or None
@@ -129,12 +129,13 @@ class Verdict:
         degrees_of_freedom, rules = self.degrees_of_freedom, self.rules
         return chosen is not None and not down_to_noise(chosen.fit, degrees_of_freedom, rules)
 
-    def is_equivalent(self, one: Hypothesis) -> bool:
+    def is_equivalent(self, hypothesis: Hypothesis) -> bool:
         """Tell whether a set is of the class, or an order or form away from one and as likely."""
         named = () if self.chosen is None else (self.chosen, *self.equivalent)
-        near = self.rules.evidence_distance
-        return one in self.equivalent or any(
-            one.names == other.names and one.bic - other.bic < near for other in named
+        distance = self.rules.evidence_distance
+        return hypothesis in self.equivalent or any(
+            hypothesis.names == member.names and hypothesis.bic - member.bic < distance
+            for member in named
         )
 
     def has_reason(self, code: str) -> bool:
@@ -147,9 +148,9 @@ class Verdict:
         chosen = self.chosen
         return chosen is not None and chosen.explained >= self.rules.explained_part_share
 
-    def proven(
+    def after_held_out_test(
         self,
-        vote: HeldOutTest | None = None,
+        held_out_test: HeldOutTest | None = None,
         worse: Mapping[str, float] | None = None,
         condemned: bool = False,
     ) -> Verdict:
@@ -157,7 +158,7 @@ class Verdict:
 
         Parameters
         ----------
-        vote : HeldOutTest, optional
+        held_out_test : HeldOutTest, optional
             Theirs on the named effects, where it has not been heard yet.
         worse : mapping of str to float, optional
             Prediction errors that grow with the named effects, after over before: see `grows`.
@@ -170,22 +171,24 @@ class Verdict:
             ``unlisted`` where they contradict it, and no better than ``partial`` where any error
             of theirs grows.
         """
-        if condemned or (vote and vote.denies(self.rules, self.accepted.misfit)):
+        if condemned or (held_out_test and held_out_test.denies(self.rules, self.accepted.misfit)):
             reasons = (*self.reasons, Reason(NOT_VALIDATED))
             return replace(self, equivalent=(), reasons=reasons, probability=None)
-        shown = self.shown_in_held_out and (vote is None or vote.counts(self.rules))
+        shown = self.shown_in_held_out and (
+            held_out_test is None or held_out_test.counts(self.rules)
+        )
         verdict = replace(self, shown_in_held_out=shown)
         if not worse:
             return verdict
-        return verdict.doubted([Reason.of(HELD_OUT_ERROR_GROWS, numbers=worse)])
+        return verdict.with_caveats([Reason.of(HELD_OUT_ERROR_GROWS, numbers=worse)])
 
-    def doubted(self, reasons: Sequence[Reason]) -> Verdict:
+    def with_caveats(self, reasons: Sequence[Reason]) -> Verdict:
         """Return it with further reasons, with which no status is unqualified."""
         sure, shares = self.probability, probability.experience_of(self.rules)
-        doubted = replace(self, reasons=(*self.reasons, *reasons))
-        if sure and doubted.status != self.status:
-            sure *= shares[doubted.status] / shares[self.status]
-        return replace(doubted, probability=sure)
+        qualified = replace(self, reasons=(*self.reasons, *reasons))
+        if sure and qualified.status != self.status:
+            sure *= shares[qualified.status] / shares[self.status]
+        return replace(qualified, probability=sure)
 
 
 def judge(
@@ -207,15 +210,15 @@ def judge(
     # A sensor far from what is stated of it may have taken what is missing.
     quiet = quiet and not beyond_stated(base, rules).any()
     # Screening is slow, and known sets need none unless the base itself may be adequate.
-    searched = [one for one in candidates if not one.instead_of]
+    searched = [candidate for candidate in candidates if not candidate.instead_of]
     screened = screen(data, base, searched) if quiet or not known else []
-    gain = max((one.reduction for one in screened), default=0.0)
+    gain = max((screening.reduction for screening in screened), default=0.0)
     if quiet and gain < rules.single_effect_gain:
         clean = probability.of_nothing(screened, len(base.residuals), rules)
         return Verdict(base, None, True, (), (), degrees_of_freedom, rules, probability=clean)
     if not screened and not known:
         return Verdict(base, None, False, (), (), degrees_of_freedom, rules)
-    forms = [one for one in candidates if one.only_as_form]
+    forms = [candidate for candidate in candidates if candidate.only_as_form]
     search = Search(data, base, searched, screened, forms)
     if known:
         search.resume(known)
@@ -238,7 +241,7 @@ def judge(
         completed.add(chosen.names)
         complete(search, chosen)
         chosen = chosen_of(search)
-    if replaced(search, chosen, [one for one in candidates if one.instead_of]):
+    if replaced(search, chosen, [candidate for candidate in candidates if candidate.instead_of]):
         chosen = chosen_of(search)
     verdict = _verdict(search, answer_of(search, chosen, search.screened))
     return verdict if search.data is data else replace(verdict, renewed=search.data)
@@ -252,19 +255,19 @@ def _renewed_search(search: Search) -> Search:
     effect beside which sensors are far from what is stated is not all, and a base that needs no
     effect with that noise says nothing of this one.
     """
-    data, first = search.data, search.hypotheses[0]
-    explained = first.listed and first.explained >= data.rules.explained_share
-    renewed = data.with_noise_of(first.fit) if explained and not search.enough(first) else None
-    if renewed is None or not _is_all(renewed, fit(renewed, first.candidates, first.fit.values)):
+    data, best = search.data, search.hypotheses[0]
+    explained = best.listed and best.explained >= data.rules.explained_share
+    renewed = data.with_noise_of(best.fit) if explained and not search.enough(best) else None
+    if renewed is None or not _is_all(renewed, fit(renewed, best.candidates, best.fit.values)):
         return search
     base, candidates = fit(renewed, start=search.base.values), search.candidates
     if down_to_noise(base, search.degrees_of_freedom, data.rules):
         return search
     again = Search(renewed, base, candidates, screen(renewed, base, candidates), search.forms_only)
     again.resume(search.hypotheses, go_on=True)
-    found = again.hypotheses[0]
-    same = found.label == first.label and _is_all(renewed, found.fit)
-    return again if same and not again.held_by_sensors(found) else search
+    renewed_best = again.hypotheses[0]
+    same = renewed_best.label == best.label and _is_all(renewed, renewed_best.fit)
+    return again if same and not again.held_by_sensors(renewed_best) else search
 
 
 def _is_all(data: Evidence, fitted: Fit) -> bool:
@@ -277,14 +280,14 @@ def _is_all(data: Evidence, fitted: Fit) -> bool:
 def _verdict(search: Search, answer: Answer) -> Verdict:
     """Return the verdict: an answer with its reasons, status and probability."""
     data, rules, degrees_of_freedom = search.data, search.data.rules, search.degrees_of_freedom
-    chosen, told, certain, foreign, in_part = answer
-    equivalent = list(told)
-    vote = data.held_out_test(search.base, chosen.fit)
-    shown = vote is None or vote.counts(rules)
-    reasons = reasons_of(search, chosen, vote) + other_forms(search, chosen)
+    chosen, rivals, certain, foreign, in_part = answer
+    equivalent = list(rivals)
+    held_out_test = data.held_out_test(search.base, chosen.fit)
+    shown = held_out_test is None or held_out_test.counts(rules)
+    reasons = reasons_of(search, chosen, held_out_test) + other_forms(search, chosen)
     if in_part:
-        left = above_noise(chosen.fit.chi_square / degrees_of_freedom)
-        reasons += [left] if left not in reasons else []
+        reason = above_noise(chosen.fit.chi_square / degrees_of_freedom)
+        reasons += [reason] if reason not in reasons else []
     if (certain and not foreign) or in_part:
         # The rules of earning may pass over a set for which the evidence speaks: both are told.
         equivalent += in_one_law(search, chosen)
@@ -297,7 +300,7 @@ def _verdict(search: Search, answer: Answer) -> Verdict:
         search.base,
         chosen,
         known,
-        tuple(one for one in search.hypotheses if one is not chosen),
+        tuple(hypothesis for hypothesis in search.hypotheses if hypothesis is not chosen),
         tuple(equivalent),
         degrees_of_freedom,
         rules,

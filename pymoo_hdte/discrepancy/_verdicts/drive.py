@@ -31,7 +31,7 @@ from pymoo_hdte.discrepancy._selection.rules import RULES, Rules
 from pymoo_hdte.discrepancy._selection.verdict import EXPLAINED, Verdict, judge
 from pymoo_hdte.discrepancy._verdicts import rattling
 from pymoo_hdte.discrepancy._verdicts.drive_finding import DriveFinding
-from pymoo_hdte.discrepancy._verdicts.validation_drive import prove
+from pymoo_hdte.discrepancy._verdicts.validation_drive import validate_drive
 from pymoo_hdte.drive import SpeedLoop, harmonic_balance
 from pymoo_hdte.drive._solve.free_angle import torus_of
 from pymoo_hdte.effects.effect import effect_named
@@ -49,7 +49,7 @@ def expected_orders(campaign: Campaign, rules: Rules = RULES) -> list[float]:
     believed = campaign.believed
     lines = believed.error_orders
     wanted = [1.0 / believed.ratio, 2.0 / believed.ratio, *lines]
-    wanted += [one + other for place, one in enumerate(lines) for other in lines[place:]]
+    wanted += [line + addend for place, line in enumerate(lines) for addend in lines[place:]]
     wanted += [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0]
     return _apart(wanted, campaign, _error_lines(campaign, rules), rules)
 
@@ -86,8 +86,8 @@ def examine_drive(campaign: Campaign, rules: Rules = RULES) -> DriveFinding:
     known = campaign.believed.error_orders
     rattles = enough and rattling.is_heard(lines, held, known, ratio, rules)
     # Lines of a motion that does not repeat are no orders.
-    kept = np.flatnonzero(held) if rattles else range(len(lines))
-    unexpected = unexpected_orders([lines[row] for row in kept], ratio, rules)
+    repeating = np.flatnonzero(held) if rattles else range(len(lines))
+    unexpected = unexpected_orders([lines[row] for row in repeating], ratio, rules)
     if unexpected:
         orders = _apart(unexpected, campaign, expected, rules)
         features = measure(campaign, campaign.train, orders)
@@ -109,10 +109,12 @@ def examine_drive(campaign: Campaign, rules: Rules = RULES) -> DriveFinding:
     data, listed, verdict = judged
     data, verdict = _judged_again(verdict, data, listed)
     finding = DriveFinding(campaign, data, verdict, (*unexpected, *harmonics), rows)
-    if verdict.accepted is verdict.base or (proof := prove(finding)) is None:
+    if verdict.accepted is verdict.base or (validation := validate_drive(finding)) is None:
         return finding
-    worse = {name.replace("_", " "): growth for name, growth in proof.growths.items()}
-    return replace(finding, verdict=verdict.proven(worse=worse, condemned=proof.condemns))
+    worse = {name.replace("_", " "): growth for name, growth in validation.growths.items()}
+    return replace(
+        finding, verdict=verdict.after_held_out_test(worse=worse, condemned=validation.condemns)
+    )
 
 
 def _harmonics(data: Data, base: Fit) -> list[float]:
@@ -130,7 +132,9 @@ def _harmonics(data: Data, base: Fit) -> list[float]:
         for multiple in range(2, len(HARMONIC_NAMES) + 1)
     }
     further = [
-        one for one in sorted(multiples) if lowest < one <= most and not is_among(orders, one)
+        order
+        for order in sorted(multiples)
+        if lowest < order <= most and not is_among(orders, order)
     ]
     if not further:
         return []
@@ -150,7 +154,7 @@ def _check_steady(data: Data) -> None:
     believed = campaign.believed
     if not believed.effects:
         return
-    values = {one.name: np.array([one.start]) for one in data.base}
+    values = {parameter.name: np.array([parameter.start]) for parameter in data.base}
     conditions = data.features.conditions
     coefficients = coefficients_of(believed, values, believed.effects, len(conditions))
     steady = harmonic_balance(
@@ -215,7 +219,7 @@ def _error_lines(campaign: Campaign, rules: Rules) -> list[float]:
     shortest = min(campaign.running, key=_travel)
     apart = rules.line_separation
     least = 2.0 * np.pi * apart / max(_travel(shortest), 2.0 * np.pi * believed.ratio)
-    kept: list[float] = []
+    resolved: list[float] = []
     for order, amplitude in zip(believed.error_orders, believed.error_amplitudes, strict=True):
         if amplitude == 0.0:
             continue
@@ -229,31 +233,33 @@ def _error_lines(campaign: Campaign, rules: Rules) -> list[float]:
             raise InvalidInput("believed.error_orders", order, allowed)
         if order > rules.highest_order:
             continue
-        near = min(kept, key=lambda one: abs(one - order), default=np.inf)
-        if abs(order - near) < least:
-            turns = apart / (believed.ratio * abs(order - near))
+        neighbour = min(resolved, key=lambda line: abs(line - order), default=np.inf)
+        if abs(order - neighbour) < least:
+            turns = apart / (believed.ratio * abs(order - neighbour))
             allowed = (
-                f"{least:.4g} or more from order {near:g}, or {shortest.name} cannot tell them "
-                f"apart: records of at least {turns:.3g} output turns, or both as one line"
+                f"{least:.4g} or more from order {neighbour:g}, or {shortest.name} cannot tell "
+                f"them apart: records of at least {turns:.3g} output turns, or both as one line"
             )
             raise InvalidInput("believed.error_orders", order, allowed)
-        kept.append(order)
-    return kept
+        resolved.append(order)
+    return resolved
 
 
 def _travel(record: RunningRecord) -> float:
     return abs(float(record.input_angle[-1] - record.input_angle[0]))
 
 
-def _apart(wanted: list[float], campaign: Campaign, kept: list[float], rules: Rules) -> list[float]:
-    """Return orders that every record can resolve: those kept, then further ones as they come."""
+def _apart(
+    wanted: list[float], campaign: Campaign, orders: list[float], rules: Rules
+) -> list[float]:
+    """Return orders that every record can resolve: those given, then wanted ones in their order."""
     least = rules.line_separation / campaign.believed.ratio
     highest = highest_order(campaign, rules)
-    kept = list(kept)
+    orders = list(orders)
     for order in wanted:
-        if order <= highest and all(abs(order - other) >= least for other in kept):
-            kept.append(order)
-    return sorted(kept)
+        if order <= highest and all(abs(order - neighbour) >= least for neighbour in orders):
+            orders.append(order)
+    return sorted(orders)
 
 
 def _strong_lines(features: Features, residuals: NDArray[np.float64], rules: Rules) -> list[float]:
@@ -268,11 +274,11 @@ def _strong_lines(features: Features, residuals: NDArray[np.float64], rules: Rul
     by_line = np.array([misfit[:, features.places(channel)].sum(axis=2) for channel in range(4)])
     power = by_line.sum(axis=0)
     speed = np.abs([record.input_speed for record in features.records])
-    groups = [power[speed == one].sum(axis=0) for one in np.unique(speed)]
+    groups = [power[speed == group_speed].sum(axis=0) for group_speed in np.unique(speed)]
     total, strongest = power.sum(axis=0), np.max(groups, axis=0)
     strong = total > _threshold(8 * len(speed), rules.order_line_chance)
     if len(groups) > 1:
-        fewest = min(np.sum(speed == one) for one in np.unique(speed))
+        fewest = min(np.sum(speed == group_speed) for group_speed in np.unique(speed))
         degrees_of_freedom = 8 * (len(speed) - fewest)
         strong &= total - strongest > _threshold(degrees_of_freedom, rules.second_speed_chance)
     ranked = [k for k in np.argsort(-total) if strong[k]]

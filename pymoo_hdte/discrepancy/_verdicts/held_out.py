@@ -1,4 +1,4 @@
-"""Held-out records, simulated in windows by the model before and after a verdict, and their vote.
+"""Held-out records, simulated in windows by the model before and after a verdict, as a test of it.
 
 With the measured inputs, or with the references where a loop is closed. Each window starts from the
 measured positions and the speeds of their smoothed course.
@@ -83,8 +83,8 @@ class SimulatedRecord:
     def powers(self, name: str) -> tuple[float, float, float]:
         """Return mean squares of a coordinate's errors before and after, and of the change."""
         before, after = (
-            float(np.mean((one[name] - self.measured[name]) ** 2))
-            for one in (self.before, self.after)
+            float(np.mean((predicted[name] - self.measured[name]) ** 2))
+            for predicted in (self.before, self.after)
         )
         return before, after, float(np.mean((self.after[name] - self.before[name]) ** 2))
 
@@ -126,15 +126,16 @@ def simulate_held_out(
     if not records:
         return ()
     models = [
-        _Model(fitted_mechanism(mechanism, one), (*known, *laws_of(one.effects))) for one in fits
+        _Model(fitted_mechanism(mechanism, fitted), (*known, *laws_of(fitted.effects)))
+        for fitted in fits
     ]
-    last, cutoff = models[1], data.spectra[0].cutoff
+    corrected, cutoff = models[1], data.spectra[0].cutoff
     duration = max(float(record.time[-1] - record.time[0]) for record in records)
-    reach = reach_of(last.mechanism, data, fits[1].residuals, last.effects, duration)
+    reach = reach_of(corrected.mechanism, data, fits[1].residuals, corrected.effects, duration)
     rules = replace(data.rules, proof_samples=max(1, data.rules.proof_samples // len(records)))
     windows = [windows_of(record, cutoff, None if whole else reach, rules) for record in records]
-    total, done = sum(len(one.rows) for one in windows), 0
-    found = []
+    total, done = sum(len(record_windows.rows) for record_windows in windows), 0
+    simulated = []
     for record, these in zip(records, windows, strict=True):
         courses = _Courses(record, cutoff, these, models[: 1 if fits[0] is fits[1] else 2])
         for rows in these.rows:
@@ -142,8 +143,8 @@ def simulate_held_out(
             done += 1
             if progress is not None:
                 progress(done, total)
-        found.append(courses.found(reach))
-    return tuple(found)
+        simulated.append(courses.simulated(reach))
+    return tuple(simulated)
 
 
 class _Courses:
@@ -157,7 +158,7 @@ class _Courses:
         self.motions = {
             name: motion_of(record.channels[name], record.step, cutoff) for name in self.names
         }
-        self.first = windows.rows[0].start
+        self.begin = windows.rows[0].start
         # Fewer samples than those of the record would take its noise for slow motion.
         smoothed = windows.rows[0].step > 1
         self.signals = {
@@ -168,25 +169,27 @@ class _Courses:
 
     def follow(self, rows: slice) -> None:
         """Simulate a window by all models."""
-        signals = {name: one[rows] for name, one in self.signals.items()}
+        signals = {name: channel[rows] for name, channel in self.signals.items()}
         part = Record(self.record.name, self.record.role, self.record.time[rows], signals)
         fine = part if self.windows.finer == 1 else part.finer(self.windows.finer)
-        start = {name: _state(one, rows.start) for name, one in self.motions.items()}
-        past = slice(self.first, rows.start + 1)
-        history = {name: one.position[past] for name, one in self.motions.items()}
+        start = {name: _state(motion, rows.start) for name, motion in self.motions.items()}
+        past = slice(self.begin, rows.start + 1)
+        history = {name: motion.position[past] for name, motion in self.motions.items()}
         for model, parts in zip(self.models, self.parts, strict=True):
             try:
                 course = simulate_mechanism(
                     model.mechanism, fine, model.effects, start=start, history=history
                 ).position
-                parts.append({n: one[:: self.windows.finer][1:] for n, one in course.items()})
+                parts.append(
+                    {n: positions[:: self.windows.finer][1:] for n, positions in course.items()}
+                )
             except ArithmeticError:
                 lost = np.full(len(part.time) - 1, np.nan)
                 parts.append({name: lost for name in self.names})
 
-    def found(self, reach: Reach) -> SimulatedRecord:
+    def simulated(self, reach: Reach) -> SimulatedRecord:
         """Return what was simulated."""
-        rows = [np.arange(len(self.record.time))[one][1:] for one in self.windows.rows]
+        rows = [np.arange(len(self.record.time))[window][1:] for window in self.windows.rows]
         every = np.concatenate(rows)
         before, after = (
             {name: np.concatenate([part[name] for part in parts]) for name in self.names}
@@ -211,7 +214,9 @@ def _state(motion: SmoothedMotion, row: int) -> tuple[float, float]:
     return float(motion.position[row]), float(motion.speed[row])
 
 
-def voted(verdict: Verdict, simulated: Sequence[SimulatedRecord]) -> Verdict:
+def mechanism_after_held_out_test(
+    verdict: Verdict, simulated: Sequence[SimulatedRecord]
+) -> Verdict:
     """Return the verdict, ``unlisted`` where held-out records contradict what it names.
 
     Simulated, their positions do not come nearer to the measured ones as they should, though the
@@ -219,25 +224,25 @@ def voted(verdict: Verdict, simulated: Sequence[SimulatedRecord]) -> Verdict:
     """
     if verdict.accepted is verdict.base or not simulated:
         return verdict
-    return verdict.proven(_vote(simulated))
+    return verdict.after_held_out_test(_held_out_test(simulated))
 
 
-def _vote(simulated: Sequence[SimulatedRecord]) -> HeldOutTest:
-    """Return the vote of simulated positions, in units of what was to be expected.
+def _held_out_test(simulated: Sequence[SimulatedRecord]) -> HeldOutTest:
+    """Return the held-out test of simulated positions, in units of what was to be expected.
 
     A window of a free coordinate gives one independent value, since its error builds up.
     """
     sums = np.zeros(3)
-    for one in simulated:
-        for name, expected in one.expected.items():
-            powers = np.array(one.powers(name))
+    for record in simulated:
+        for name, expected in record.expected.items():
+            powers = np.array(record.powers(name))
             diverges = ~np.isfinite(powers[:2])
             if diverges.any():
                 # Where both diverge, nothing is said.
                 after, change = np.inf if diverges[1] else 0.0, 0.0 if diverges.all() else np.inf
                 return HeldOutTest(1.0, after, change)
-            values = one.extent.windows * one.independent
-            sums += values * powers / (expected + one.noise[name] ** 2)
+            values = record.extent.windows * record.independent
+            sums += values * powers / (expected + record.noise[name] ** 2)
     return HeldOutTest(*sums.tolist())
 
 

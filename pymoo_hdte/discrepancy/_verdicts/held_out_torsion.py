@@ -1,4 +1,4 @@
-"""The torsion of held-out records as models predict it from the measured torque, and their vote."""
+"""The torsion of held-out records as models predict it from the measured torque."""
 
 from __future__ import annotations
 
@@ -15,7 +15,11 @@ from pymoo_hdte.discrepancy._selection.hypothesis import bounded_unknowns, label
 from pymoo_hdte.discrepancy._selection.verdict import Verdict
 from pymoo_hdte.discrepancy._verdicts.held_out import laws_of
 from pymoo_hdte.discrepancy._verdicts.mechanism_finding import MechanismFinding
-from pymoo_hdte.discrepancy._verdicts.validation_mechanism import MeasuredGap, chance_of, grown
+from pymoo_hdte.discrepancy._verdicts.validation_mechanism import (
+    MechanismPredictionError,
+    chance_of,
+    grown,
+)
 from pymoo_hdte.mechanism import Port
 from pymoo_hdte.mechanism.port_motion import law_force, torsion_noise
 
@@ -27,8 +31,8 @@ _SETTLED = 1e-9
 """rad, 2e-4 arcseconds."""
 
 
-def torsion_gaps(finding: MechanismFinding) -> tuple[MeasuredGap, ...]:
-    """Return the gaps between the measured and the predicted torsion of held-out records, rad.
+def torsion_errors(finding: MechanismFinding) -> tuple[MechanismPredictionError, ...]:
+    """Return the errors of the predicted torsion on held-out records, rad.
 
     About their means: how the springs of a hysteresis are stretched at the first row is not known.
 
@@ -38,9 +42,9 @@ def torsion_gaps(finding: MechanismFinding) -> tuple[MeasuredGap, ...]:
         From `examine_torsion`.
     """
     (gear,) = (port for port in finding.mechanism.ports if port.followed)
-    # As the gaps are: with the fitted stiffness, of which the stated one may be a multiple.
-    left = float(finding.remainder[0]) / stiffness_of(finding.accepted, gear)
-    found = []
+    # As the errors are: with the fitted stiffness, of which the stated one may be a multiple.
+    unexplained = float(finding.unexplained[0]) / stiffness_of(finding.accepted, gear)
+    errors = []
     for record in finding.records:
         if record.role != "held_out":
             continue
@@ -51,13 +55,13 @@ def torsion_gaps(finding: MechanismFinding) -> tuple[MeasuredGap, ...]:
         rows = balance.moving.whole
         measured = balance.ports[gear.name].position[rows]
         before, after = (
-            _about(predicted_torsion(data, one)[rows], measured)
-            for one in (finding.verdict.base, finding.accepted)
+            _about(predicted_torsion(data, fitted)[rows], measured)
+            for fitted in (finding.verdict.base, finding.accepted)
         )
         noise = torsion_noise(gear, record)
-        expected = float(np.hypot(left, noise))
-        found.append(
-            MeasuredGap(
+        expected = float(np.hypot(unexplained, noise))
+        errors.append(
+            MechanismPredictionError(
                 record.name,
                 gear.name,
                 KIND,
@@ -76,7 +80,7 @@ def torsion_gaps(finding: MechanismFinding) -> tuple[MeasuredGap, ...]:
                 finding.data.rules,
             )
         )
-    return tuple(found)
+    return tuple(errors)
 
 
 def _independent(finding: MechanismFinding, time: Values) -> float:
@@ -108,11 +112,17 @@ def predicted_torsion(data: MeasuredData, fitted: Fit) -> Values:
     """
     (balance,) = data.spectra
     (gear,) = (port for port in data.mechanism.ports if port.followed)
-    base = dict(zip((one.name for one in data.base), fitted.values[: len(data.base)], strict=True))
+    base = dict(
+        zip(
+            (parameter.name for parameter in data.base),
+            fitted.values[: len(data.base)],
+            strict=True,
+        )
+    )
     stiffness = stiffness_of(fitted, gear)
     zero = float(base[f"zero of {gear.name}"])
     effects = (*data.known, *laws_of(fitted.effects))
-    laws = [one.law for one in effects if one.port == gear.name]
+    laws = [effect.law for effect in effects if effect.port == gear.name]
     motion = balance.ports[gear.name]
 
     def force(torsion: Values) -> Values:
@@ -121,8 +131,8 @@ def predicted_torsion(data: MeasuredData, fitted: Fit) -> Values:
         return np.asarray(stiffness * torsion + zero + sum(of_laws))
 
     whitened = data.residuals(fitted.values[: len(data.base)], laws_of(fitted.effects))
-    left = balance.in_time(data.coefficients(whitened)[0][0])
-    wanted, torsion = force(motion.position) + left, motion.position
+    unexplained = balance.in_time(data.coefficients(whitened)[0][0])
+    wanted, torsion = force(motion.position) + unexplained, motion.position
     # The steepest slope anywhere, so that no step goes too far.
     steepest = max(stiffness, _steepest(force, motion.position))
     for _ in range(_STEPS):
@@ -135,7 +145,9 @@ def predicted_torsion(data: MeasuredData, fitted: Fit) -> Values:
 
 def stiffness_of(fitted: Fit, gear: Port) -> float:
     """Return the stiffness of a gear in a fit, N.m/rad; the believed one where it is not fitted."""
-    values = dict(zip((one.name for one in fitted.parameters), fitted.values, strict=True))
+    values = dict(
+        zip((parameter.name for parameter in fitted.parameters), fitted.values, strict=True)
+    )
     return float(values.get(f"stiffness of {gear.name}", gear.stiffness.value))
 
 
@@ -148,28 +160,32 @@ def _steepest(force: Callable[[Values], Values], torsion: Values) -> float:
     return float(np.max((force(torsion + apart) - force(torsion))[1:] / apart[1:]))
 
 
-def voted(finding: MechanismFinding, gaps: Sequence[MeasuredGap]) -> Verdict:
+def torsion_after_held_out_test(
+    finding: MechanismFinding, errors: Sequence[MechanismPredictionError]
+) -> Verdict:
     """Return the verdict on a torsion, ``unlisted`` where held-out records contradict it.
 
     Parameters
     ----------
     finding : MechanismFinding
-    gaps : sequence of MeasuredGap
-        From `torsion_gaps`.
+    errors : sequence of MechanismPredictionError
+        From `torsion_errors`.
     """
     verdict = finding.verdict
-    if verdict.accepted is verdict.base or not gaps:
+    if verdict.accepted is verdict.base or not errors:
         return verdict
     sums = np.zeros(3)
-    for gap in gaps:
-        change = float(np.mean((gap.predicted_after - gap.predicted_before) ** 2))
-        powers = np.array([gap.before**2, gap.after**2, change])
-        sums += _independent(finding, gap.time) * powers / gap.expected**2
-    return verdict.proven(HeldOutTest(*sums.tolist()), grown(gaps))
+    for error in errors:
+        change = float(np.mean((error.predicted_after - error.predicted_before) ** 2))
+        powers = np.array([error.before**2, error.after**2, change])
+        sums += _independent(finding, error.time) * powers / error.expected**2
+    return verdict.after_held_out_test(HeldOutTest(*sums.tolist()), grown(errors))
 
 
-def without_unproved_lines(verdict: Verdict, fitted: Fit, gaps: Sequence[MeasuredGap]) -> Verdict:
-    """Return a verdict on a torsion in which no set has an order that its fit or its proof denies.
+def without_unvalidated_lines(
+    verdict: Verdict, fitted: Fit, errors: Sequence[MechanismPredictionError]
+) -> Verdict:
+    """Return a verdict on a torsion in which no set has an order that its fit or validation denies.
 
     A line whose amplitude ended at a bound, or one that leaves the held-out torsion as it was,
     stands for something else: its order would send a reader to a part that does not err.
@@ -177,13 +193,13 @@ def without_unproved_lines(verdict: Verdict, fitted: Fit, gaps: Sequence[Measure
     Parameters
     ----------
     verdict : Verdict
-        After the vote of its held-out records.
+        After the test on its held-out records.
     fitted : Fit
         What was accepted before it.
-    gaps : sequence of MeasuredGap
+    errors : sequence of MechanismPredictionError
         Of that fit, on these records.
     """
-    shrinks = not gaps or sum(one.after**2 - one.before**2 for one in gaps) < 0.0
+    shrinks = not errors or sum(error.after**2 - error.before**2 for error in errors) < 0.0
     denied = {
         candidate.label
         for candidate, bounded in bounded_unknowns(fitted)
@@ -192,7 +208,7 @@ def without_unproved_lines(verdict: Verdict, fitted: Fit, gaps: Sequence[Measure
     if not denied or verdict.chosen is None:
         return verdict
     sets = verdict.chosen, *verdict.alternatives
-    others = [one for one in sets if not denied & label_of(one.candidates)]
+    others = [hypothesis for hypothesis in sets if not denied & label_of(hypothesis.candidates)]
     return replace(
         verdict,
         certain=False,

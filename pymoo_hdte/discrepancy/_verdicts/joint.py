@@ -18,14 +18,14 @@ from pymoo_hdte.discrepancy._selection.rules import RULES, Rules
 from pymoo_hdte.discrepancy._verdicts.held_out import Progress, laws_of
 from pymoo_hdte.discrepancy._verdicts.held_out_torsion import (
     stiffness_of,
-    torsion_gaps,
-    voted,
-    without_unproved_lines,
+    torsion_after_held_out_test,
+    torsion_errors,
+    without_unvalidated_lines,
 )
 from pymoo_hdte.discrepancy._verdicts.joint_torsion import examine_torsion, lines_of
 from pymoo_hdte.discrepancy._verdicts.mechanism import examine_mechanism
 from pymoo_hdte.discrepancy._verdicts.mechanism_finding import MechanismFinding
-from pymoo_hdte.discrepancy._verdicts.validation_mechanism import MeasuredGap
+from pymoo_hdte.discrepancy._verdicts.validation_mechanism import MechanismPredictionError
 from pymoo_hdte.drive._effects.static_error import KinematicTorsion
 from pymoo_hdte.mechanism import ErrorLine, LawAt, Mechanism, Port, Record
 
@@ -43,14 +43,14 @@ class JointFinding:
         On the balance of torques of the joint as a rigid body, with its held-out simulation.
     torsion : MechanismFinding
         On the torsion of the gear: in N.m of its output, its ripples in rad.
-    gaps : tuple of MeasuredGap
+    errors : tuple of MechanismPredictionError
         Of the torsion of held-out records, rad.
     """
 
     joint: Joint
     torque: MechanismFinding
     torsion: MechanismFinding
-    gaps: tuple[MeasuredGap, ...]
+    errors: tuple[MechanismPredictionError, ...]
 
     @property
     def status(self) -> str:
@@ -58,10 +58,10 @@ class JointFinding:
 
         One that names nothing beside another that does leaves the whole ``"partial"``.
         """
-        both = {self.torque.verdict.status, self.torsion.verdict.status}
-        if "unlisted" in both:
-            return "unlisted" if both <= {"unlisted", "adequate"} else "partial"
-        return next((one for one in _WORST_FIRST if one in both), "adequate")
+        statuses = {self.torque.verdict.status, self.torsion.verdict.status}
+        if "unlisted" in statuses:
+            return "unlisted" if statuses <= {"unlisted", "adequate"} else "partial"
+        return next((status for status in _WORST_FIRST if status in statuses), "adequate")
 
     @property
     def stiffness(self) -> float:
@@ -103,16 +103,18 @@ def examine_joint(
     rigid = rigid_half(joint, records, known)
     torque = examine_mechanism(rigid.mechanism, rigid.records, cutoff, rigid.known, rules, progress)
     torsion = examine_torsion(torsion_half(joint, records, known), joint, torque.cutoff, rules)
-    gaps = torsion_gaps(torsion)
-    verdict = voted(torsion, gaps)
-    slows = any(one.effect and one.effect.slows for one in verdict.accepted.candidates)
+    errors = torsion_errors(torsion)
+    verdict = torsion_after_held_out_test(torsion, errors)
+    slows = any(
+        candidate.effect and candidate.effect.slows for candidate in verdict.accepted.candidates
+    )
     if verdict.status == "named" and slows:
         verdict = replace(verdict, rivals_beyond=("encoder_delay",))
-    verdict = without_unproved_lines(verdict, torsion.accepted, gaps)
-    told = replace(torsion, verdict=verdict)
-    if told.accepted is not torsion.accepted:
-        gaps = torsion_gaps(told)
-    return JointFinding(joint, torque, told, gaps)
+    verdict = without_unvalidated_lines(verdict, torsion.accepted, errors)
+    validated = replace(torsion, verdict=verdict)
+    if validated.accepted is not torsion.accepted:
+        errors = torsion_errors(validated)
+    return JointFinding(joint, torque, validated, errors)
 
 
 def revised_joint(title: str, finding: JointFinding) -> MechanismModel:
@@ -127,14 +129,14 @@ def revised_joint(title: str, finding: JointFinding) -> MechanismModel:
     finding : JointFinding
     """
     joint, torque, torsion = finding.joint, finding.torque, finding.torsion
-    whole, ahead = (fitted_values(one.mechanism, one.accepted) for one in (torque, torsion))
+    whole, ahead = (fitted_values(half.mechanism, half.accepted) for half in (torque, torsion))
     motor, load = joint.side(joint.motor), joint.side(joint.load)
     laws = (*laws_of(torsion.accepted.effects), *lines_of(torsion.ripples))
-    errors = [one.law for one in laws if isinstance(one.law, KinematicTorsion)]
-    ours = [one for one in laws if not isinstance(one.law, KinematicTorsion)]
-    moved = {one.name for one in ours if one.port != joint.gear.name}
+    errors = [law.law for law in laws if isinstance(law.law, KinematicTorsion)]
+    ours = [law for law in laws if not isinstance(law.law, KinematicTorsion)]
+    moved = {law.name for law in ours if law.port != joint.gear.name}
     of_torque = (*laws_of(torque.accepted.effects), *torque.ripples.laws)
-    theirs = [replace(one, port=load.name) for one in of_torque if one.name not in moved]
+    theirs = [replace(law, port=load.name) for law in of_torque if law.name not in moved]
     lines = tuple(
         # An error is a sum of sines of the input's angle.
         ErrorLine(joint.motor, law.order, law.amplitude, law.phase + math.pi / 2.0)
@@ -144,9 +146,9 @@ def revised_joint(title: str, finding: JointFinding) -> MechanismModel:
     ports = {port.name: port for port in (*joint.mechanism.ports, gear)}
     effects = (*finding.torque.believed, *torsion.believed)
     believed = list(dict.fromkeys(effects))
-    for one in (*theirs, *ours, *believed):
-        ports.setdefault(one.port, motor if one.port == motor.name else load)
-    if any(one.law.loaded for one in ours):
+    for law in (*theirs, *ours, *believed):
+        ports.setdefault(law.port, motor if law.port == motor.name else load)
+    if any(law.law.loaded for law in ours):
         ports[motor.name] = replace(ports[motor.name], load=torsion.mechanism.ports[0].load)
     mechanism = _with_ports(joint.mechanism, list(ports.values()))
     values = _values(finding, whole, ahead)
@@ -156,8 +158,8 @@ def revised_joint(title: str, finding: JointFinding) -> MechanismModel:
     )
 
 
-def _with_ports(one: Mechanism, ports: Sequence[Port]) -> Mechanism:
-    return replace(one, ports=ports)
+def _with_ports(mechanism: Mechanism, ports: Sequence[Port]) -> Mechanism:
+    return replace(mechanism, ports=ports)
 
 
 def _values(
@@ -165,14 +167,17 @@ def _values(
 ) -> dict[str, float]:
     """Return the fitted values of both sides; the load has what the motor has not."""
     joint = finding.joint
-    found = dict(ahead)
+    values = dict(ahead)
     motor, load = joint.side(joint.motor).name, joint.side(joint.load).name
     of_motor, of_load = f"inertia of {joint.motor}", f"inertia of {joint.load}"
-    own = found.get(of_motor, joint.mechanism.inertias[joint.motor].value)
-    left = whole.get(of_load, sum(one.value for one in joint.mechanism.inertias.values())) - own
+    own = values.get(of_motor, joint.mechanism.inertias[joint.motor].value)
+    of_rest = (
+        whole.get(of_load, sum(inertia.value for inertia in joint.mechanism.inertias.values()))
+        - own
+    )
     # Neither is below a tenth of the whole: a difference of two fits may be below zero.
-    found[of_load] = max(left, 0.1 * (left + own))
+    values[of_load] = max(of_rest, 0.1 * (of_rest + own))
     total = whole.get(f"damping of {load}")
     if total is not None and load in joint.mechanism.port_names:
-        found[f"damping of {load}"] = max(total - found.get(f"damping of {motor}", 0.0), 0.0)
-    return found
+        values[f"damping of {load}"] = max(total - values.get(f"damping of {motor}", 0.0), 0.0)
+    return values

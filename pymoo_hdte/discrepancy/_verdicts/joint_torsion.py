@@ -91,7 +91,7 @@ def examine_torsion(
         # While the shafts turn slowly, they are within the band as well.
         again = examined(replace(sensors, known=(*half.known, *lines)), _candidates)
         data, verdict = (data, verdict) if again[1].status == "unlisted" else again
-    verdict = replace(verdict, seen_beyond=tuple(dict.fromkeys(one.name for one in lines)))
+    verdict = replace(verdict, seen_beyond=tuple(dict.fromkeys(line.name for line in lines)))
     return MechanismFinding(half.mechanism, records, cutoff, data, verdict, ripples)
 
 
@@ -101,9 +101,9 @@ def errors_of(ripples: Ripples) -> list[tuple[Ripple, Part]]:
     Their part that turns with the direction is friction, or the error of a fit.
     """
     return [
-        (one, part)
-        for one in ripples.lines
-        for part in one.parts
+        (line, part)
+        for line in ripples.lines
+        for part in line.parts
         if isinstance(part.law.law, PeriodicTorque)
     ]
 
@@ -111,8 +111,8 @@ def errors_of(ripples: Ripples) -> list[tuple[Ripple, Part]]:
 def lines_of(ripples: Ripples) -> tuple[LawAt, ...]:
     """Return the kinematic errors beyond the band as laws of the torsion."""
     return tuple(
-        LawAt(KINEMATIC, one.port, KinematicTorsion(law.order, law.phase, law.amplitude))
-        for one, part in errors_of(ripples)
+        LawAt(KINEMATIC, line.port, KinematicTorsion(law.order, law.phase, law.amplitude))
+        for line, part in errors_of(ripples)
         if isinstance(law := part.law.law, PeriodicTorque)
     )
 
@@ -127,23 +127,23 @@ def _candidates(
     those in what another fit leaves.
     """
     shaft, gear = data.mechanism.ports
-    (left,) = root_mean_square(data, base.residuals)
+    (unexplained,) = root_mean_square(data, base.residuals)
     orders = seen[gear.name]
     if fitted is not base and not orders:
         orders = position_orders(data, fitted)[gear.name]
-    found = []
+    candidates = []
     for port in (gear, shaft):
-        sizes = port_sizes(data, port, float(left), orders if port is gear else ())
+        sizes = port_sizes(data, port, float(unexplained), orders if port is gear else ())
         if port is gear:
             sizes = replace(sizes, between=True, expected=_low_orders(data, gear, orders))
         for effect in law_effects():
             if _belongs(effect, port):
-                found += [
+                candidates += [
                     candidate_of(effect, guess, port.name, "torque", LawAt)
                     for guess in effect.guesses(sizes)
                 ]
-    known = {place_of(one) for one in data.known}
-    return [one for one in found if not one.places & known]
+    known = {place_of(law) for law in data.known}
+    return [candidate for candidate in candidates if not candidate.places & known]
 
 
 def _low_orders(data: MeasuredData, gear: Port, seen: Sequence[float]) -> tuple[float, ...]:
@@ -151,11 +151,11 @@ def _low_orders(data: MeasuredData, gear: Port, seen: Sequence[float]) -> tuple[
 
     A shaft errs at whole orders by its bearings, its encoder and its splines.
     """
-    widest = max(float(np.ptp(one.ports[gear.name].shaft)) for one in data.spectra)
+    widest = max(float(np.ptp(balance.ports[gear.name].shaft)) for balance in data.spectra)
     turns, rules = widest / (2.0 * np.pi), data.rules
     lowest, highest = rules.fewest_error_periods / turns, rules.fewest_periods / turns
     orders = np.arange(max(1.0, np.ceil(lowest)), np.ceil(highest))
-    return tuple(one for one in orders.tolist() if one not in seen)
+    return tuple(order for order in orders.tolist() if order not in seen)
 
 
 def _belongs(effect: Effect, port: Port) -> bool:
@@ -179,14 +179,14 @@ def _lines_beyond(half: Half, joint: Joint, cutoff: float, rules: Rules) -> Ripp
     angle = Mechanism({name: BelievedValue(1.0)}, [port], [Input(ANGLE, {name: 1.0})])
     records = [
         Record(
-            one.name,
-            one.role,
-            one.time,
+            record.name,
+            record.role,
+            record.time,
             {
-                name: one.channels[name],
-                ANGLE: motion_at_port(gear, dict(one.channels), still).position,
+                name: record.channels[name],
+                ANGLE: motion_at_port(gear, dict(record.channels), still).position,
             },
         )
-        for one in half.records
+        for record in half.records
     ]
     return find_ripples(angle, records, cutoff, (), rules, OF_TORSION)

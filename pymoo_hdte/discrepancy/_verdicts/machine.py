@@ -14,7 +14,7 @@ from pymoo_hdte.discrepancy._evidence.predicted_records import PredictedRecords
 from pymoo_hdte.discrepancy._selection.fitting import fit
 from pymoo_hdte.discrepancy._selection.rules import RULES, Rules
 from pymoo_hdte.discrepancy._selection.verdict import Verdict, judge
-from pymoo_hdte.discrepancy._verdicts.gap import DEVIATIONS, Gap
+from pymoo_hdte.discrepancy._verdicts.prediction_error import DEVIATIONS, PredictionError
 
 _ROLES = ("train", "held_out")
 
@@ -24,6 +24,14 @@ class Machine(Protocol):
     """A kind of machine of your own: its records, and how they are compared with its model.
 
     Where it has a ``title``, reports begin with it.
+
+    Examples
+    --------
+    >>> class Oscillator:
+    ...     records = ()
+    ...     def evidence(self, records): ...
+    >>> isinstance(Oscillator(), Machine)
+    True
     """
 
     @property
@@ -73,27 +81,27 @@ class HeldOutErrors:
 
     Attributes
     ----------
-    parts, records : dict of str to Gap
+    parts, records : dict of str to PredictionError
         By channel, and by record.
-    overall : Gap
+    overall : PredictionError
     """
 
-    parts: dict[str, Gap]
-    records: dict[str, Gap]
-    overall: Gap
+    parts: dict[str, PredictionError]
+    records: dict[str, PredictionError]
+    overall: PredictionError
 
     @property
     def growths(self) -> dict[str, float]:
         """What grew, with after over before."""
         together = {**self.parts, **self.records}
-        return {name: gap.after / gap.before for name, gap in together.items() if gap.worse}
+        return {name: error.after / error.before for name, error in together.items() if error.worse}
 
     def as_dict(self) -> dict[str, Any]:
         """Return them as plain values."""
         return {
             **self.overall.as_dict(),
-            "channels": {name: gap.as_dict() for name, gap in self.parts.items()},
-            "records": {name: gap.as_dict() for name, gap in self.records.items()},
+            "channels": {name: error.as_dict() for name, error in self.parts.items()},
+            "records": {name: error.as_dict() for name, error in self.records.items()},
         }
 
 
@@ -130,7 +138,7 @@ def examine_machine(machine: Machine, rules: Rules = RULES) -> MachineFinding:
     errors = held_out_errors(finding)
     if errors is None or verdict.accepted is verdict.base:
         return finding
-    verdict = verdict.proven(worse=errors.growths, condemned=errors.overall.worse)
+    verdict = verdict.after_held_out_test(worse=errors.growths, condemned=errors.overall.worse)
     return replace(finding, verdict=verdict)
 
 
@@ -143,14 +151,16 @@ def held_out_errors(finding: MachineFinding) -> HeldOutErrors | None:
     misfit, (record, part) = verdict.accepted.misfit, data.layout
     among = len(data.parts) + len(finding.held_out_names)
 
-    def gap(rows: Any, count: int) -> Gap:
-        size, corrected = (float(np.sqrt(np.mean(left[rows] ** 2))) for left in (before, after))
+    def error(rows: Any, count: int) -> PredictionError:
+        size, corrected = (
+            float(np.sqrt(np.mean(residuals[rows] ** 2))) for residuals in (before, after)
+        )
         moved = (after - before)[rows]
         chance = 2.0 * float(np.linalg.norm(moved)) * misfit**0.5 / moved.size
-        return Gap(size, corrected, 1.0, DEVIATIONS, verdict.rules, chance, count)
+        return PredictionError(size, corrected, 1.0, DEVIATIONS, verdict.rules, chance, count)
 
     return HeldOutErrors(
-        {name: gap(part == place, among) for place, name in enumerate(data.parts)},
-        {name: gap(record == place, among) for place, name in enumerate(finding.held_out_names)},
-        gap(slice(None), 1),
+        {name: error(part == place, among) for place, name in enumerate(data.parts)},
+        {name: error(record == place, among) for place, name in enumerate(finding.held_out_names)},
+        error(slice(None), 1),
     )

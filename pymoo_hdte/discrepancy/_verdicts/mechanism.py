@@ -35,12 +35,12 @@ from pymoo_hdte.discrepancy._selection.rules import RULES, Rules
 from pymoo_hdte.discrepancy._selection.verdict import Verdict
 from pymoo_hdte.discrepancy._verdicts.held_out import (
     Progress,
+    mechanism_after_held_out_test,
     simulate_held_out,
-    voted,
 )
 from pymoo_hdte.discrepancy._verdicts.mechanism_choice import judged
 from pymoo_hdte.discrepancy._verdicts.mechanism_finding import MechanismFinding
-from pymoo_hdte.discrepancy._verdicts.validation_mechanism import grown, prove_measured
+from pymoo_hdte.discrepancy._verdicts.validation_mechanism import grown, validate_mechanism
 from pymoo_hdte.mechanism import LawAt, Mechanism, Record
 
 CandidatesOf = Callable[[MeasuredData, Fit, Mapping[str, tuple[float, ...]], Fit], list[Candidate]]
@@ -105,11 +105,13 @@ def examine_mechanism(
     # A ripple beyond the band moves nothing that could be measured, and takes a solver many steps.
     fits = verdict.base, verdict.accepted
     simulated = simulate_held_out(mechanism, records, data, fits, known, progress)
-    verdict = voted(verdict, simulated)
+    verdict = mechanism_after_held_out_test(verdict, simulated)
     finding = MechanismFinding(mechanism, records, cutoff, data, verdict, ripples, simulated)
     if verdict.accepted is verdict.base:
         return finding
-    return replace(finding, verdict=verdict.proven(worse=grown(prove_measured(finding))))
+    return replace(
+        finding, verdict=verdict.after_held_out_test(worse=grown(validate_mechanism(finding)))
+    )
 
 
 def _beyond(
@@ -118,7 +120,7 @@ def _beyond(
     """Return the ripple beyond the band, with the gains that are fitted, as its other forces."""
     mechanism = sensors.mechanism
     fitted = fitted_values(mechanism, verdict.accepted)
-    gains = [f"gain of {one.name}" for one in mechanism.inputs]
+    gains = [f"gain of {actuator.name}" for actuator in mechanism.inputs]
     scaled = {name: fitted[name] for name in gains if name in fitted}
     as_fitted = mechanism.with_values(scaled, exactly=False)
     effects = (*sensors.known, *verdict.accepted.effects)

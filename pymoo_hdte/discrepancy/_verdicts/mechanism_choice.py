@@ -53,7 +53,7 @@ def judged(
         Effects beyond whose residual others are judged, so that they are judged themselves.
     """
     base, rules = fit(data), data.rules
-    searched = [one for one in candidates if not one.instead_of]
+    searched = [candidate for candidate in candidates if not candidate.instead_of]
     verdict, added = _compared(data, base, searched, best)
     verdict = _mostly_explained(sensors, data, verdict)
     verdict = _simplest(data, verdict)
@@ -64,8 +64,8 @@ def judged(
         quiet = np.all(before <= rules.noise_power_ratio * noise)
         return verdict if quiet else _as_unlisted(verdict, None)
     removed = share_removed(sensors, data, base, verdict.chosen.fit)
-    freed = [one.releases for one in verdict.chosen.candidates]
-    out = any(one in verdict.chosen.fit.at_bounds for one in freed if one)
+    freed = [candidate.releases for candidate in verdict.chosen.candidates]
+    out = any(parameter in verdict.chosen.fit.at_bounds for parameter in freed if parameter)
     least = rules.explained_share if verdict.status == "parameter" else rules.main_share
     if removed < least or out:
         return _as_unlisted(verdict, verdict.chosen)
@@ -80,7 +80,7 @@ def judged(
     scale = stated.reach / rules.certain_deviations
     unsure = uncertain(chosen.fit, rules, stated.covariance * np.outer(scale, scale))
     of_zeros = [reason for reason in holds_zero(unsure) if reason not in verdict.reasons]
-    return verdict.doubted([_too_little(removed)] * little + of_zeros)
+    return verdict.with_caveats([_too_little(removed)] * little + of_zeros)
 
 
 def _compared(
@@ -97,24 +97,30 @@ def _compared(
     verdict = judge(data, base, candidates)
     if verdict.status != "unlisted" or verdict.chosen is None or best is None:
         return verdict, False
-    found = [verdict.chosen, *verdict.alternatives]
-    if label_of(best.candidates) in [label_of(one.candidates) for one in found]:
+    hypotheses = [verdict.chosen, *verdict.alternatives]
+    if label_of(best.candidates) in [label_of(hypothesis.candidates) for hypothesis in hypotheses]:
         return verdict, False
     some = [
-        kept for n in range(len(best.candidates)) for kept in combinations(best.candidates, n + 1)
+        subset
+        for n in range(len(best.candidates))
+        for subset in combinations(best.candidates, n + 1)
     ]
     excess = base.chi_square - verdict.degrees_of_freedom
-    found += [hypothesis_of(fit(data, kept, best.values_of(kept)), excess) for kept in some]
-    return judge(data, base, candidates, sorted(found, key=lambda one: one.bic)), True
+    hypotheses += [
+        hypothesis_of(fit(data, subset, best.values_of(subset)), excess) for subset in some
+    ]
+    return judge(
+        data, base, candidates, sorted(hypotheses, key=lambda hypothesis: hypothesis.bic)
+    ), True
 
 
-def _largest_first(data: MeasuredData, one: Hypothesis) -> Hypothesis:
+def _largest_first(data: MeasuredData, hypothesis: Hypothesis) -> Hypothesis:
     """Return a set with its effects in the order of their forces, the largest first.
 
     A search finds them in another one: beside a large force that the base imitates, as damping does
     dry friction, a small one that it does not imitate explains more.
     """
-    fitted, places = one.fit, [place for _, place in one.fit.places]
+    fitted, places = hypothesis.fit, [place for _, place in hypothesis.fit.places]
     base = fitted.values[: fitted.n_base]
     forces = (data.whitened_forces(base, effects) for effects in fitted.effects_by_candidate)
     order = np.argsort([-float(force @ force) for force in forces], kind="stable")
@@ -126,7 +132,7 @@ def _largest_first(data: MeasuredData, one: Hypothesis) -> Hypothesis:
         values=fitted.values[columns],
         jacobian=fitted.jacobian[:, columns],
     )
-    return replace(one, fit=in_order)
+    return replace(hypothesis, fit=in_order)
 
 
 def _mostly_explained(sensors: MeasuredData, data: MeasuredData, verdict: Verdict) -> Verdict:
@@ -143,11 +149,11 @@ def _mostly_explained(sensors: MeasuredData, data: MeasuredData, verdict: Verdic
     if removed < rules.partial_share or contradicted_parts(data, verdict.base, chosen.fit).any():
         return verdict
     rivals = [
-        one
-        for one in verdict.alternatives
-        if len(one.candidates) == len(chosen.candidates)
-        and one.names != chosen.names
-        and _does_as_well(data, one.fit, chosen.fit)
+        hypothesis
+        for hypothesis in verdict.alternatives
+        if len(hypothesis.candidates) == len(chosen.candidates)
+        and hypothesis.names != chosen.names
+        and _does_as_well(data, hypothesis.fit, chosen.fit)
     ]
     reasons = (*_reasons(data, verdict.base, chosen), _too_little(removed))
     return _with_rivals(replace(verdict, reasons=reasons), rivals)
@@ -166,16 +172,18 @@ def _simplest(data: MeasuredData, verdict: Verdict) -> Verdict:
     chosen = verdict.chosen
     if chosen is None or verdict.status not in _NAMING:
         return verdict
-    near = [
-        one
-        for one in verdict.alternatives
-        if all(candidate.releases is None for candidate in one.candidates)
-        and _unknowns(one) < _unknowns(chosen)
-        and _does_as_well(data, one.fit, chosen.fit)
+    simpler = [
+        hypothesis
+        for hypothesis in verdict.alternatives
+        if all(candidate.releases is None for candidate in hypothesis.candidates)
+        and _unknowns(hypothesis) < _unknowns(chosen)
+        and _does_as_well(data, hypothesis.fit, chosen.fit)
     ]
-    if not near:
+    if not simpler:
         return _choosing(data, verdict, chosen)
-    return _choosing(data, verdict, min(near, key=lambda one: (_unknowns(one), one.bic)))
+    return _choosing(
+        data, verdict, min(simpler, key=lambda hypothesis: (_unknowns(hypothesis), hypothesis.bic))
+    )
 
 
 def _within_bounds(sensors: MeasuredData, data: MeasuredData, verdict: Verdict) -> Verdict:
@@ -183,48 +191,56 @@ def _within_bounds(sensors: MeasuredData, data: MeasuredData, verdict: Verdict) 
 
     A further effect that takes it off the bound and leaves nothing is earned by that. Else, at the
     bound of a law lies a simpler one, or one that these records do not show. What is certain is the
-    simpler one, as long as it explains most of the misfit; what it leaves is a doubt.
+    simpler one, as long as it explains most of the misfit; what it leaves is a caveat.
     """
     chosen = verdict.chosen
     if chosen is None or verdict.status not in _NAMING or not _bounded(chosen.fit):
         return verdict
     degrees_of_freedom = verdict.degrees_of_freedom
     larger = [
-        one
-        for one in verdict.alternatives
-        if label_of(one.candidates) > label_of(chosen.candidates)
-        and len(one.candidates) == len(chosen.candidates) + 1
-        and not _reasons(data, verdict.base, one)
-        and down_to_noise(one.fit, degrees_of_freedom, data.rules)
+        hypothesis
+        for hypothesis in verdict.alternatives
+        if label_of(hypothesis.candidates) > label_of(chosen.candidates)
+        and len(hypothesis.candidates) == len(chosen.candidates) + 1
+        and not _reasons(data, verdict.base, hypothesis)
+        and down_to_noise(hypothesis.fit, degrees_of_freedom, data.rules)
     ]
     if larger:
-        return _choosing(data, verdict, min(larger, key=lambda one: one.bic))
+        return _choosing(data, verdict, min(larger, key=lambda hypothesis: hypothesis.bic))
     simpler = [
-        one
-        for one in verdict.alternatives
-        if one.names != chosen.names
-        and contains(chosen, one)
-        and not _bounded(one.fit)
-        and share_removed(sensors, data, verdict.base, one.fit) >= data.rules.main_share
-        and not contradicted_parts(data, verdict.base, one.fit).any()
+        hypothesis
+        for hypothesis in verdict.alternatives
+        if hypothesis.names != chosen.names
+        and contains(chosen, hypothesis)
+        and not _bounded(hypothesis.fit)
+        and share_removed(sensors, data, verdict.base, hypothesis.fit) >= data.rules.main_share
+        and not contradicted_parts(data, verdict.base, hypothesis.fit).any()
     ]
     if not simpler:
         return verdict
     reason = Reason(RICHER_AT_BOUND, chosen.label, tuple(_bounded(chosen.fit)))
-    return _choosing(data, verdict, min(simpler, key=lambda one: one.bic), reason)
+    return _choosing(data, verdict, min(simpler, key=lambda hypothesis: hypothesis.bic), reason)
 
 
-def _choosing(data: MeasuredData, verdict: Verdict, one: Hypothesis, *more: Reason) -> Verdict:
+def _choosing(
+    data: MeasuredData, verdict: Verdict, preferred: Hypothesis, *further: Reason
+) -> Verdict:
     """Return the verdict with another of its sets as the chosen one, and further reasons."""
     assert verdict.chosen is not None
-    others = tuple(each for each in (verdict.chosen, *verdict.alternatives) if each is not one)
-    rivals = (
-        each
-        for each in verdict.equivalent
-        if each is not one and len(each.members) == len(one.members)
+    others = tuple(
+        hypothesis
+        for hypothesis in (verdict.chosen, *verdict.alternatives)
+        if hypothesis is not preferred
     )
-    reasons = (*_reasons(data, verdict.base, one), *more)
-    return _with_rivals(replace(verdict, chosen=one, alternatives=others, reasons=reasons), rivals)
+    rivals = (
+        hypothesis
+        for hypothesis in verdict.equivalent
+        if hypothesis is not preferred and len(hypothesis.members) == len(preferred.members)
+    )
+    reasons = (*_reasons(data, verdict.base, preferred), *further)
+    return _with_rivals(
+        replace(verdict, chosen=preferred, alternatives=others, reasons=reasons), rivals
+    )
 
 
 def _with_true_rivals(data: MeasuredData, verdict: Verdict) -> Verdict:
@@ -236,9 +252,9 @@ def _with_true_rivals(data: MeasuredData, verdict: Verdict) -> Verdict:
     if chosen is None or verdict.status != "class":
         return verdict
     equivalent = (
-        one
-        for one in verdict.equivalent
-        if _does_as_well(data, one.fit, chosen.fit) and not contains(one, chosen)
+        hypothesis
+        for hypothesis in verdict.equivalent
+        if _does_as_well(data, hypothesis.fit, chosen.fit) and not contains(hypothesis, chosen)
     )
     return _with_rivals(verdict, equivalent)
 
@@ -252,11 +268,13 @@ def _with_substitutes(
         return verdict
     rivals = list(verdict.equivalent)
     for member in chosen.candidates:
-        kept = tuple(one for one in chosen.candidates if one is not member)
-        for other in candidates:
-            if other.replaces(member) and all(other.goes_with(one) for one in kept):
-                start = np.append(chosen.values_of(kept), other.starts[0])
-                fitted = fit(data, (*kept, other), start)
+        others = tuple(candidate for candidate in chosen.candidates if candidate is not member)
+        for substitute in candidates:
+            if substitute.replaces(member) and all(
+                substitute.goes_with(candidate) for candidate in others
+            ):
+                start = np.append(chosen.values_of(others), substitute.starts[0])
+                fitted = fit(data, (*others, substitute), start)
                 if _does_as_well(data, fitted, chosen.fit):
                     excess = verdict.base.chi_square - verdict.degrees_of_freedom
                     rivals.append(hypothesis_of(fitted, excess))
@@ -288,10 +306,10 @@ def _reasons(data: MeasuredData, base: Fit, chosen: Hypothesis) -> list[Reason]:
     return of_effects + [Reason(AT_TOLERANCE, name) for name in stuck]
 
 
-def _does_as_well(data: MeasuredData, one: Fit, chosen: Fit) -> bool:
+def _does_as_well(data: MeasuredData, fitted: Fit, chosen: Fit) -> bool:
     """Tell whether a fit leaves about as little as the chosen one, in every balance."""
     most = data.rules.parsimony_ratio * data.power(chosen.residuals)
-    return bool(np.all(data.power(one.residuals) <= most))
+    return bool(np.all(data.power(fitted.residuals) <= most))
 
 
 def _bounded(fitted: Fit) -> list[tuple[str, float]]:
@@ -299,8 +317,8 @@ def _bounded(fitted: Fit) -> list[tuple[str, float]]:
     return [item for _, values in bounded_unknowns(fitted) for item in values.items()]
 
 
-def _unknowns(one: Hypothesis) -> int:
-    return sum(candidate.unknowns for candidate in one.candidates)
+def _unknowns(hypothesis: Hypothesis) -> int:
+    return sum(candidate.unknowns for candidate in hypothesis.candidates)
 
 
 def _as_unlisted(verdict: Verdict, nearest: Hypothesis | None) -> Verdict:

@@ -60,12 +60,12 @@ class MechanismFinding:
     @property
     def believed(self) -> tuple[LawAt, ...]:
         """Effects that the mechanism was known to have."""
-        return tuple(one for one in self.data.known if one not in self.ripples.laws)
+        return tuple(law for law in self.data.known if law not in self.ripples.laws)
 
     @property
     def sensors(self) -> MeasuredData:
         """The data with the noise of their sensors only."""
-        return replace(self.data, deviation=tuple(one.noise for one in self.data.spectra))
+        return replace(self.data, deviation=tuple(balance.noise for balance in self.data.spectra))
 
     @property
     def share_removed(self) -> float:
@@ -89,7 +89,7 @@ class MechanismFinding:
         return root_mean_square(self.data, self.verdict.base.residuals)
 
     @property
-    def remainder(self) -> NDArray[np.float64]:
+    def unexplained(self) -> NDArray[np.float64]:
         """Root mean square of the residual of the accepted model in each balance.
 
         Shape (n_balances,), N or N.m.

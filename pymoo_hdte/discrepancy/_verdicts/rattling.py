@@ -57,12 +57,12 @@ def judged(
         return _judged_from(data, base, candidates)
     if effect_named(leading).rattles:
         return _judged_on(loaded, candidates_of)
-    first = _judged_from(data, base, candidates)
-    if first[-1].status == "unlisted" or first[-1].leaves_more_than_noise:
+    overall = _judged_from(data, base, candidates)
+    if overall[-1].status == "unlisted" or overall[-1].leaves_more_than_noise:
         again = _judged_on(loaded, candidates_of)
         if _explains_by_a_clearance(again[-1]):
             return again
-    return first
+    return overall
 
 
 def _judged_on(
@@ -86,9 +86,11 @@ def _explains_by_a_clearance(verdict: Verdict) -> bool:
     """Tell whether a clearance beside another effect, perhaps of a class, leaves only noise."""
     if verdict.status not in EXPLAINED or verdict.leaves_more_than_noise:
         return False
-    named = [one for one in (verdict.chosen, *verdict.equivalent) if one is not None]
-    several = (one.effects for one in named if len(one.effects) > 1)
-    listed = {each.name for effects in several for each in effects if each.listed}
+    named = [
+        hypothesis for hypothesis in (verdict.chosen, *verdict.equivalent) if hypothesis is not None
+    ]
+    several = (hypothesis.effects for hypothesis in named if len(hypothesis.effects) > 1)
+    listed = {member.name for effects in several for member in effects if member.listed}
     return any(effect_named(name).rattles for name in listed)
 
 
@@ -116,18 +118,19 @@ def is_heard(
     ratio : float
     rules : Rules
     """
-    with_load = [one for one, is_held in zip(lines, held, strict=True) if is_held]
-    without = [one for one, is_held in zip(lines, held, strict=True) if not is_held]
-    loaded = {order for one in with_load for order in one}
-    if sum(len(one) >= rules.rattling_trace for one in without) < rules.fewest_rattling:
+    with_load = [spectrum for spectrum, is_held in zip(lines, held, strict=True) if is_held]
+    without = [spectrum for spectrum, is_held in zip(lines, held, strict=True) if not is_held]
+    loaded = {order for spectrum in with_load for order in spectrum}
+    if sum(len(spectrum) >= rules.rattling_trace for spectrum in without) < rules.fewest_rattling:
         return False
     of_error, steady = (
-        _sums_of(one, rules.highest_order, ratio) for one in (orders, {*orders, *loaded})
+        _sums_of(known_orders, rules.highest_order, ratio)
+        for known_orders in (orders, {*orders, *loaded})
     )
-    free = np.array([_strong_beyond(one, steady, ratio) for one in without])
-    rough = [_strong_beyond(one, of_error, ratio) for one in with_load]
-    several = np.sum(free >= rules.rattling_trace) >= rules.fewest_rattling
-    return bool(several and max(rough, default=0) < rules.rattling_lines <= free.max())
+    irregular = np.array([_strong_beyond(spectrum, steady, ratio) for spectrum in without])
+    rough = [_strong_beyond(spectrum, of_error, ratio) for spectrum in with_load]
+    several = np.sum(irregular >= rules.rattling_trace) >= rules.fewest_rattling
+    return bool(several and max(rough, default=0) < rules.rattling_lines <= irregular.max())
 
 
 def _strong_beyond(lines: dict[float, float], steady: NDArray[np.float64], ratio: float) -> int:
@@ -143,12 +146,12 @@ def _sums_of(orders: Collection[float], highest: float, ratio: float) -> NDArray
 
     To a hundredth of a cycle of an output turn, so that they are not too many.
     """
-    one = np.array([0.0, *orders, *(-order for order in orders)])
-    found = np.zeros(1)
+    signed = np.array([0.0, *orders, *(-order for order in orders)])
+    sums = np.zeros(1)
     for _ in range(SUMMED):
-        found = np.abs(np.add.outer(found, one)).ravel()
-        found = np.unique((100.0 * ratio * found[found <= highest]).round()) / (100.0 * ratio)
-    return found
+        sums = np.abs(np.add.outer(sums, signed)).ravel()
+        sums = np.unique((100.0 * ratio * sums[sums <= highest]).round()) / (100.0 * ratio)
+    return sums
 
 
 def with_clearance(data: Data) -> Data:
@@ -162,7 +165,7 @@ def with_clearance(data: Data) -> Data:
 
 def clearances() -> frozenset[str]:
     """Return the names of the effects with which parts may lose contact."""
-    return frozenset(one.name for one in known_effects() if one.rattles)
+    return frozenset(effect.name for effect in known_effects() if effect.rattles)
 
 
 def leading_sweep_effect(data: Data, fitted: Fit, candidates: Sequence[Candidate]) -> str | None:
@@ -179,7 +182,7 @@ def leading_sweep_effect(data: Data, fitted: Fit, candidates: Sequence[Candidate
     imitated = (data.torsion_residuals(moved, fitted.effects) - before).T
     orthonormal, _ = np.linalg.qr(imitated)
     residual = before - orthonormal @ (orthonormal.T @ before)
-    least, found = data.rules.sweep_gain, list[tuple[float, str]]()
+    least, gains = data.rules.sweep_gain, list[tuple[float, str]]()
     for candidate in candidates:
         for start in candidate.starts:
             effects = (*fitted.effects, *candidate.build(start))
@@ -188,6 +191,6 @@ def leading_sweep_effect(data: Data, fitted: Fit, candidates: Sequence[Candidate
             size = float(change @ change)
             along = float(-change @ residual)
             if size > least and along > 0.0:
-                found.append((along**2 / size, candidate.name))
-    reduction, name = max(found, default=(0.0, ""))
+                gains.append((along**2 / size, candidate.name))
+    reduction, name = max(gains, default=(0.0, ""))
     return name if reduction > least else None

@@ -8,8 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pymoo_hdte._reports.html import number
-from pymoo_hdte.discrepancy._evidence.order_lines.parameters import READING, base_unit
+from pymoo_hdte.discrepancy._evidence.order_lines.parameters import READING
 from pymoo_hdte.discrepancy._selection.fitted_sets import from_stated
 from pymoo_hdte.discrepancy._selection.fitting import Fit
 from pymoo_hdte.discrepancy._selection.rules import Rules
@@ -21,14 +20,14 @@ _OF_TORQUES = ("N", "kg")
 
 def beyond_limits(fitted: Fit, rules: Rules) -> list[tuple[Parameter, float]]:
     """Return gains and zeros that plainly contradict their stated limits, with values; SI."""
-    far = np.flatnonzero(from_stated(fitted) ** 2 >= rules.contradicting_chi_square)
-    known = [(fitted.parameters[place], float(fitted.values[place])) for place in far]
-    return [(one, value) for one, value in known if one.name in READING]
+    contradicted = np.flatnonzero(from_stated(fitted) ** 2 >= rules.contradicting_chi_square)
+    known = [(fitted.parameters[place], float(fitted.values[place])) for place in contradicted]
+    return [(parameter, value) for parameter, value in known if parameter.name in READING]
 
 
 def scale_error(fitted: Fit, rules: Rules) -> float:
     """Return the largest gain that contradicts what is stated of it, a share; 0 without any."""
-    gains = [abs(value) for one, value in beyond_limits(fitted, rules) if _is_gain(one)]
+    gains = [abs(value) for parameter, value in beyond_limits(fitted, rules) if _is_gain(parameter)]
     return max(gains, default=0.0)
 
 
@@ -41,23 +40,6 @@ def shares_scale(unit: str) -> bool:
     [True, True, False, False]
     """
     return unit.startswith(_OF_TORQUES)
-
-
-def sensor_caveats(fitted: Fit, rules: Rules) -> list[str]:
-    """Return a sentence for each sensor whose gain or zero contradicts what is stated of it."""
-    return [_caveat(one, value) for one, value in beyond_limits(fitted, rules)]
-
-
-def _caveat(sensor: Parameter, value: float) -> str:
-    place, _, kind = sensor.name.rpartition("_torque_")
-    size, unit, shares = 1.0, base_unit(sensor.name), "the mean torques share"
-    if _is_gain(sensor):
-        size, unit, shares = 100.0, "%", "torques, stiffness and inertias share"
-    off, stated = (f"{number(size * one, 2)} {unit}" for one in (value, sensor.prior))
-    return (
-        f"The fitted {kind} of the {place} torque sensor is off by {off} (you stated +-{stated}): "
-        f"check the sensor; {shares} this error."
-    )
 
 
 def _is_gain(sensor: Parameter) -> bool:

@@ -1,7 +1,7 @@
 """Validation on records that were not fitted: the error of the model before and after.
 
 Differences are taken between means and order lines, measured and predicted at the loads measured;
-their squares add up to a `Gap`.
+their squares add up to a `PredictionError`.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from pymoo_hdte.discrepancy._records.line_fit import CHANNELS
 from pymoo_hdte.discrepancy._records.records import RunningRecord
 from pymoo_hdte.discrepancy._selection.fitting import Fit
 from pymoo_hdte.discrepancy._verdicts.drive_finding import DriveFinding
-from pymoo_hdte.discrepancy._verdicts.gap import DEVIATIONS, Gap
+from pymoo_hdte.discrepancy._verdicts.prediction_error import DEVIATIONS, PredictionError
 from pymoo_hdte.drive import OrderSpectrum
 from pymoo_hdte.units import ARCSEC, UNITS
 from pymoo_hdte.validation import ValidationMetrics, validation_metrics
@@ -27,7 +27,7 @@ from pymoo_hdte.validation import ValidationMetrics, validation_metrics
 _OVERLAY_TURNS = 2.0
 _OVERLAY_POINTS = 400
 
-__all__ = ["Gap", "Overlay", "Proof", "prove"]
+__all__ = ["Overlay", "PredictionError", "Validation", "validate_drive"]
 
 Values = NDArray[np.float64]
 
@@ -59,21 +59,21 @@ class Overlay:
 
 
 @dataclass(frozen=True, eq=False)
-class Proof:
-    """Gaps on the held-out records.
+class Validation:
+    """Prediction errors on the held-out records.
 
     Attributes
     ----------
     records : tuple of str, length r
-    channels : dict of Gap
+    channels : dict of PredictionError
         By name of the channel, over all records.
-    overall : Gap
+    overall : PredictionError
         Over all features, whitened by their full covariance: 1 for a perfect model.
-    by_record : tuple of Gap, length r
+    by_record : tuple of PredictionError, length r
         Of the transmission error.
     orders : ndarray, shape (1 + m,)
         0 for the mean, then the order lines.
-    by_order : tuple of Gap, length 1 + m
+    by_order : tuple of PredictionError, length 1 + m
         Of the transmission error.
     dte : ndarray, shape (3, r)
         Peak-to-peak over one output turn, arcsec, of the sum of the order lines of the transmission
@@ -89,11 +89,11 @@ class Proof:
     """
 
     records: tuple[str, ...]
-    channels: dict[str, Gap]
-    overall: Gap
-    by_record: tuple[Gap, ...]
+    channels: dict[str, PredictionError]
+    overall: PredictionError
+    by_record: tuple[PredictionError, ...]
     orders: Values
-    by_order: tuple[Gap, ...]
+    by_order: tuple[PredictionError, ...]
     dte: Values
     metrics: tuple[ValidationMetrics, ValidationMetrics] | None
     leading: str
@@ -111,12 +111,12 @@ class Proof:
     @property
     def growths(self) -> dict[str, float]:
         """Errors that the correction made worse, by their name in `worse`: after over before."""
-        gaps = {**self.channels, "overall": self.overall}
+        errors = {**self.channels, "overall": self.overall}
         records = zip(self.records, self.by_record, strict=True)
         return {
-            name: gap.after / max(gap.before, 1e-300)
-            for name, gap in (*gaps.items(), *records)
-            if gap.worse
+            name: error.after / max(error.before, 1e-300)
+            for name, error in (*errors.items(), *records)
+            if error.worse
         }
 
     @property
@@ -129,20 +129,21 @@ class Proof:
         metrics = None
         if self.metrics is not None:
             metrics = {
-                name: asdict(one)
-                for name, one in zip(("before", "after"), self.metrics, strict=True)
+                name: asdict(metric)
+                for name, metric in zip(("before", "after"), self.metrics, strict=True)
             }
         return self.channels["transmission_error"].as_dict() | {
             "overall": self.overall.as_dict(),
-            "channels": {name: gap.as_dict() for name, gap in self.channels.items()},
+            "channels": {name: error.as_dict() for name, error in self.channels.items()},
             "leading_channel": self.leading,
             "worse": list(self.worse),
             "records": {
-                name: gap.as_dict() for name, gap in zip(self.records, self.by_record, strict=True)
+                name: error.as_dict()
+                for name, error in zip(self.records, self.by_record, strict=True)
             },
             "orders": {
-                f"{order:.6g}": gap.as_dict()
-                for order, gap in zip(self.orders, self.by_order, strict=True)
+                f"{order:.6g}": error.as_dict()
+                for order, error in zip(self.orders, self.by_order, strict=True)
             },
             "dte_arcsec": dict(
                 zip(("measured", "before", "after"), self.dte.tolist(), strict=True)
@@ -151,8 +152,8 @@ class Proof:
         }
 
 
-def prove(finding: DriveFinding) -> Proof | None:
-    """Return the gaps on the held-out records, or None where there are none.
+def validate_drive(finding: DriveFinding) -> Validation | None:
+    """Return the errors on the held-out records, or None where there are none.
 
     The loads are those measured. Where the verdict names nothing, nothing was added, so that
     before and after are the same.
@@ -172,7 +173,7 @@ def prove(finding: DriveFinding) -> Proof | None:
     noise = np.diagonal(data.covariance, axis1=1, axis2=2)
     floor = np.stack([_squares(data, noise, channel) for channel in range(3)], axis=1)
     chance = np.stack([_chance(data, change, misfit, channel) for channel in range(3)], axis=1)
-    gaps = {
+    errors = {
         name: _gap(
             data,
             squares[:, :, place].sum(axis=2),
@@ -185,20 +186,21 @@ def prove(finding: DriveFinding) -> Proof | None:
     moved = (white[1] - white[0]).ravel()
     overall_chance = 2.0 * float(np.linalg.norm(moved)) * misfit**0.5 / moved.size
     error, error_floor = squares[:, :, 0], floor[:, 0]
-    leading = max(gaps, key=lambda name: _height(gaps[name]))
+    leading = max(errors, key=lambda name: _height(errors[name]))
     # What decides is asked first; one of the others grows by chance the more easily.
-    others = len(gaps) - 1 + len(data.features.records)
-    gaps = {
-        name: replace(gap, among=2 if name == leading else others) for name, gap in gaps.items()
+    others = len(errors) - 1 + len(data.features.records)
+    errors = {
+        name: replace(error, among=2 if name == leading else others)
+        for name, error in errors.items()
     }
     beside = "input_torque" if leading == "transmission_error" else leading
     place = CHANNELS.index(leading)
     worst = int(np.argmax(squares[0, :, place].sum(axis=1) / floor[:, place].sum(axis=1)))
     dte = np.array([_dte(data, features) for features in (data.features.values, *predicted)])
-    return Proof(
+    return Validation(
         records=tuple(record.name for record in data.features.records),
-        channels=gaps,
-        overall=Gap(
+        channels=errors,
+        overall=PredictionError(
             float(overall[0]), float(overall[1]), 1.0, DEVIATIONS, data.rules, overall_chance, 2
         ),
         by_record=tuple(
@@ -260,17 +262,17 @@ def _chance(data: Data, change: Values, misfit: float, channel: int) -> Values:
 
 def _gap(
     data: Data, squares: Values, noise: Values, chance: Values, channel: str, among: int = 1
-) -> Gap:
-    """Return the gap from mean squares (2, r), those of the noise (r,), and `_chance` (r,)."""
+) -> PredictionError:
+    """Return the error from mean squares (2, r), those of the noise (r,), and `_chance` (r,)."""
     unit, size = SHOWN_IN[channel]
     before, after = np.sqrt(squares.mean(axis=1)) / size
     floor = float(np.sqrt(noise.mean()) / size)
     by_chance = float(np.linalg.norm(chance)) / squares.shape[1] / size**2
-    return Gap(float(before), float(after), floor, unit, data.rules, by_chance, among)
+    return PredictionError(float(before), float(after), floor, unit, data.rules, by_chance, among)
 
 
-def _height(gap: Gap) -> float:
-    return gap.before / gap.noise_floor
+def _height(error: PredictionError) -> float:
+    return error.before / error.noise_floor
 
 
 def _phasors(data: Data, features: Values, channel: int) -> NDArray[np.complex128]:
@@ -297,9 +299,9 @@ def _overlay(data: Data, predicted: Values, record: int, name: str) -> Overlay:
     channel = CHANNELS.index(name)
     raw = data.features.records[record]
     settled = raw.input_angle[unsettled_rows(raw) :]
-    first = np.ceil(settled.min() / (2.0 * np.pi))
+    start_turn = np.ceil(settled.min() / (2.0 * np.pi))
     turns = np.linspace(0.0, _OVERLAY_TURNS, _OVERLAY_POINTS)
-    waves = np.exp(2j * np.pi * np.outer(data.features.orders, first + turns))
+    waves = np.exp(2j * np.pi * np.outer(data.features.orders, start_turn + turns))
     measured = data.features.values[record]
     samples = _samples(data, raw, channel)
     # The mean of the output torque is a condition, the same in all three.
@@ -310,7 +312,7 @@ def _overlay(data: Data, predicted: Values, record: int, name: str) -> Overlay:
         moving = (_phasors(data, features, channel) @ waves).real
         return np.asarray((mean - own_mean + moving) / size)
 
-    sample_turns = raw.input_angle / (2.0 * np.pi) - first
+    sample_turns = raw.input_angle / (2.0 * np.pi) - start_turn
     shown = (sample_turns >= 0.0) & (sample_turns <= _OVERLAY_TURNS)
     return Overlay(
         name,
@@ -335,4 +337,4 @@ SHOWN_IN = {
     "input_torque": ("mN.m", UNITS["torque"]["mN.m"]),
     "output_torque": ("mN.m", UNITS["torque"]["mN.m"]),
 }
-"""Channels whose gap is shown, with their unit and its size in SI."""
+"""Channels whose error is shown, with their unit and its size in SI."""

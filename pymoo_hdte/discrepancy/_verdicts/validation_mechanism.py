@@ -1,4 +1,4 @@
-"""Validation on records that were not fitted: gaps of motion and forces before and after.
+"""Validation on records that were not fitted: errors of motion and forces before and after.
 
 Simulations in windows, see `held_out`, show the quality of the model's predictions; the force
 balances show its error at each moment.
@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from pymoo_hdte.discrepancy._evidence.force_balances.evidence import measured_data
 from pymoo_hdte.discrepancy._evidence.force_balances.unexplained import root_mean_square
 from pymoo_hdte.discrepancy._selection.rules import RULES, Rules
-from pymoo_hdte.discrepancy._verdicts.gap import grows
 from pymoo_hdte.discrepancy._verdicts.held_out import (
     Extent,
     SimulatedRecord,
@@ -24,6 +23,7 @@ from pymoo_hdte.discrepancy._verdicts.held_out import (
     simulate_held_out,
 )
 from pymoo_hdte.discrepancy._verdicts.mechanism_finding import MechanismFinding
+from pymoo_hdte.discrepancy._verdicts.prediction_error import grows
 from pymoo_hdte.mechanism import Record
 from pymoo_hdte.mechanism.quantity_units import unit_of
 
@@ -31,7 +31,7 @@ Values = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class MeasuredGap:
+class MechanismPredictionError:
     """Root mean squares of measured minus predicted.
 
     Of a simulation at the samples of its windows but those at which they start.
@@ -57,7 +57,7 @@ class MeasuredGap:
         What the revised model leaves to be expected of it, by what it leaves of the training
         records, in ``unit``.
     chance : float
-        Standard deviation of the difference of the squares of the gaps, if only that is left.
+        Standard deviation of the difference of the squares of the errors, if only that is left.
     rules : Rules
         Thresholds by which it shrinks or grows.
     extent : Extent or None
@@ -82,7 +82,7 @@ class MeasuredGap:
 
     @property
     def shrinkage(self) -> float | None:
-        """1 - (after - floor) / (before - floor), or None where there was no gap to shrink."""
+        """1 - (after - floor) / (before - floor), or None where there was no error to shrink."""
         excess = self.before - self.noise_floor
         if not excess > self.rules.least_gap_share * self.noise_floor:
             return None
@@ -130,8 +130,10 @@ class MeasuredGap:
         }
 
 
-def prove_measured(finding: MechanismFinding, whole: bool = False) -> tuple[MeasuredGap, ...]:
-    """Return the gaps on the held-out records; none where none was held out.
+def validate_mechanism(
+    finding: MechanismFinding, whole: bool = False
+) -> tuple[MechanismPredictionError, ...]:
+    """Return the errors on the held-out records; none where none was held out.
 
     Where nothing is named, before and after are equal.
 
@@ -148,55 +150,60 @@ def prove_measured(finding: MechanismFinding, whole: bool = False) -> tuple[Meas
         simulated = simulate_held_out(
             finding.mechanism, finding.records, finding.data, fits, known, whole=True
         )
-    by_name = {one.record: one for one in simulated}
-    found: list[MeasuredGap] = []
+    by_name = {record.record: record for record in simulated}
+    errors: list[MechanismPredictionError] = []
     for record in finding.records:
         if record.role == "held_out":
-            found += _simulated(finding, by_name[record.name])
-            found += _balanced(finding, record)
-    return tuple(found)
+            errors += _simulated(finding, by_name[record.name])
+            errors += _balanced(finding, record)
+    return tuple(errors)
 
 
-def _simulated(finding: MechanismFinding, one: SimulatedRecord) -> list[MeasuredGap]:
-    after = one.before if finding.accepted is finding.verdict.base else one.after
-    values = one.extent.windows * one.independent
+def _simulated(
+    finding: MechanismFinding, record: SimulatedRecord
+) -> list[MechanismPredictionError]:
+    after = record.before if finding.accepted is finding.verdict.base else record.after
+    values = record.extent.windows * record.independent
     return [
-        MeasuredGap(
-            one.record,
+        MechanismPredictionError(
+            record.record,
             name,
             "simulation",
-            _size(measured - one.before[name]),
+            _size(measured - record.before[name]),
             _size(measured - after[name]),
-            one.noise[name],
+            record.noise[name],
             unit_of(finding.mechanism, name, "position"),
-            one.time,
+            record.time,
             measured,
-            one.before[name],
+            record.before[name],
             after[name],
-            expected := (one.expected[name] + one.noise[name] ** 2) ** 0.5,
-            chance_of(expected, _size(after[name] - one.before[name]), values),
+            expected := (record.expected[name] + record.noise[name] ** 2) ** 0.5,
+            chance_of(expected, _size(after[name] - record.before[name]), values),
             finding.data.rules,
-            one.extent,
+            record.extent,
         )
-        for name, measured in one.measured.items()
+        for name, measured in record.measured.items()
     ]
 
 
-def _balanced(finding: MechanismFinding, record: Record) -> list[MeasuredGap]:
+def _balanced(finding: MechanismFinding, record: Record) -> list[MechanismPredictionError]:
     data = measured_data(finding.mechanism, [record], finding.cutoff, finding.data.known)
     n_base = len(data.base)
     (balance,) = data.spectra
     whitened = [
-        data.residuals(one.values[:n_base], laws_of(one.effects))
-        for one in (finding.verdict.base, finding.accepted)
+        data.residuals(fitted.values[:n_base], laws_of(fitted.effects))
+        for fitted in (finding.verdict.base, finding.accepted)
     ]
-    residual = [(root_mean_square(data, one), data.coefficients(one)[0]) for one in whitened]
+    residual = [
+        (root_mean_square(data, residuals), data.coefficients(residuals)[0])
+        for residuals in whitened
+    ]
     floor = root_mean_square(data, np.ones(len(data.frequency)))
     change = root_mean_square(data, whitened[1] - whitened[0])
     counts = [len(rows) for rows in data.rows_of_parts()]
-    expected = np.maximum(finding.remainder, floor)
+    expected = np.maximum(finding.unexplained, floor)
     return [
-        MeasuredGap(
+        MechanismPredictionError(
             record.name,
             name,
             "balance",
@@ -229,23 +236,24 @@ def chance_of(expected: float, change: float, values: float) -> float:
     return 2.0 * expected * change / max(values, 1.0) ** 0.5
 
 
-def rests_told(finding: MechanismFinding) -> list[str]:
+def sentences_on_rest(finding: MechanismFinding) -> list[str]:
     """Return a sentence for each training record of which rows at rest are left out."""
     return [
-        f"{one.left_out} rows of {one.record.name} at rest are left out, because dry friction may "
-        "have any force up to its breakaway there. Effects that act only at or near rest, such as "
-        "friction that falls at the slowest speeds, cannot be seen."
-        for one in finding.data.spectra
-        if one.left_out
+        f"{balance.left_out} rows of {balance.record.name} at rest are left out, because dry "
+        "friction may have any force up to its breakaway there. Effects that act only at or near "
+        "rest, such as friction that falls at the slowest speeds, cannot be seen."
+        for balance in finding.data.spectra
+        if balance.left_out
     ]
 
 
-def grown(gaps: Sequence[MeasuredGap]) -> dict[str, float]:
-    """Return the gaps that the correction made worse: after over before."""
-    worse = [one for one in gaps if one.worse(among=len(gaps))]
+def grown(errors: Sequence[MechanismPredictionError]) -> dict[str, float]:
+    """Return the errors that the correction made worse: after over before."""
+    worse = [error for error in errors if error.worse(among=len(errors))]
     return {
-        f"{one.quantity} by {one.kind} in {one.record}": one.after / max(one.before, 1e-300)
-        for one in worse
+        f"{error.quantity} by {error.kind} in {error.record}": error.after
+        / max(error.before, 1e-300)
+        for error in worse
     }
 
 

@@ -57,13 +57,13 @@ class Reach:
     step: float
     errors: Values
 
-    def free(self, duration: float, rules: Rules) -> bool:
+    def remembers_start(self, duration: float, rules: Rules) -> bool:
         """Tell whether the start is remembered for most of a record of a duration in s."""
         return self.memory > duration / rules.fewest_windows
 
     def length(self, duration: float, rules: Rules) -> float:
         """Return the length in s of the windows of a record of a duration in s."""
-        if self.free(duration, rules):
+        if self.remembers_start(duration, rules):
             return min(self.drift, duration / rules.fewest_windows)
         return min(rules.window_decays * self.memory, duration)
 
@@ -118,9 +118,14 @@ def reach_of(
     duration : float
         Of the longest record that is to be simulated, s.
     """
-    found = []
-    for balance, left in zip(data.spectra, data.coefficients(residuals), strict=True):
-        forces = np.array([balance.in_time(one) for one in left[: len(mechanism.coordinates)]])
+    reaches = []
+    for balance, unexplained in zip(data.spectra, data.coefficients(residuals), strict=True):
+        forces = np.array(
+            [
+                balance.in_time(coefficients)
+                for coefficients in unexplained[: len(mechanism.coordinates)]
+            ]
+        )
         memory = _memory(_linearised(mechanism, balance, ()))
         matrix = _linearised(mechanism, balance, effects)
         step = float(balance.time[1] - balance.time[0])
@@ -129,8 +134,8 @@ def reach_of(
         allowed = [balance.motions[name].position.std() for name in mechanism.coordinates]
         beyond = np.any(errors > (data.rules.window_drift * np.array(allowed)) ** 2, axis=1)
         drift = step * float(np.argmax(beyond)) if beyond.any() else np.inf
-        found.append(Reach(drift, memory, step, errors))
-    return min(found, key=lambda one: one.drift)
+        reaches.append(Reach(drift, memory, step, errors))
+    return min(reaches, key=lambda reach: reach.drift)
 
 
 def windows_of(record: Record, cutoff: float, reach: Reach | None, rules: Rules) -> Windows:
@@ -148,22 +153,22 @@ def windows_of(record: Record, cutoff: float, reach: Reach | None, rules: Rules)
     share = _SAMPLES * cutoff * record.step
     finer, stride = (int(np.ceil(share - 1e-9)), 1) if share > 1.0 else (1, int(1.0 / share))
     # Where smoothing has one side only, the state at the start of a window is not known.
-    first = min(margin_of(cutoff, record.step), len(record.time) // 4)
-    room = (len(record.time) - 1 - first) // stride
+    begin = min(margin_of(cutoff, record.step), len(record.time) // 4)
+    room = (len(record.time) - 1 - begin) // stride
     if reach is None:
-        return Windows((slice(first, first + room * stride + 1, stride),), 1, finer)
+        return Windows((slice(begin, begin + room * stride + 1, stride),), 1, finer)
     step = stride * record.step
     # Of at least a period of the cutoff, in which the samples of the simulation are as many.
     fewest = max(_SAMPLES // finer, FEWEST_SAMPLES)
     most = max(rules.proof_samples // finer, fewest)
     steps, longest = int(reach.length(room * step, rules) / step), most
-    if reach.free(room * step, rules):
+    if reach.remembers_start(room * step, rules):
         longest = most // rules.fewest_windows
     steps = min(max(min(steps, longest), fewest), room)
     count = room // steps
     chosen = np.linspace(0, count - 1, min(count, max(1, most // steps)))
-    starts = first + np.unique(np.round(chosen).astype(int)) * steps * stride
-    rows = tuple(slice(one, one + steps * stride + 1, stride) for one in starts.tolist())
+    starts = begin + np.unique(np.round(chosen).astype(int)) * steps * stride
+    rows = tuple(slice(start, start + steps * stride + 1, stride) for start in starts.tolist())
     return Windows(rows, count, finer)
 
 
@@ -179,7 +184,7 @@ def _linearised(mechanism: Mechanism, balance: ForceBalance, effects: Sequence[L
             continue
         row, motion = coordinate_row(mechanism, port.motion), balance.ports[port.name]
         stiffness, damping = port.stiffness.value, port.damping.value
-        laws = [one.law for one in effects if one.port == port.name]
+        laws = [effect.law for effect in effects if effect.port == port.name]
         if laws:
             force = np.sum([law_force(law, motion, stiffness) for law in laws], axis=0)
             columns = np.column_stack(
@@ -191,7 +196,7 @@ def _linearised(mechanism: Mechanism, balance: ForceBalance, effects: Sequence[L
         by_speed -= damping * np.outer(row, row)
     for loop in mechanism.loops:
         if loop.reference in balance.record.channels:
-            driven = next(one for one in mechanism.inputs if one.name == loop.input)
+            driven = next(driver for driver in mechanism.inputs if driver.name == loop.input)
             acts = driven.gain.value * coordinate_row(mechanism, driven.acts)
             seen = coordinate_row(mechanism, {loop.coordinate: 1.0})
             by_position -= loop.position_gain * np.outer(acts, seen)
@@ -202,7 +207,7 @@ def _linearised(mechanism: Mechanism, balance: ForceBalance, effects: Sequence[L
 
 
 def _inertias(mechanism: Mechanism) -> Values:
-    return np.array([one.value for one in mechanism.inertias.values()])
+    return np.array([inertia.value for inertia in mechanism.inertias.values()])
 
 
 def _memory(matrix: Values) -> float:
@@ -221,15 +226,15 @@ def _errors(inertias: Values, matrix: Values, forces: Values, step: float, longe
     block = np.zeros((3 * n, 3 * n))
     block[: 2 * n, : 2 * n] = matrix
     block[n : 2 * n, 2 * n :] = np.diag(1.0 / inertias)
-    both = expm(step * block)[: 2 * n]
-    by_state, by_force = both[:, : 2 * n], both[:, 2 * n :]
+    transition = expm(step * block)[: 2 * n]
+    by_state, by_force = transition[:, : 2 * n], transition[:, 2 * n :]
     starts = np.unique(np.linspace(0, max(samples - 2, 0), _STARTS).astype(int))
-    state, found = np.zeros((2 * n, len(starts))), list[Values]()
+    state, errors = np.zeros((2 * n, len(starts))), list[Values]()
     for passed in range(min(max(longest, 1), samples - 1)):
         inside = starts + passed < samples
-        if found and np.count_nonzero(inside) < _FEWEST_STARTS:
+        if errors and np.count_nonzero(inside) < _FEWEST_STARTS:
             break
         starts, state = starts[inside], state[:, inside]
         state = by_state @ state + by_force @ forces[:, starts + passed]
-        found.append(np.mean(state[:n] ** 2, axis=1))
-    return np.array(found)
+        errors.append(np.mean(state[:n] ** 2, axis=1))
+    return np.array(errors)

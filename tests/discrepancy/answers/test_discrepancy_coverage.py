@@ -12,6 +12,7 @@ from quick_campaigns import quick_campaign
 from pymoo_hdte.discrepancy._answers.where.coverage import campaign_limits
 from pymoo_hdte.discrepancy._evidence.order_lines.evidence import Data
 from pymoo_hdte.discrepancy._evidence.order_lines.features import measure
+from pymoo_hdte.discrepancy._report.words import limit_sentence
 from pymoo_hdte.discrepancy._verdicts.drive_finding import DriveFinding
 from pymoo_hdte.effects import effect_named
 
@@ -34,9 +35,9 @@ def said(campaign, fitted=None, orders=ORDERS, chosen=None, status=None, **of_da
     features = measure(campaign, fitted or campaign.train, orders)
     data = Data(campaign, features, (), campaign.torsion, **of_data)
     status = status or ("adequate" if chosen is None else "named")
-    return campaign_limits(
-        DriveFinding(campaign, data, made_verdict(status, UNFITTED, chosen, freedom=FREEDOM), ())
-    )
+    verdict = made_verdict(status, UNFITTED, chosen, freedom=FREEDOM)
+    limits = campaign_limits(DriveFinding(campaign, data, verdict, ()))
+    return [limit_sentence(limit) for limit in limits]
 
 
 def periodic(misfit, *orders):
@@ -44,7 +45,7 @@ def periodic(misfit, *orders):
     fit = SimpleNamespace(**{**vars(UNFITTED), "chi_square": misfit * FREEDOM})
     ripple = effect_named("torque_ripple")
     candidates = [SimpleNamespace(effect=ripple, name=ripple.name, order=one) for one in orders]
-    return SimpleNamespace(fit=fit, candidates=candidates, listed=True)
+    return SimpleNamespace(fit=fit, candidates=candidates, listed=True, label="torque_ripple")
 
 
 def trained(campaign, keep):
@@ -155,7 +156,7 @@ def test_a_record_that_has_most_of_what_nothing_explains_is_told(
     monkeypatch.setattr(Data, "excess", uneven)
     fitted = campaign.train[:n_records]
     assert len(fitted) == n_records
-    sentences = said(campaign, fitted, chosen=periodic(1.0), status=status)
+    sentences = said(campaign, fitted, chosen=periodic(1.0, None), status=status)
     found = [one for one in sentences if one.startswith(f"Record {fitted[1].name} alone")]
     assert bool(found) == bool(told)
     assert told in "".join(found)

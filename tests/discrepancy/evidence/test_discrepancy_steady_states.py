@@ -264,6 +264,7 @@ def test_a_clearance_is_evident_only_where_enough_records_are_left():
     assert len(few.features.records) == 6
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("evident", [True, False])
 def test_what_is_evident_is_told_beside_what_explains_the_rest(evident):
     """A soft wind-up told of a clearance beside it as well, in records with load."""

@@ -360,6 +360,7 @@ def test_a_ripple_in_rows_at_uneven_times_has_its_size(kind):
     assert size == pytest.approx(0.3, rel=0.05)
 
 
+@pytest.mark.nightly
 def test_a_ripple_that_hides_the_gain_is_told_with_the_gain_that_is_found_without_it():
     generator = np.random.default_rng(20)
     mechanism = Mechanism(

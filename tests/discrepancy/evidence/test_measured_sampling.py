@@ -69,6 +69,7 @@ def test_share_beyond_a_frequency_is_that_of_the_lines_there():
     assert share_beyond(slow, 0.01, 10.0) < 0.01
 
 
+@pytest.mark.nightly
 def test_a_cubic_spring_is_found_at_eight_samples_a_period():
     """At a tenth of the rate the resonance is lost, and with it the spring."""
     analysis, files = reported(

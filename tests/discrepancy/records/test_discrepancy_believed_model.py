@@ -258,7 +258,7 @@ def test_a_revised_mechanism_fed_back_misses_nothing(folder, tmp_path, capsys):
     assert rig_again.model == replace(first.revised_model(), title="again")
     again = analyse(rig_again)
     assert again.verdict.status == "adequate"
-    assert again.finding.remainder == pytest.approx(first.finding.remainder, rel=1e-3)
+    assert again.finding.unexplained == pytest.approx(first.finding.unexplained, rel=1e-3)
     tolerances = [one.tolerance for one in again.measured.mechanism.quantities.values()]
     assert tolerances == [one.tolerance for one in rig.OSCILLATOR.quantities.values()]
     assert again.revised_model().effects == first.revised_model().effects

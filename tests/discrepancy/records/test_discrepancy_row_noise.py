@@ -59,7 +59,7 @@ def test_a_sound_campaign_is_left_as_it_is(clean):
 
 # A shared case, below, has all of them three times as stated.
 @pytest.mark.parametrize("factor", others_at_night([1.0 / 3.0, 1.25], 1.25))
-@pytest.mark.parametrize("name", NOISES)
+@pytest.mark.parametrize("name", others_at_night(NOISES, *NOISES[1::2]))
 def test_a_misstated_noise_is_replaced_by_that_of_the_records(clean, name, factor):
     changed, found = examined(with_stated(clean, name, factor))
     assert [one.name for one in found.noise if one.replaced] == [name]
@@ -156,6 +156,7 @@ def unsettled(campaign, sizes, constant=lambda record: 0.15):
     return replace(campaign, running=tuple(running))
 
 
+@pytest.mark.nightly
 def test_a_clean_drive_in_records_that_begin_unsettled_is_adequate(clean):
     loads = np.array([one.load_torque for one in clean.running])
     campaign = unsettled(clean, 2e-4 * loads)
@@ -167,7 +168,11 @@ def test_a_clean_drive_in_records_that_begin_unsettled_is_adequate(clean):
 
 
 @pytest.mark.parametrize(
-    "constant", [lambda record: 0.15, lambda record: 15.0 / abs(record.input_speed)]
+    "constant",
+    [
+        pytest.param(lambda record: 0.15, marks=pytest.mark.nightly),
+        lambda record: 15.0 / abs(record.input_speed),
+    ],
 )
 def test_where_several_records_begin_unsettled_all_are_fitted_so(clean, constant):
     """Of a decay below the noise a slow line of a short record takes the most."""
@@ -233,13 +238,14 @@ def test_a_drift_over_the_session_is_no_new_zero(clean, course):
     assert found.faults == ()
 
 
+@pytest.mark.nightly
 @pytest.mark.skipif(not CASES.is_dir(), reason="the shared cases are not here")
 @pytest.mark.parametrize(
     ("case", "faults", "replaced"),
     [
         ("nothing-encoder-spikes", ["spike"] * 3, 0),
-        pytest.param("nothing-encoder-jump", ["jump"], 0, marks=pytest.mark.nightly),
-        pytest.param("coulomb-gap", ["gap"], 0, marks=pytest.mark.nightly),
+        ("nothing-encoder-jump", ["jump"], 0),
+        ("coulomb-gap", ["gap"], 0),
         ("coulomb-noise-x3", [], 4),
     ],
 )
@@ -353,6 +359,7 @@ def test_no_friction_is_named_for_a_drift(clean, power):
     assert analyse(drift).verdict.status == "adequate"
 
 
+@pytest.mark.nightly
 def test_friction_beside_a_drift_is_named_where_the_drive_turns_both_ways():
     rng = np.random.default_rng(1)
     rig = draw_rig(BELIEVED, (effect("input", coulomb=0.03),), rng)
@@ -391,7 +398,12 @@ def test_a_session_with_one_zero_is_left_as_it_is(twice):
 
 @pytest.mark.parametrize(
     ("channel", "size"),
-    [("input_torque", 0.03), ("output_torque", 1.0), ("output_angle", 1e-4), ("input_angle", 0.1)],
+    [
+        ("input_torque", 0.03),
+        pytest.param("output_torque", 1.0, marks=pytest.mark.nightly),
+        ("output_angle", 1e-4),
+        pytest.param("input_angle", 0.1, marks=pytest.mark.nightly),
+    ],
 )
 def test_a_zero_that_differs_in_one_record_is_told_and_taken_out(twice, channel, size):
     """It was called a thermal drift, or friction that grows with the load."""
@@ -411,6 +423,7 @@ def test_a_zero_that_differs_in_one_record_is_told_and_taken_out(twice, channel,
     assert np.sqrt(lines.covariance[place, 0, 0]) == pytest.approx(size / scale, rel=0.1)
 
 
+@pytest.mark.nightly
 def test_a_drift_over_the_session_is_no_zero_of_one_record(twice):
     warming = reading(twice, "output_angle", lambda one: one.output_angle - 1e-8 * one.elapsed)
     first = twice.running[0].elapsed
@@ -455,7 +468,7 @@ def test_steps_finer_than_the_noise_need_nothing(clean):
     assert examined(rows)[0].rig is clean.rig
 
 
-@pytest.mark.parametrize("step", [0.006, 0.008, 0.012, 0.02])
+@pytest.mark.parametrize("step", others_at_night([0.006, 0.008, 0.012, 0.02], 0.008, 0.02))
 def test_lines_of_a_coarse_torque_scatter_as_their_covariance_says(clean, step):
     believed, orders = clean.believed, [1.0, 2.0, 3.0]
     rows = reading(clean, "input_torque", lambda one: coarse(one.input_torque, step))

@@ -45,6 +45,7 @@ def test_a_sensor_at_the_brake_misses_what_accelerates_the_load():
         assert f'"{place}"' in hint
 
 
+@pytest.mark.nightly
 def test_where_the_sensor_sits_decides_between_adequate_and_unlisted(tmp_path):
     brake = session(AT_BRAKE)
     assert analyse(brake).verdict.status == "adequate"

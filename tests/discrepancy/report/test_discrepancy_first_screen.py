@@ -1,4 +1,4 @@
-"""Sentences of a report's first screen on the proof and on what is good enough, true and false."""
+"""Sentences of a report's first screen: on validation and what is good enough."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -13,31 +13,33 @@ from pymoo_hdte.discrepancy._answers.where.relevance import Relevance, largest_c
 from pymoo_hdte.discrepancy._report.document import sentence
 from pymoo_hdte.discrepancy._report.optimum import Choice
 from pymoo_hdte.discrepancy._report.tables import EffectRow, effect_rows, hypothesis_rows
-from pymoo_hdte.discrepancy._report.write import gap_sentence
+from pymoo_hdte.discrepancy._report.write import validation_sentence
 from pymoo_hdte.discrepancy._selection.rules import RULES
-from pymoo_hdte.discrepancy._verdicts.gap import Gap
-from pymoo_hdte.discrepancy._verdicts.validation_drive import Proof
+from pymoo_hdte.discrepancy._verdicts.prediction_error import PredictionError
+from pymoo_hdte.discrepancy._verdicts.validation_drive import Validation
 from pymoo_hdte.units import ARCSEC
 
 NAMED = SimpleNamespace(
     verdict=SimpleNamespace(accepted=SimpleNamespace(candidates=("something",)))
 )
 NOTHING = SimpleNamespace(verdict=SimpleNamespace(accepted=SimpleNamespace(candidates=())))
-GAPS = {
-    "transmission_error": Gap(8.2, 0.43, 0.42, "arcsec"),
-    "input_torque": Gap(0.21, 0.2, 0.2, "mN.m"),
-    "output_torque": Gap(19.4, 17.3, 19.8, "mN.m"),
+ERRORS = {
+    "transmission_error": PredictionError(8.2, 0.43, 0.42, "arcsec"),
+    "input_torque": PredictionError(0.21, 0.2, 0.2, "mN.m"),
+    "output_torque": PredictionError(19.4, 17.3, 19.8, "mN.m"),
 }
 
 
-def proof(overall=(4.7, 1.02), records=(1.0, 1.0), **after):
-    """Return gaps on held-out records, with those of channels ``after`` and of two records."""
-    channels = {name: replace(gap, after=after.get(name, gap.after)) for name, gap in GAPS.items()}
-    return Proof(
+def validation(overall=(4.7, 1.02), records=(1.0, 1.0), **after):
+    """Return errors on held-out records, with those of channels ``after`` and of two records."""
+    channels = {
+        name: replace(error, after=after.get(name, error.after)) for name, error in ERRORS.items()
+    }
+    return Validation(
         records=("run_a", "run_b"),
         channels=channels,
-        overall=Gap(*overall, 1.0, "standard deviations of the noise"),
-        by_record=tuple(Gap(1.0, one, 0.4, "arcsec") for one in records),
+        overall=PredictionError(*overall, 1.0, "standard deviations of the noise"),
+        by_record=tuple(PredictionError(1.0, one, 0.4, "arcsec") for one in records),
         orders=np.zeros(1),
         by_order=(),
         dte=np.zeros((3, 2)),
@@ -48,12 +50,12 @@ def proof(overall=(4.7, 1.02), records=(1.0, 1.0), **after):
     )
 
 
-def test_a_gap_that_shrinks_everywhere_is_not_called_worse():
-    said = gap_sentence(NAMED, proof())
+def test_an_error_that_shrinks_everywhere_is_not_called_worse():
+    said = validation_sentence(NAMED, validation())
     assert "8.2 arcsec before, 0.43 after" in said
     assert "the correction removes" in said
     assert "orse" not in said
-    assert proof().worse == ()
+    assert validation().worse == ()
 
 
 @pytest.mark.parametrize(
@@ -68,17 +70,17 @@ def test_a_gap_that_shrinks_everywhere_is_not_called_worse():
     ],
 )  # fmt: skip
 def test_what_gets_worse_is_said(changes, words, names):
-    assert words not in gap_sentence(NAMED, proof())
-    found = proof(**changes)
-    assert words in gap_sentence(NAMED, found)
+    assert words not in validation_sentence(NAMED, validation())
+    found = validation(**changes)
+    assert words in validation_sentence(NAMED, found)
     assert found.worse == names
 
 
-def test_a_gap_of_thousands_has_no_exponent():
+def test_an_error_of_thousands_has_no_exponent():
     """It was off by 4.46e+03 mN.m."""
-    large = proof()
-    large.channels["transmission_error"] = Gap(4460.0, 1230.0, 0.42, "arcsec")
-    assert "4460 arcsec before, 1230 after" in gap_sentence(NAMED, large)
+    large = validation()
+    large.channels["transmission_error"] = PredictionError(4460.0, 1230.0, 0.42, "arcsec")
+    assert "4460 arcsec before, 1230 after" in validation_sentence(NAMED, large)
 
 
 @pytest.mark.parametrize(
@@ -95,20 +97,20 @@ def test_the_old_design_stays_where_the_new_optimum_is_better_in_nothing(reached
     assert choice.stays == stays
 
 
-def test_a_gap_within_the_noise_is_not_called_worse():
-    assert proof(output_torque=21.0, input_torque=0.21).worse == ()
+def test_an_error_within_the_noise_is_not_called_worse():
+    assert validation(output_torque=21.0, input_torque=0.21).worse == ()
 
 
 def test_without_an_effect_or_a_record_nothing_is_claimed():
-    assert gap_sentence(NOTHING, proof()).startswith("Nothing was added.")
-    assert gap_sentence(NAMED, None).startswith("No record was held out")
+    assert validation_sentence(NOTHING, validation()).startswith("Nothing was added.")
+    assert validation_sentence(NAMED, None).startswith("No record was held out")
 
 
 @given(st.floats(0.0, 1e3), st.floats(0.0, 1e3), st.floats(1e-3, 1e3))
 def test_worse_is_larger_by_more_than_the_rule_says(before, after, floor):
-    gap = Gap(before, after, floor, "arcsec", RULES)
-    assert gap.worse == (after - before > 0.05 * floor and after > 1.1 * floor)
-    assert not (gap.worse and gap.shrinkage is not None and gap.shrinkage > 0.0)
+    error = PredictionError(before, after, floor, "arcsec", RULES)
+    assert error.worse == (after - before > 0.05 * floor and after > 1.1 * floor)
+    assert not (error.worse and error.shrinkage is not None and error.shrinkage > 0.0)
 
 
 def matters(error=0.2, torque=0.01, enough=(1.0, 0.05), whole=True):
@@ -255,7 +257,7 @@ def test_an_effect_that_explains_less_than_half_is_not_called_near(share, told):
             (("soft_windup",), ("backlash", "stiffness")),
             "from backlash (mesh) and stiffness (out of tolerance).",
         ),
-        # What is a part of the first alone is in the class for its doubts.
+        # What is a part of the first alone is in the class for its caveats.
         ((("play", "windup"), ("windup",)), "from windup (mesh) alone, with caveats."),
     ],
 )

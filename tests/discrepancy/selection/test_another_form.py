@@ -398,7 +398,7 @@ def test_a_damping_out_of_tolerance_may_be_the_form_of_a_drag_at_its_port(
     base.values = np.zeros(0)
     data = SimpleNamespace(
         rules=RULES,
-        remainder=RULES.model_accuracy**2,
+        model_error_share=RULES.model_accuracy**2,
         excess=lambda fit: SimpleNamespace(of_parts=np.array([whole[fit.name]])),
     )
     rest = SimpleNamespace(fit=fitted("rest"), exact=False, candidates=(drag,))
@@ -431,8 +431,8 @@ def test_dry_friction_whose_bristles_bend_is_no_hysteresis_of_the_mesh():
     effect = Correction("output", DryWithBristles(1.2))
     rng = np.random.default_rng(2)
     data = with_sweep(measured((effect,), rng, FEW)[0], (effect,), rng)
-    wanted = {"hysteresis", "coulomb_friction", "presliding_friction"}
-    laws = [one for one in library(data) if one.name in wanted]
+    wanted = {"hysteresis:mesh", "presliding_friction:output"}
+    laws = [one for one in library(data) if one.label in wanted]
     found = judge(data, fit(data), laws)
     assert (found.status, found.chosen.label) == ("named", "presliding_friction:output")
     (_, place), covariance = found.chosen.fit.places[0], found.chosen.fit.covariance
@@ -477,6 +477,7 @@ def test_a_parameter_that_an_effect_covers_is_told_as_that_effect(moved):
 IN_A_CLUTCH = "load_inertia/coupled:output"
 
 
+@pytest.mark.nightly
 def test_an_inertia_in_a_clutch_is_named_as_such():
     """Not as a rigid one beside a damping of the torsion that imitates what the clutch loses."""
     data = measured((CoupledInertia(0.05, 3e-4),), np.random.default_rng(1), DATA)[0]
@@ -514,6 +515,7 @@ def test_no_parameter_is_freed_beside_the_effect_that_covers_it():
     assert {one.label for one in found.chosen.candidates} == BOTH
 
 
+@pytest.mark.nightly
 def test_two_covered_parameters_that_are_both_needed_stay(moved, monkeypatch):
     """No one effect covers both."""
     monkeypatch.setattr(Search, "_needless", lambda self, one, fewer: False)
@@ -553,6 +555,7 @@ def test_a_parameter_out_of_tolerance_removes_more_than_the_misfit_lets_it(moved
     assert needless(freedom, 3.0 * cost)
 
 
+@pytest.mark.nightly
 def test_the_force_of_uneven_springs_lies_in_the_interval_that_is_told_of_it():
     """On a bench written apart two of nine did: the error of a form counted as noise."""
     rng = np.random.default_rng(1)
@@ -561,9 +564,9 @@ def test_the_force_of_uneven_springs_lies_in_the_interval_that_is_told_of_it():
         Correction("mesh", MaxwellSlip(2.0 * share, slip, 1e-3))
         for share, slip in zip(shares / shares.sum(), slips, strict=True)
     )
-    records = known_data([(40.0, 40.0), (150.0, 5.0), (500.0, 20.0), (1200.0, 40.0)], [1.0, 2.0])
+    records = known_data([(40.0, 40.0), (500.0, 5.0)], [1.0, 2.0])
     data = with_sweep(measured(effects, rng, records)[0], effects, rng)
-    found = judge(data, fit(data), [one for one in library(data) if one.name == "hysteresis"])
+    found = judge(data, fit(data), [one for one in library(data) if one.label == "hysteresis:mesh"])
     lower, upper = effects_of(found)[0]["parameters"]["force"]["interval95"]
     assert lower < 2.0 < upper
     assert upper - lower < 0.2 * 2.0

@@ -12,8 +12,7 @@ from pymoo_hdte.discrepancy._evidence.order_lines.corrections import (
     Correction,
 )
 from pymoo_hdte.discrepancy._evidence.order_lines.evidence import Data
-from pymoo_hdte.discrepancy._selection import caveats as doubts
-from pymoo_hdte.discrepancy._selection import verdict
+from pymoo_hdte.discrepancy._selection import caveats, verdict
 from pymoo_hdte.discrepancy._selection.any_form import AnyForm
 from pymoo_hdte.discrepancy._selection.excess import HeldOutTest
 from pymoo_hdte.discrepancy._selection.fitting import fit
@@ -106,6 +105,7 @@ def test_a_small_effect_shows_beside_a_law_of_another_form():
     assert {one.label for one in found.chosen.candidates} == {SPRING, DRIFT}
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(("go_on", "labels"), [(False, {SPRING}), (True, {SPRING, DRIFT})])
 def test_a_search_goes_on_from_known_sets_only_where_that_is_asked_for(go_on, labels):
     """Resonances beside an inertia hid a friction: with their noise it alone was judged."""
@@ -127,14 +127,16 @@ def judged_with_a_gain(*beside):
     return judge(data, fit(data), of_labels("coulomb_friction:input", FRICTION, DRIFT))
 
 
-def test_a_gain_that_stands_for_the_form_of_a_law_is_no_doubt():
+@pytest.mark.nightly
+def test_a_gain_that_stands_for_the_form_of_a_law_is_no_caveat():
     found = judged_with_a_gain(*small_drift())
     assert (found.status, found.chosen.label) == ("named", f"{FRICTION}+{DRIFT}")
     names = [one.name for one in found.chosen.fit.parameters]
     assert found.chosen.fit.bound_sides[names.index("output_torque_gain")] != 0.0
 
 
-def test_a_gain_beside_one_law_is_a_doubt():
+@pytest.mark.nightly
+def test_a_gain_beside_one_law_is_a_caveat():
     """In any form it follows too much."""
     assert GAIN in judged_with_a_gain().reasons
 
@@ -146,7 +148,7 @@ DRAG, DRY = "nonlinear_drag:input", "coulomb_friction:input"
     ("dry", "status", "labels"),
     [
         (0.0, "named", [DRAG]),
-        (0.04, "class", [f"{DRAG}+{DRY}", DRAG]),
+        pytest.param(0.04, "class", [f"{DRAG}+{DRY}", DRAG], marks=pytest.mark.nightly),
         (0.08, "named", [f"{DRY}+{DRAG}"]),
     ],
 )
@@ -192,11 +194,11 @@ def test_a_small_effect_that_held_out_records_deny_is_not_named(monkeypatch, wor
     (drift,) = of_labels(DRIFT)
     data = planted(*law.build((6.0,)), *drift.build((2e-8, 500.0)))
 
-    def vote(self, before, after):
+    def held_out_test(self, before, after):
         beside = before.candidates == (law,)
         return HeldOutTest(500.0, 500.0 + worse if beside else 400.0, 10.0)
 
-    monkeypatch.setattr(Data, "held_out_test", vote)
+    monkeypatch.setattr(Data, "held_out_test", held_out_test)
     found = judge(data, fit(data), [law, drift])
     assert (DRIFT in {one.label for one in found.chosen.candidates}) == named
 
@@ -209,7 +211,7 @@ def test_a_small_effect_whose_interval_contains_nothing_is_not_named(monkeypatch
     data = planted(*law.build((6.0,)), *drift.build((2e-8, 500.0)))
     of_drift = {DRIFT: certain}
     monkeypatch.setattr(
-        doubts, "strength_is_certain", lambda _, one, *__: of_drift.get(one.label, True)
+        caveats, "strength_is_certain", lambda _, one, *__: of_drift.get(one.label, True)
     )
     found = judge(data, fit(data), [law, drift])
     assert found.status == "named"
@@ -356,7 +358,7 @@ def test_a_harmonic_that_is_not_analysed_is_a_form_of_a_ripple():
 
 def test_a_law_whose_listed_form_contradicts_a_part_is_not_named_plainly(monkeypatch):
     """As where it explains the whole but for one channel, which only another form follows."""
-    monkeypatch.setattr(doubts, "explains", lambda *arguments: False)
+    monkeypatch.setattr(caveats, "explains", lambda *arguments: False)
     data = planted(FOREIGN[SPRING], seed=2)
     found = judge(data, fit(data), of_labels(SPRING))
     assert AnyForm(data, found.base).explains(found.chosen)

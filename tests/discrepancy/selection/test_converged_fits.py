@@ -101,14 +101,8 @@ def nothing():
     return found.finding.data, compared(found.verdict, found.finding.data.rules)
 
 
-@pytest.mark.parametrize(
-    ("fits", "share"),
-    [
-        pytest.param(nothing, 1.0, marks=pytest.mark.nightly),
-        (ripple, 1.0),
-        pytest.param(friction, 0.2, marks=pytest.mark.nightly),
-    ],
-)
+@pytest.mark.nightly
+@pytest.mark.parametrize(("fits", "share"), [(nothing, 1.0), (ripple, 1.0), (friction, 0.2)])
 def test_no_start_ends_below_the_fits_that_decide(fits, share):
     hold(*fits(), share)
 

@@ -222,7 +222,8 @@ def test_a_parameter_out_of_tolerance_stops_at_its_bound(factor, side):
     assert gain == pytest.approx(base.chi_square - freed.chi_square, rel=0.1)
 
 
-@pytest.mark.parametrize("share", others_at_night([0.92, 1.0, 1.08], 0.92))
+@pytest.mark.nightly
+@pytest.mark.parametrize("share", [0.92, 1.0, 1.08])
 def test_the_interval_of_an_inertia_holds_it_wherever_the_believed_one_lies(share):
     """Records show their sum only, and fits end at one end of the tolerance of the believed one."""
     speeds, loads = (150.0, 500.0, 1000.0, 1500.0, 2000.0), (5.0, 20.0, 30.0, 40.0, 10.0)

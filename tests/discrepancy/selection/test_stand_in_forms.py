@@ -38,6 +38,7 @@ def laws_of(data):
     return [one for one in library(data) if one.name in ("hysteresis", "kinematic_reaction")]
 
 
+@pytest.mark.nightly
 def test_a_loop_that_forgets_is_named_with_what_stands_beside_it(data):
     found = judge(data, fit(data), laws_of(data))
     labels = [one.label for one in found.chosen.candidates]
@@ -47,7 +48,7 @@ def test_a_loop_that_forgets_is_named_with_what_stands_beside_it(data):
     assert found.chosen.fit.values[place][0] == pytest.approx(FORCE, abs=3.0 * deviation)
 
 
-@pytest.mark.parametrize("mended", [True, False])
+@pytest.mark.parametrize("mended", [True, pytest.param(False, marks=pytest.mark.nightly)])
 def test_a_second_effect_is_sought_beside_the_loop_and_not_beside_springs(
     data, mended, monkeypatch
 ):

@@ -71,6 +71,7 @@ def test_it_is_named_with_its_rate():
     assert verdict.accepted.chi_square < 1.15 * verdict.degrees_of_freedom < verdict.base.chi_square
 
 
+@pytest.mark.nightly
 def test_a_drive_that_is_believed_to_have_it_misses_it_no_more():
     campaign = warm_campaign()
     law = TemperatureFriction(BELIEVED.input_damping, RATE, MIDDLE)

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from measured_oscillator import OSCILLATOR, nothing
 
-from pymoo_hdte.discrepancy._report.mechanism import proof_sentence
+from pymoo_hdte.discrepancy._report.mechanism import validation_sentence
 from pymoo_hdte.discrepancy._report.mechanism_document import limits
 from pymoo_hdte.discrepancy._selection.reason import NOT_VALIDATED
 from pymoo_hdte.discrepancy._selection.rules import RULES
 from pymoo_hdte.discrepancy._verdicts.mechanism import examine_mechanism
-from pymoo_hdte.discrepancy._verdicts.validation_mechanism import prove_measured
+from pymoo_hdte.discrepancy._verdicts.validation_mechanism import validate_mechanism
 from pymoo_hdte.discrepancy._verdicts.windows import Reach, windows_of
 from pymoo_hdte.effects.friction import CoulombFriction
 from pymoo_hdte.effects.hysteresis import MaxwellSlip
@@ -74,7 +74,7 @@ def test_a_name_that_the_held_out_record_contradicts_is_not_given():
     (one,) = finding.simulated
     before, after, _ = one.powers("x")
     assert after > before
-    simulated, _ = prove_measured(finding)
+    simulated, _ = validate_mechanism(finding)
     assert simulated.before == simulated.after == pytest.approx(before**0.5)
 
 
@@ -93,8 +93,8 @@ def test_a_name_that_the_held_out_record_shows_is_given_and_one_at_rest_says_not
 def test_a_free_joint_is_simulated_until_it_drifts_and_its_name_stands():
     finding = found_on_joint(0.05)
     assert [one.name for one in finding.accepted.candidates] == ["coulomb_friction"]
-    simulated, _ = prove_measured(finding)
-    whole, _ = prove_measured(finding, whole=True)
+    simulated, _ = validate_mechanism(finding)
+    whole, _ = validate_mechanism(finding, whole=True)
     extent = simulated.extent
     assert extent.windows == extent.room >= RULES.fewest_windows
     assert whole.extent.windows == 1
@@ -108,9 +108,10 @@ def test_a_free_joint_is_simulated_until_it_drifts_and_its_name_stands():
     assert told["r2_after"] == simulated.determination[1]
     assert (told["windows"], told["window_s"]) == (extent.windows, extent.length)
     sentence = f"{extent.windows} of {extent.room} windows of {extent.length:.3g} s in held_out 2"
-    assert sentence in proof_sentence(finding, [simulated])
+    assert sentence in validation_sentence(finding, [simulated])
 
 
+@pytest.mark.nightly
 def test_the_worse_the_model_the_shorter_the_windows():
     lengths = [found_on_joint(one).simulated[0].extent.length for one in (0.05, 0.8)]
     assert lengths[1] < 0.8 * lengths[0]

@@ -22,14 +22,14 @@ from pymoo_hdte.discrepancy._answers.next_test_mechanism import _how, next_test
 from pymoo_hdte.discrepancy._evidence.force_balances.evidence import measured_data
 from pymoo_hdte.discrepancy._evidence.force_balances.intervals import Spread
 from pymoo_hdte.discrepancy._evidence.force_balances.preconditions import check_scale, usual_cutoff
-from pymoo_hdte.discrepancy._report.mechanism_document import limits, record_remarks, remainder
+from pymoo_hdte.discrepancy._report.mechanism_document import limits, record_remarks, unexplained
 from pymoo_hdte.discrepancy._report.mechanism_values import _parameters, effects, quantities
 from pymoo_hdte.discrepancy._selection.fitting import fit
 from pymoo_hdte.discrepancy._selection.reason import ZERO_IN_INTERVAL
 from pymoo_hdte.discrepancy._selection.rules import RULES
 from pymoo_hdte.discrepancy._verdicts import mechanism_choice
 from pymoo_hdte.discrepancy._verdicts.mechanism import examine_mechanism
-from pymoo_hdte.discrepancy._verdicts.validation_mechanism import prove_measured
+from pymoo_hdte.discrepancy._verdicts.validation_mechanism import validate_mechanism
 from pymoo_hdte.effects.friction import CoulombFriction
 from pymoo_hdte.mechanism import BelievedValue, Input, LawAt, Mechanism, Port, Record
 
@@ -47,12 +47,12 @@ def finding_on(hidden, seed=1):
 
 def test_a_user_finds_the_cubic_spring_of_a_duffing_oscillator():
     analysis, _ = cubic_analysis()
-    finding, gaps = analysis.finding, analysis.prove()
+    finding, errors = analysis.finding, analysis.validate()
     assert finding.verdict.status == "named"
     (effect,) = effects(finding)
     assert (effect["name"], effect["port"]) == ("hardening_stiffness", "spring")
     assert effect["parameters"]["coefficient"]["value"] == pytest.approx(4e6, rel=0.01)
-    simulated, balanced = gaps
+    simulated, balanced = errors
     assert (simulated.kind, balanced.kind) == ("simulation", "balance")
     assert simulated.shrinkage > 0.95
     assert balanced.shrinkage > 0.95
@@ -63,7 +63,7 @@ def test_a_user_finds_the_cubic_spring_of_a_duffing_oscillator():
 def test_hysteresis_of_another_form_is_named():
     finding = examine_mechanism(OSCILLATOR, with_held_out(bouc_wen))
     assert [one["name"] for one in effects(finding)] == ["hysteresis"]
-    simulated, balanced = prove_measured(finding)
+    simulated, balanced = validate_mechanism(finding)
     assert simulated.shrinkage > 0.95
     # What the other form leaves shows in the forces more than in the motion.
     assert balanced.shrinkage > 0.9
@@ -79,7 +79,7 @@ def test_nothing_hidden_is_adequate_and_proved_to_be():
     assert "Rows of train 1 with values that are not finite: 3." in told
     assert effects(finding) == []
     assert np.all(finding.base_misfit < 1.3 * finding.sensor_noise)
-    simulated, balanced = prove_measured(finding)
+    simulated, balanced = validate_mechanism(finding)
     assert simulated.record == balanced.record == others[0].name
     assert simulated.before == simulated.after
     assert balanced.after < 1.3 * balanced.noise_floor
@@ -96,6 +96,7 @@ def test_a_force_that_jumps_between_samples_is_no_missing_effect(seed, force_noi
     assert np.all(finding.base_misfit > 0.5 * finding.sensor_noise)
 
 
+@pytest.mark.nightly
 def test_a_force_that_jumps_finds_the_damper_that_was_forgotten():
     (port,) = OSCILLATOR.ports
     forgetful = replace(OSCILLATOR, ports=(replace(port, damping=BelievedValue(0.0)),))
@@ -178,7 +179,7 @@ def test_what_no_law_explains_is_unlisted_and_described():
     finding = finding_on(swinging_stiffness)
     assert finding.verdict.status == "unlisted"
     assert effects(finding) == []
-    assert "force balance of x" in remainder(finding)["sentence"]
+    assert "force balance of x" in unexplained(finding)["sentence"]
     assert any("held out" in sentence for sentence in limits(finding))
 
 
@@ -240,6 +241,7 @@ def test_a_repetition_is_told_by_its_travel_its_rate_and_the_speed_that_they_mak
     assert "with 3 times its travel (3 times its speed)" in alone.description
 
 
+@pytest.mark.nightly
 def test_a_gain_of_the_wrong_sign_is_the_first_thing_to_check():
     record = rig.record_of(nothing)
     channels = {**record.channels, "force": -record.channels["force"]}
@@ -328,7 +330,7 @@ def test_play_takes_the_stiffness_that_is_fitted_and_not_the_believed_one():
     assert effect["name"] == "backlash"
     assert effect["parameters"]["half_width"]["value"] == pytest.approx(0.002, rel=0.02)
     assert quantities(finding)["stiffness of spring"]["value"] == pytest.approx(4000.0, rel=0.005)
-    simulated, balanced = prove_measured(finding)
+    simulated, balanced = validate_mechanism(finding)
     assert simulated.shrinkage > 0.9
     assert balanced.shrinkage > 0.9
 

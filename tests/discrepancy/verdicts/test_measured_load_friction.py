@@ -88,6 +88,7 @@ def test_it_is_named_where_the_port_states_its_load():
     assert [standing.law.share, standing.law.driven_share] == pytest.approx([SHARE] * 2, rel=0.05)
 
 
+@pytest.mark.nightly
 def test_nothing_of_the_kind_is_said_where_it_does_not():
     named = {one.name for one in finding(False).accepted.candidates}
     assert NAME not in named

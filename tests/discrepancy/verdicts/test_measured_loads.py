@@ -173,6 +173,7 @@ def test_a_ripple_is_found_beside_gravity_and_friction_that_hide_it():
     assert ripple.amplitude == pytest.approx(1.2, rel=0.02)
 
 
+@pytest.mark.nightly
 def test_at_the_bound_of_a_form_no_name_is_plain():
     finding = found(lambda q, v: 4.0 * np.sign(v) * np.abs(v) ** 0.12)
     assert finding.verdict.status == "partial"
@@ -202,7 +203,7 @@ def test_at_the_bound_of_a_form_no_name_is_plain():
         ),
     ],
 )
-def test_a_belief_that_ends_at_its_tolerance_is_a_doubt(believed, stuck):
+def test_a_belief_that_ends_at_its_tolerance_is_a_caveat(believed, stuck):
     finding = found(dry, mechanism=believed)
     assert finding.verdict.status == "partial"
     assert Reason(AT_TOLERANCE, stuck) in finding.verdict.reasons

@@ -69,6 +69,7 @@ def test_springs_that_slip_and_a_spring_that_hardens_are_found_together(seed):
     assert finding.share_removed > 0.9
 
 
+@pytest.mark.nightly
 def test_what_sets_the_noise_by_itself_is_no_plain_name_unless_it_explains_nine_tenths():
     """Beside a disturbance the same two effects are certain, but not that they are all."""
     believed, record = slipping_and_hardening(1, disturbance=7.0)
@@ -79,6 +80,7 @@ def test_what_sets_the_noise_by_itself_is_no_plain_name_unless_it_explains_nine_
     assert finding.verdict.has_reason(EXPLAINS_TOO_LITTLE)
 
 
+@pytest.mark.nightly
 def test_dry_friction_is_named_before_its_difference_between_the_directions():
     """At speeds that hardly vary, damping imitates all of the first and nothing of the second."""
     believed = machine(BelievedValue(100.0, 0.5), BelievedValue(0.0), BelievedValue(300.0, 1.0))

@@ -15,7 +15,7 @@ from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy import JointAnalysis, analyse, read_rig
 from pymoo_hdte.discrepancy._answers.joint_open_questions import (
     torsion_test,
-    wiring_doubts,
+    wiring_caveats,
 )
 from pymoo_hdte.discrepancy._evidence.force_balances.evidence import measured_data
 from pymoo_hdte.discrepancy._evidence.force_balances.joint_halves import (
@@ -26,10 +26,14 @@ from pymoo_hdte.discrepancy._evidence.force_balances.joint_halves import (
 from pymoo_hdte.discrepancy._records.rig_model import model_text, read_mechanism_model
 from pymoo_hdte.discrepancy._report.torsion import torsion_document, torsion_limits
 from pymoo_hdte.discrepancy._selection.rules import RULES
-from pymoo_hdte.discrepancy._verdicts.held_out_torsion import predicted_torsion, torsion_gaps, voted
+from pymoo_hdte.discrepancy._verdicts.held_out_torsion import (
+    predicted_torsion,
+    torsion_after_held_out_test,
+    torsion_errors,
+)
 from pymoo_hdte.discrepancy._verdicts.joint import JointFinding, examine_joint
 from pymoo_hdte.discrepancy._verdicts.joint_torsion import examine_torsion
-from pymoo_hdte.discrepancy._verdicts.validation_mechanism import rests_told
+from pymoo_hdte.discrepancy._verdicts.validation_mechanism import sentences_on_rest
 from pymoo_hdte.effects.friction import CoulombFriction
 from pymoo_hdte.effects.gravity import Gravity
 from pymoo_hdte.effects.hysteresis import MaxwellSlip
@@ -50,10 +54,10 @@ WINDUP = SoftWindup(0.4, 6e-4, 3.0)
 
 
 def torsion_of(hidden):
-    """Return the finding on the torsion alone, and its gaps."""
+    """Return the finding on the torsion alone, and its errors."""
     joint = joint_of(believed())
     finding = examine_torsion(torsion_half(joint, records(hidden), ()), joint, CUTOFF)
-    return finding, torsion_gaps(finding)
+    return finding, torsion_errors(finding)
 
 
 def value(fitted, name):
@@ -66,11 +70,11 @@ def value(fitted, name):
 
 
 def test_with_nothing_missing_the_torsion_is_adequate_and_its_stiffness_found():
-    finding, (gap,) = torsion_of(Hidden())
+    finding, (error,) = torsion_of(Hidden())
     assert finding.verdict.status == "adequate"
     assert value(finding.accepted, "stiffness of gear") == pytest.approx(STIFFNESS, rel=1e-3)
-    assert gap.after < 2.0 * gap.noise_floor
-    assert np.std(gap.measured) > 100.0 * gap.after
+    assert error.after < 2.0 * error.noise_floor
+    assert np.std(error.measured) > 100.0 * error.after
 
 
 def resting(seconds, seed):
@@ -84,6 +88,7 @@ def resting(seconds, seed):
     return time, position, speed, np.gradient(speed, made_joint.STEP)
 
 
+@pytest.mark.nightly
 def test_rests_that_are_left_out_are_told_and_count_as_no_prediction(monkeypatch):
     """Dry friction ahead of the gear is known: what it holds at rest is in no force balance."""
     monkeypatch.setattr(made_joint, "motion", resting)
@@ -94,10 +99,10 @@ def test_rests_that_are_left_out_are_told_and_count_as_no_prediction(monkeypatch
     made = records(Hidden(WINDUP, dry=6.0))
     finding = examine_torsion(torsion_half(joint, made, known), joint, 10.0)
     assert finding.data.spectra[0].left_out > 0
-    assert any("at rest" in words for words in rests_told(finding))
-    (gap,) = torsion_gaps(finding)
+    assert any("at rest" in words for words in sentences_on_rest(finding))
+    (error,) = torsion_errors(finding)
     # Where nothing is compared, a prediction would differ from what is measured by the same.
-    differences = gap.measured - gap.predicted_before
+    differences = error.measured - error.predicted_before
     assert len(np.unique(np.round(differences / ARCSECOND, 9))) == len(differences)
 
 
@@ -139,7 +144,7 @@ def test_rests_that_are_left_out_are_told_and_count_as_no_prediction(monkeypatch
     ids=lambda one: one if isinstance(one, str) else "",
 )
 def test_what_is_hidden_in_a_torsion_is_named_with_its_size(hidden, name, unknown, truth):
-    finding, (gap,) = torsion_of(hidden)
+    finding, (error,) = torsion_of(hidden)
     assert finding.verdict.status == "named"
     (candidate,) = finding.accepted.candidates
     assert candidate.name == name
@@ -149,7 +154,7 @@ def test_what_is_hidden_in_a_torsion_is_named_with_its_size(hidden, name, unknow
         else np.hypot(*finding.accepted.values[finding.accepted.n_base :])
     )
     assert size == pytest.approx(truth, rel=0.05)
-    assert gap.after < 0.4 * gap.before
+    assert error.after < 0.4 * error.before
 
 
 def test_an_error_beyond_the_band_is_found_in_the_torsion_with_its_order():
@@ -203,8 +208,8 @@ def test_one_document_tells_what_torques_and_torsion_lack(joint_analysis, tmp_pa
     share = found["coulomb_friction"]["rms_arcsec"] * ARCSECOND * STIFFNESS
     assert share == pytest.approx(4.0, rel=0.05)
     assert torsion["remainder"]["share_removed"] > 0.99
-    (gap,) = torsion["held_out"]
-    assert gap["after_arcsec"] < 1.0 < 20.0 < gap["before_arcsec"]
+    (error,) = torsion["held_out"]
+    assert error["after_arcsec"] < 1.0 < 20.0 < error["before_arcsec"]
     assert "Torsion between the encoders" in (tmp_path / "report" / "report.html").read_text()
 
 
@@ -239,18 +244,19 @@ def test_the_delay_of_an_encoder_is_not_told_from_friction():
     assert "in the other order" in torsion_test(finding)
 
 
+@pytest.mark.nightly
 def test_effects_that_make_the_held_out_torsion_worse_are_not_named():
     train, _ = records(Hidden(WINDUP))
     _, other = records(Hidden())
     joint = joint_of(believed())
     finding = examine_torsion(torsion_half(joint, [train, other], ()), joint, CUTOFF)
     assert finding.verdict.status == "named"
-    verdict = voted(finding, torsion_gaps(finding))
+    verdict = torsion_after_held_out_test(finding, torsion_errors(finding))
     assert verdict.status == "unlisted"
     assert verdict.accepted is verdict.base
     told = replace(finding, verdict=verdict)
-    both = JointFinding(joint, torque=told, torsion=told, gaps=())
-    assert wiring_doubts(both) == []
+    both = JointFinding(joint, torque=told, torsion=told, errors=())
+    assert wiring_caveats(both) == []
     (words,) = (one for one in torsion_limits(both) if "None is named" in one)
     assert "soft windup" in words
 

@@ -116,6 +116,7 @@ def test_an_open_run_is_the_run_of_its_algorithm(tmp_path):
     assert float(run["Spacing"]) == expected.spacing
 
 
+@pytest.mark.nightly
 def test_a_changed_file_of_a_stranger_gives_new_runs(stranger):
     arguments = ("--seeds", "1", *SMALL, "--problems", "zdt1", "--algorithms")
     before = rows_of(open_table(stranger / "out", *arguments, "my_module:MyAlgorithm") / "runs.csv")
@@ -127,6 +128,7 @@ def test_a_changed_file_of_a_stranger_gives_new_runs(stranger):
     assert before != after
 
 
+@pytest.mark.nightly
 def test_the_ablation_is_open_as_well(tmp_path):
     found = open_table(
         tmp_path, "--seeds", "2", *SMALL, "--problems", "calibrated", experiment="ablation"

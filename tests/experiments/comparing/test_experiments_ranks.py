@@ -417,6 +417,7 @@ class TestFigures:
         ]
         assert [patch.get_x() for patch in axis.patches] == [0.5, 0.5]
 
+    @pytest.mark.nightly
     def test_heatmap_of_a_whole_benchmark_is_legible(self):
         problems = [f"RobustDTE calibrated {number}" for number in range(35)]
         groups = ["held out"] * 23 + ["tuning"] * 12

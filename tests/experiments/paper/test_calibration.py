@@ -125,6 +125,7 @@ def test_a_fit_never_sees_what_it_is_judged_on():
         assert set(names) | set(held_out(direction)) == set(PUBLISHED)
 
 
+@pytest.mark.nightly
 def test_a_local_fit_recovers_the_model_that_made_the_numbers():
     rung = Candidate(("damping_reference",), "peak_to_peak", NARROW)
     truth = {**{name: KNOWN[1][name] for name in rung.bounds}, "std_arcsec": 8.0}

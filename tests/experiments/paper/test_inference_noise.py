@@ -72,6 +72,7 @@ def moments_of_noisy_surrogates(rung, parameters, noise):
     return np.concatenate(np.moveaxis(found, 1, 0)).T
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("bands", [NARROW, WIDE])
 def test_the_covariance_of_node_noise_is_that_of_surrogates_fitted_to_noisy_runs(bands):
     rung = Rung(Candidate(EFFECTS, "semi_amplitude", bands))

@@ -144,6 +144,7 @@ class TestShapiroWilk:
         assert share == pytest.approx(1.0 - shapiro_p(least, 20), abs=0.005)
         assert share < 0.02
 
+    @pytest.mark.nightly
     def test_the_page_finds_no_size_that_fits_twenty(self):
         (finding,) = tables.sizes_table().findings
         assert (finding.within_paper, finding.agrees) == (True, False)

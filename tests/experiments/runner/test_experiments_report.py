@@ -189,7 +189,7 @@ def test_seeds_are_refused_where_they_would_change_nothing(experiment, tmp_path,
         (["table7"], [], 20),
         (["table7"], ["--seeds", "3"], 3),
         pytest.param([], [], 20, marks=pytest.mark.nightly),
-        ([], ["--seeds", "3"], 3),
+        pytest.param([], ["--seeds", "3"], 3, marks=pytest.mark.nightly),
     ],
 )
 def test_the_number_of_seeds_reaches_what_takes_it(name, option, seeds, tmp_path, monkeypatch):

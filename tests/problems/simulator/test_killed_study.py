@@ -11,6 +11,7 @@ from functools import partial
 import chaospy
 import numpy as np
 import pytest
+from night import others_at_night
 
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.problems import Design, robust_problem
@@ -300,15 +301,28 @@ DAMAGED = {
 }
 
 
-@pytest.mark.parametrize("kind", DAMAGED)
-def test_a_damaged_line_is_told_and_left_out_and_its_run_made_again(tmp_path, whole, kind):
+def damaged(whole, kind):
+    """Return the file of a study whose sixth line is damaged."""
     lines = (whole / RUNS).read_bytes().split(b"\n")
-    contents = b"\n".join([*lines[:5], DAMAGED[kind], *lines[6:]])
-    (tmp_path / RUNS).write_bytes(contents)
+    return b"\n".join([*lines[:5], DAMAGED[kind], *lines[6:]])
+
+
+@pytest.mark.parametrize("kind", DAMAGED)
+def test_a_damaged_line_is_told_and_left_out(tmp_path, whole, kind):
+    (tmp_path / RUNS).write_bytes(damaged(whole, kind))
+    (tmp_path / "whole").write_bytes((whole / RUNS).read_bytes())
     with pytest.warns(RuntimeWarning, match="line 6"):
-        file = RunFile(tmp_path / RUNS, NAMES, None)
-    assert (tmp_path / RUNS).read_bytes() == contents
-    del file
+        runs = RunFile(tmp_path / RUNS, NAMES, None).runs
+    assert (tmp_path / RUNS).read_bytes() == damaged(whole, kind)
+    undamaged = RunFile(tmp_path / "whole", NAMES, None).runs
+    # Two lines above the runs name the inputs and the responses.
+    del undamaged[[*undamaged][3]]
+    assert [*runs.items()] == [*undamaged.items()]
+
+
+@pytest.mark.parametrize("kind", others_at_night(DAMAGED, "cut"))
+def test_the_run_of_a_damaged_line_is_made_again(tmp_path, whole, kind):
+    (tmp_path / RUNS).write_bytes(damaged(whole, kind))
     before = len(calls(whole))
     with pytest.warns(RuntimeWarning, match="line 6"):
         study(tmp_path, partial(noting, str(whole / "log")))

@@ -224,6 +224,7 @@ def test_inputs_that_do_not_fit_the_signature_are_told_before_any_run(
         never(**dict.fromkeys(inputs, 1.0))
 
 
+@pytest.mark.nightly
 def test_simulators_that_tell_nothing_of_their_arguments_are_called_as_before():
     def plain(b, load):
         return b * load
@@ -320,6 +321,7 @@ def test_a_problem_of_pymoo_gets_its_robust_counterpart():
         Robust(whole, scatter=0.1)
 
 
+@pytest.mark.nightly
 def test_a_response_that_nothing_asks_for_takes_no_runs():
     def simulate(x):
         return {"wanted": x**2, "beside": np.sin(60.0 * x) * np.abs(x - 1.5) ** 0.3}
@@ -362,6 +364,7 @@ def test_a_random_simulator_is_told_to_be_one():
         robust_problem(simulate, {"x": Design(1.0, 2.0, tolerance=0.1)}, budget=60, progress=False)
 
 
+@pytest.mark.nightly
 def test_a_budget_that_ends_before_the_error_is_confirmed_is_announced():
     def rough(x):
         return 1.0 / (1.0 + 100.0 * (x - 1.5) ** 2)

@@ -41,6 +41,7 @@ def problem():
     )
 
 
+@pytest.mark.nightly
 def test_very_many_designs_have_the_objectives_and_constraints_of_few():
     several = robust_problem(
         lambda x, y, a: {"first": x * y + a, "second": x - y * a},
@@ -82,8 +83,8 @@ def test_statistics_of_a_normal_response_are_closed_forms(problem):
     ("statistic", "reach"),
     [
         (Quantile(0.9), norm.ppf(0.9)),
-        (Quantile(0.05), norm.ppf(0.05)),
-        (CVaR(0.9), norm.pdf(norm.ppf(0.9)) / 0.1),
+        pytest.param(Quantile(0.05), norm.ppf(0.05), marks=pytest.mark.nightly),
+        pytest.param(CVaR(0.9), norm.pdf(norm.ppf(0.9)) / 0.1, marks=pytest.mark.nightly),
         (FailureProbability(above=LIMIT), None),
     ],
 )

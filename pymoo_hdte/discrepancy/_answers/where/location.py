@@ -79,7 +79,7 @@ def locate(finding: DriveFinding) -> Location:
     residual = cell_chi_square(data, data.features.values - complete)
     sweep = _sweep_p_value(data, believed, ())
     conditions = data.features.conditions
-    found = Location(
+    location = Location(
         records=tuple(record.name for record in data.features.records),
         speed_rpm=conditions.input_speed / REVOLUTION_PER_MINUTE,
         load_torque=conditions.output_torque,
@@ -98,8 +98,8 @@ def locate(finding: DriveFinding) -> Location:
         named=bool(clean.candidates),
         rules=data.rules,
     )
-    sentence, trusted = sentences(found, data, finding.unexpected)
-    return replace(found, sentence=sentence, trusted=trusted)
+    sentence, trusted = sentences(location, data, finding.unexpected)
+    return replace(location, sentence=sentence, trusted=trusted)
 
 
 def within_tolerance(data: Data, values: Values) -> Values:
@@ -123,7 +123,7 @@ def groups_within_noise(data: Data, difference: Values) -> WithinNoise:
         Measured minus predicted features.
     """
     places = [data.features.places(channel) for channel in range(len(CHANNELS))]
-    means = [[MEANS.index(one)] if one in MEANS else [] for one in range(len(CHANNELS))]
+    means = [[MEANS.index(channel)] if channel in MEANS else [] for channel in range(len(CHANNELS))]
     channels = [np.array([*mean, *pair.ravel()]) for mean, pair in zip(means, places, strict=True)]
     lines = np.concatenate(places, axis=1)
     orders = [np.array([place for mean in means for place in mean]), *lines]
@@ -138,7 +138,7 @@ def groups_within_noise(data: Data, difference: Values) -> WithinNoise:
             [meets(s, len(difference) * len(g)) for s, g in zip(sums, groups, strict=True)]
         )
 
-    records = np.array([meets(one, difference.shape[1]) for one in every])
+    records = np.array([meets(chi_square, difference.shape[1]) for chi_square in every])
     return WithinNoise(together(channels), together(orders), records)
 
 
@@ -170,8 +170,8 @@ def refit_clean(data: Data, fitted: Fit) -> Fit:
         return fitted
     stated, priors = _with_sensors_as_stated(data, fitted)
     begins = [fitted.values, *([stated] if np.abs(priors).max() > 1.0 else [])]
-    found = [_robust(data, replace(fitted, values=values)) for values in begins]
-    fitted = min(found, key=lambda one: _robust_loss(data, one))
+    fits = [_robust(data, replace(fitted, values=values)) for values in begins]
+    fitted = min(fits, key=lambda candidate_fit: _robust_loss(data, candidate_fit))
     values = fitted.values
     chi_square, sweep = _misfit(data, fitted)
     factor = np.where(_significant(chi_square, degrees_of_freedom, rules), _LEFT_OUT, 1.0)
@@ -213,8 +213,8 @@ def _robust_step(data: Data, fitted: Fit) -> Values:
     """
     degrees_of_freedom = cell_degrees_of_freedom(data)
     _, sweep = _misfit(data, fitted)
-    kept = replace(data, torsion=()) if _wrong(sweep, data.rules) else data
-    objective = Objective(kept, fitted.candidates)
+    used = replace(data, torsion=()) if _wrong(sweep, data.rules) else data
+    objective = Objective(used, fitted.candidates)
     difference, others = objective.differences(fitted.values)
     slopes, others_slopes = objective.derivatives(fitted.values)
     lower = (objective.lower - fitted.values) / objective.scale

@@ -47,14 +47,14 @@ class Relevance:
     @property
     def sentence(self) -> str:
         """What is named in numbers, as real and irrelevant or as more than is good enough."""
-        compared = [one for one in self._compared() if one[2] is not None]
+        compared = [change for change in self._compared() if change[2] is not None]
         if self.irrelevant:
             words = " and ".join(
                 f"{what} by at most {_shown(change, what)} ({_shown(limit, what)} is good enough)"
                 for what, change, limit in compared
             )
-            rest = "" if self.whole else " The unexplained residual is not counted."
-            return f"Real and irrelevant at the stated size: it changes {words}.{rest}"
+            remark = "" if self.whole else " The unexplained residual is not counted."
+            return f"Real and irrelevant at the stated size: it changes {words}.{remark}"
         words = " and ".join(
             f"{what} by up to {_shown(change, what)} ({_shown(limit, what)} is good enough)"
             for what, change, limit in compared

@@ -111,17 +111,17 @@ def trends(
         names, columns = ["speed or load"], columns[:1]
     design = _design(columns, len(misfit))
     values = _signed(misfit, noise, design, speed, load)
-    found: dict[str, Trend | None] = {} if joined else dict.fromkeys(sizes)
+    by_condition: dict[str, Trend | None] = {} if joined else dict.fromkeys(sizes)
     for place, name in enumerate(names, start=1):
-        found[name] = trend = _trend(values, noise, design, place, rules)
+        by_condition[name] = trend = _trend(values, noise, design, place, rules)
         if trend.kind == "unknown" and len(names) == 2:
-            (other,) = set(names) - {name}
-            alike = _alike(other, sizes[other], rules)
+            (condition,) = set(names) - {name}
+            alike = _alike(condition, sizes[condition], rules)
             grouped = np.column_stack([columns[place - 1], alike])
-            found[name] = _trend(
+            by_condition[name] = _trend(
                 _signed(misfit, noise, grouped, speed, load), noise, grouped, 0, rules
             )
-    return found
+    return by_condition
 
 
 def _trend(values: Values, noise: Values, design: Values, place: int, rules: Rules) -> Trend:
@@ -156,16 +156,16 @@ def _alike(name: str, size: Values, rules: Rules) -> NDArray[np.float64]:
     return np.eye(level.max() + 1)[level]
 
 
-def in_words(found: dict[str, Trend | None]) -> str:
+def in_words(by_condition: dict[str, Trend | None]) -> str:
     """Return in words how a misfit changes with its conditions."""
-    kinds = [None if trend is None else trend.kind for trend in found.values()]
+    kinds = [None if trend is None else trend.kind for trend in by_condition.values()]
     if kinds == ["steady", "steady"]:
         return "is nearly the same at all speeds and loads"
     if kinds == ["unknown", "unknown"]:
-        if any(trend is not None and trend.scattered for trend in found.values()):
+        if any(trend is not None and trend.scattered for trend in by_condition.values()):
             return "differs from record to record, but not surely with speed or load"
         return "neither grows nor falls surely with speed or load"
-    return " and ".join(_clause(name, trend) for name, trend in found.items())
+    return " and ".join(_clause(name, trend) for name, trend in by_condition.items())
 
 
 def _clause(name: str, trend: Trend | None) -> str:
@@ -206,10 +206,10 @@ def _design(columns: Sequence[Values], records: int) -> NDArray[np.float64]:
     Last, where enough records are there, the product of both conditions: a misfit proportional to
     the load may grow with speed. It is zero where either is at its mean.
     """
-    found = [np.ones(records), *columns]
-    if len(columns) == 2 and records >= 2 * (len(found) + 1):
-        found.append(columns[0] * columns[1])
-    return np.column_stack(found)
+    columns_of_design = [np.ones(records), *columns]
+    if len(columns) == 2 and records >= 2 * (len(columns_of_design) + 1):
+        columns_of_design.append(columns[0] * columns[1])
+    return np.column_stack(columns_of_design)
 
 
 def _signed(
@@ -225,19 +225,19 @@ def _signed(
     parts = 2.0 if np.any(misfit.imag) else 1.0
     amplitude = np.sqrt(np.clip(power - parts * noise**2, 0.0, None))
     weight = 1.0 / (noise**2 + power.mean() + np.finfo(float).tiny)
-    best, least = amplitude, _left(amplitude, design, weight)
+    best, least = amplitude, _residual_power(amplitude, design, weight)
     turned = misfit * np.exp(-0.5j * np.angle(np.sum(weight * misfit**2)))
     # A signed misfit has more freedom than its amplitude: it has to win by more than the noise.
     aside = float(weight @ (turned.imag**2 + noise**2))
     for sign in (1.0, np.sign(speed), np.sign(load), np.sign(speed) * np.sign(load)):
         values = sign * turned.real
-        left = aside + _left(values, design, weight)
-        if left < least:
-            best, least = values, left
+        power_left = aside + _residual_power(values, design, weight)
+        if power_left < least:
+            best, least = values, power_left
     return np.asarray(best)
 
 
-def _left(values: Values, design: Values, weight: Values) -> float:
+def _residual_power(values: Values, design: Values, weight: Values) -> float:
     root = np.sqrt(weight)
     slope = np.linalg.lstsq(root[:, None] * design, root * values, rcond=None)[0]
     return float(weight @ (values - design @ slope) ** 2)
@@ -257,11 +257,11 @@ def _added_variance(values: Values, design: Values, noise: Values, freedom: int)
     """Return the variance that makes the weighted squares of the residuals equal their number."""
 
     def beyond(added: float) -> float:
-        return _left(values, design, 1.0 / (noise**2 + added)) - freedom
+        return _residual_power(values, design, 1.0 / (noise**2 + added)) - freedom
 
     if beyond(0.0) <= 0.0:
         return 0.0
-    most = _left(values, design, np.ones(len(values))) / freedom
+    most = _residual_power(values, design, np.ones(len(values))) / freedom
     return float(brentq(beyond, 0.0, 1.01 * most, xtol=1e-9 * most))
 
 

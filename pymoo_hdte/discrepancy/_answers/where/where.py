@@ -77,17 +77,17 @@ def _where(location: Location, stray: StrayLines, ratio: float) -> str:
     if stray.frequency is None:
         return _orders(location, size, ratio)
     frequencies = np.abs(location.orders * location.speed_rpm[:, None]) / 60.0
-    near = np.abs(frequencies / stray.frequency - 1.0) < _HALF_WIDTH
-    vibration = np.where(near[:, None], size, 0.0)
+    at_frequency = np.abs(frequencies / stray.frequency - 1.0) < _HALF_WIDTH
+    vibration = np.where(at_frequency[:, None], size, 0.0)
     words = f"At a fixed frequency of {stray.frequency:.3g} Hz, whatever the speed"
     if vibration.any():
         words += f", in {_channels(vibration.sum(axis=(0, 2)))}"
-    rest = size - vibration
-    return f"{words}." + (f" {_orders(location, rest, ratio)}" if _matters(rest, size) else "")
+    beyond = size - vibration
+    return f"{words}." + (f" {_orders(location, beyond, ratio)}" if _matters(beyond, size) else "")
 
 
-def _matters(rest: Values, size: Values) -> bool:
-    return bool(rest.sum() > _MINOR * size.sum())
+def _matters(remaining: Values, size: Values) -> bool:
+    return bool(remaining.sum() > _MINOR * size.sum())
 
 
 def _orders(location: Location, size: Values, ratio: float) -> str:
@@ -99,9 +99,9 @@ def _orders(location: Location, size: Values, ratio: float) -> str:
         channels = _channels(size[:, :, place].sum(axis=0))
         by_channels.setdefault(channels, []).append(_order(location, place, ratio))
     parts = [f"at {listed(orders)} in {channels}" for channels, orders in by_channels.items()]
-    more = np.count_nonzero(size.any(axis=(0, 1))) - len(shown)
-    if more:
-        parts.append(f"less at {more} further order{'s' if more > 1 else ''}")
+    remaining = np.count_nonzero(size.any(axis=(0, 1))) - len(shown)
+    if remaining:
+        parts.append(f"less at {remaining} further order{'s' if remaining > 1 else ''}")
     words = "; ".join(parts)
     return f"{words[0].upper()}{words[1:]}."
 
@@ -126,8 +126,12 @@ def _order(location: Location, place: int, ratio: float) -> str:
 def _channels(size: Values) -> str:
     """Return the channels whose misfit (4,) matters."""
     least = _MINOR * _weight(size[:, None])[0] / max(np.count_nonzero(size[:3]), 1)
-    found = [name for name, one in zip(_WORDS, size, strict=True) if one > 0.0 and one >= least]
-    return "all channels" if len(found) == len(_WORDS) else f"the {listed(found)}"
+    names = [
+        name
+        for name, channel_size in zip(_WORDS, size, strict=True)
+        if channel_size > 0.0 and channel_size >= least
+    ]
+    return "all channels" if len(names) == len(_WORDS) else f"the {listed(names)}"
 
 
 def _growth(location: Location, broad: bool) -> str:
@@ -137,12 +141,12 @@ def _growth(location: Location, broad: bool) -> str:
     conditions = location.speed_rpm, location.load_torque
     if broad:
         lines = location.misfit[:, channel, 1:], location.noise[:, channel, 1:]
-        found = trends(*broad_band(*lines), *conditions, location.rules)
-        return f"The {_WORDS[channel]} there {in_words(found)}"
+        by_condition = trends(*broad_band(*lines), *conditions, location.rules)
+        return f"The {_WORDS[channel]} there {in_words(by_condition)}"
     cell = location.misfit[:, channel, order], location.noise[:, channel, order]
     what = "mean" if order == 0 else f"line of order {location.orders[order]:.4g}"
-    found = trends(*cell, *conditions, location.rules)
-    return f"The misfit of the {_WORDS[channel]} ({what}) {in_words(found)}"
+    by_condition = trends(*cell, *conditions, location.rules)
+    return f"The misfit of the {_WORDS[channel]} ({what}) {in_words(by_condition)}"
 
 
 def _beyond(location: Location, ratio: float) -> str:
@@ -159,7 +163,7 @@ def _beyond(location: Location, ratio: float) -> str:
 def _trusted(location: Location, ratio: float) -> str:
     """Return channels, orders and records that the believed model meets within the noise.
 
-    Nothing is flagged in them, and the gaps of their cells together are those of noise.
+    Nothing is flagged in them, and the errors of their cells together are those of noise.
     """
     flagged, within = location.flagged, location.within_noise
     if not flagged.any() and within.everywhere:

@@ -53,7 +53,7 @@ class MeasuredData(WhitenedBalances):
         return frozenset()
 
     @property
-    def remainder(self) -> float:
+    def model_error_share(self) -> float:
         """Share of the base's excess up to which a residual is attributed to no effect."""
         return self.rules.mechanism_remainder
 

@@ -52,7 +52,7 @@ class Data(Observations):
     evident: frozenset[str] = frozenset()
 
     @property
-    def remainder(self) -> float:
+    def model_error_share(self) -> float:
         """Share of the base's excess up to which a residual counts as the model's own error."""
         return self.rules.model_accuracy**2
 
@@ -133,13 +133,13 @@ class Data(Observations):
         if (data := self.held_out) is None:
             return None
         if not self.creep:
-            return data._vote(base, fitted)
+            return data._held_out_test(base, fitted)
         settled = replace(data.features.conditions, fading=None)
         versions = data, replace(data, features=replace(data.features, conditions=settled))
-        votes = [version._vote(base, fitted) for version in versions]
-        return max(votes, key=lambda vote: (vote.before - vote.after) / max(vote.change, 1e-300))
+        tests = [version._held_out_test(base, fitted) for version in versions]
+        return max(tests, key=lambda test: (test.before - test.after) / max(test.change, 1e-300))
 
-    def _vote(self, base: Fit, fitted: Fit) -> HeldOutTest:
+    def _held_out_test(self, base: Fit, fitted: Fit) -> HeldOutTest:
         """Return what these records say of two fits."""
         before, after = (
             self.whiten(

@@ -200,6 +200,7 @@ def scores():
 
 
 class TestStoredOutcome:
+    @pytest.mark.nightly
     def test_it_is_what_a_run_gives_today(self, scores):
         """On a processor that rounds otherwise a few runs end as other seeds do."""
         front = robust_problem("calibrated").pareto_front()

@@ -297,6 +297,7 @@ def test_visibility_counts_neither_what_a_base_fit_absorbs_nor_a_straight_sweep(
     assert line == pytest.approx(effect.size, rel=2e-3)
 
 
+@pytest.mark.nightly
 def test_a_gap_that_varies_must_differ_visibly_from_one_that_does_not():
     conditions = tuple(replace(RATED, load=load) for load in (20.0, 40.0, 0.0))
     about = draw_circumstances(np.random.default_rng(2), conditions=conditions)

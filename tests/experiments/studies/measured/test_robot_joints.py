@@ -46,6 +46,7 @@ def test_dry_friction_of_a_robot_joint_is_found(name, dry, viscous):
         assert found == pytest.approx(dry + viscous * speed, rel=0.05)
 
 
+@pytest.mark.nightly
 def test_gravity_of_a_robot_joint_is_found_beside_its_friction():
     verdict, _ = verdict_on("ur10e_joint_4")
     assert verdict.status == "named"

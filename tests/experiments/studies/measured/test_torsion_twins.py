@@ -9,7 +9,10 @@ from experiments.studies.measured.rigs import MEASURED, RIGS
 from pymoo_hdte.discrepancy._evidence.force_balances.joint_halves import joint_of, torsion_half
 from pymoo_hdte.discrepancy._records.rig_files import read_rig
 from pymoo_hdte.discrepancy._report.torsion import torsion_document
-from pymoo_hdte.discrepancy._verdicts.held_out_torsion import torsion_gaps, voted
+from pymoo_hdte.discrepancy._verdicts.held_out_torsion import (
+    torsion_after_held_out_test,
+    torsion_errors,
+)
 from pymoo_hdte.discrepancy._verdicts.joint import JointFinding
 from pymoo_hdte.discrepancy._verdicts.joint_torsion import examine_torsion
 from pymoo_hdte.drive._effects.static_error import KinematicTorsion
@@ -55,12 +58,12 @@ def twin(record, law, cutoff, generator):
 
 
 def examined(law):
-    """Return the finding on the twins of all records, and the verdict with the held-out vote."""
+    """Return the finding on the twins of all records, and the verdict after the held-out test."""
     joint, records, cutoff = measured()
     generator = np.random.default_rng(3)
     twins = [twin(one, law, cutoff, generator) for one in records]
     finding = examine_torsion(torsion_half(joint, twins, ()), joint, cutoff)
-    return finding, voted(finding, torsion_gaps(finding))
+    return finding, torsion_after_held_out_test(finding, torsion_errors(finding))
 
 
 def test_a_twin_with_nothing_missing_is_adequate():

@@ -79,6 +79,7 @@ def test_an_input_is_a_pure_function_of_kind_and_number():
     assert original == KINDS["duty cycle"].original()
 
 
+@pytest.mark.nightly
 def test_every_mutation_is_drawn_and_leaves_nothing_but_files(tmp_path):
     names = set()
     for number in range(600):

@@ -234,6 +234,7 @@ def test_the_whole_has_what_is_stored_and_more():
     assert all(run.key in stored for run in BBOB_RUNS)
 
 
+@pytest.mark.nightly
 def test_the_stored_outcome_gives_the_report_and_repeats(tmp_path):
     result = experiment.run(Context(1, tmp_path, Campaign(tmp_path)))
     assert result.answer

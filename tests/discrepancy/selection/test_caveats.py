@@ -50,8 +50,8 @@ def fit_of(chi_square_per_degree, candidates, base=(), values=()):
     )
 
 
-def doubts(chi_square_per_degree, *candidates, base=(), values=()):
-    """Doubts about a set that leaves so much, with no held-out record."""
+def caveats(chi_square_per_degree, *candidates, base=(), values=()):
+    """Caveats of a set that leaves so much, with no held-out record."""
     fitted = fit_of(chi_square_per_degree, candidates, base, values)
     quiet = chi_square_per_degree < 1.1
     search = SimpleNamespace(
@@ -79,7 +79,7 @@ FREED = one("parameter:damping", exact=True, releases="damping")
 )
 def test_values_beside_a_curve_that_does_not_quite_fit_are_not_certain(left, candidates, doubtful):
     """A rational fall of a friction was named Stribeck's with a damping that had not changed."""
-    assert bool(doubts(left, *candidates)) == doubtful
+    assert bool(caveats(left, *candidates)) == doubtful
 
 
 CLEARANCE = one("clearance_variation:mesh@2", exact=False)
@@ -101,18 +101,18 @@ CLEARANCE = one("clearance_variation:mesh@2", exact=False)
 def test_a_harmonic_of_another_effect_is_not_certain(left, label, doubtful):
     """A clearance with a harmonic was named with a kinematic error of order 4."""
     line = one(label, exact=True)
-    assert bool(doubts(left, CLEARANCE, line)) == doubtful
-    assert bool(doubts(left, line, CLEARANCE)) == doubtful
+    assert bool(caveats(left, CLEARANCE, line)) == doubtful
+    assert bool(caveats(left, line, CLEARANCE)) == doubtful
 
 
 @pytest.mark.parametrize(
     ("prior", "value", "doubtful"),
     [(0.1, 1.0, True), (0.1, 0.9, False), (0.5, 1.0, False), (np.inf, 1.0, False)],
 )
-def test_a_sensor_far_beyond_what_is_stated_of_it_is_a_doubt(prior, value, doubtful):
+def test_a_sensor_far_beyond_what_is_stated_of_it_is_a_caveat(prior, value, doubtful):
     """Friction of the load that begins slowly was named with a dry one and a zero of ten times."""
     zero = Parameter("output_torque_zero", 0.0, -1.0, 1.0, 0.1, prior=prior)
-    assert bool(doubts(1.0, FRICTION, base=(zero,), values=(value,))) == doubtful
+    assert bool(caveats(1.0, FRICTION, base=(zero,), values=(value,))) == doubtful
 
 
 @pytest.mark.parametrize(
@@ -125,7 +125,7 @@ def test_a_sensor_far_beyond_what_is_stated_of_it_is_a_doubt(prior, value, doubt
         (0.05, True, ("free",), True),
     ],
 )
-def test_a_sensor_s_value_is_no_doubt_only_where_the_forms_of_all_laws_explain_it(
+def test_a_sensor_s_value_is_no_caveat_only_where_the_forms_of_all_laws_explain_it(
     zero, free_leaves_noise, fewer_do, doubtful
 ):
     """With 0.9, nine deviations, it is no longer at its bound, and as doubtful."""
@@ -155,10 +155,10 @@ def test_a_sensor_s_value_is_no_doubt_only_where_the_forms_of_all_laws_explain_i
     assert bool(reasons_of(search, chosen, None)) == doubtful
 
 
-def test_what_is_left_in_multiples_of_the_noise_is_a_doubt():
+def test_what_is_left_in_multiples_of_the_noise_is_a_caveat():
     limit = RULES.contradicting_chi_square
-    assert not doubts(0.99 * limit, LINE)
-    assert doubts(1.01 * limit, LINE)
+    assert not caveats(0.99 * limit, LINE)
+    assert caveats(1.01 * limit, LINE)
 
 
 def law(name, *, bounded=False, chi_square=1000.0):
@@ -482,8 +482,8 @@ def denials(change, share, misfit=1.0):
     predicted[0] = np.sqrt(change)
     measured = share * predicted + misfit**0.5 * rng.normal(size=(4000, 40))
     before, after = (np.sum((measured - one) ** 2, axis=1) for one in (0.0, predicted))
-    votes = [HeldOutTest(*pair, change) for pair in zip(before, after, strict=True)]
-    return np.mean([one.denies(RULES, misfit) for one in votes])
+    held_out_tests = [HeldOutTest(*pair, change) for pair in zip(before, after, strict=True)]
+    return np.mean([one.denies(RULES, misfit) for one in held_out_tests])
 
 
 @pytest.mark.parametrize("misfit", [1.0, 4.0])

@@ -38,7 +38,7 @@ def grows(
 
 
 @dataclass(frozen=True)
-class Gap:
+class PredictionError:
     """Root mean squares of measured minus predicted, in ``unit``.
 
     Attributes
@@ -76,13 +76,13 @@ class Gap:
 
     @property
     def shrinkage(self) -> float | None:
-        """1 - (after - floor) / (before - floor), or None where there was no gap to shrink."""
+        """1 - (after - floor) / (before - floor), or None where there was no error to shrink."""
         excess = self.before - self.noise_floor
         if excess <= self.rules.least_gap_share * self.noise_floor:
             return None
         return 1.0 - (self.after - self.noise_floor) / excess
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the gap as plain values."""
+        """Return the error as plain values."""
         sizes = {name: getattr(self, name) for name in ("before", "after", "noise_floor", "unit")}
         return sizes | {"shrinkage": self.shrinkage, "reduction": self.reduction}

@@ -10,8 +10,8 @@ from pymoo_hdte.discrepancy._evidence.order_lines.candidates import out_of_toler
 from pymoo_hdte.discrepancy._selection.excess import HeldOutTest
 from pymoo_hdte.discrepancy._selection.reason import HELD_OUT_ERROR_GROWS, NOT_VALIDATED, Reason
 from pymoo_hdte.discrepancy._selection.rules import RULES
-from pymoo_hdte.discrepancy._verdicts.gap import Gap, grows
-from pymoo_hdte.discrepancy._verdicts.held_out_torsion import without_unproved_lines
+from pymoo_hdte.discrepancy._verdicts.held_out_torsion import without_unvalidated_lines
+from pymoo_hdte.discrepancy._verdicts.prediction_error import PredictionError, grows
 
 FIT = SimpleNamespace(misfit=1.0)
 
@@ -23,17 +23,17 @@ def verdict(status, probability=RULES.named_right):
 
 @pytest.mark.parametrize("status", ["named", "parameter"])
 def test_an_error_that_grows_leaves_no_unqualified_status(status):
-    found = verdict(status).proven(worse={"output torque": 1.5})
+    found = verdict(status).after_held_out_test(worse={"output torque": 1.5})
     assert found.status == "partial"
     assert found.reasons == (Reason.of(HELD_OUT_ERROR_GROWS, numbers={"output torque": 1.5}),)
     # As probable as other partial verdicts are.
     assert found.probability == pytest.approx(RULES.partial_right)
-    assert verdict(status).proven().status == status
+    assert verdict(status).after_held_out_test().status == status
 
 
 @pytest.mark.parametrize("status", ["named", "parameter", "class", "partial"])
 def test_a_model_that_is_not_to_be_used_is_not_offered(status):
-    found = verdict(status).proven(worse={"overall": 1.5}, condemned=True)
+    found = verdict(status).after_held_out_test(worse={"overall": 1.5}, condemned=True)
     assert (found.status, found.probability) == ("unlisted", None)
     assert found.has_reason(NOT_VALIDATED)
     assert found.accepted is found.base
@@ -66,13 +66,13 @@ def test_a_growth_within_the_noise_of_the_metric_is_none():
     assert grows(0.676, 0.713, 0.592, 0.0)
     deviation = (0.713**2 - 0.676**2) / 0.5
     assert not grows(0.676, 0.713, 0.592, deviation)
-    assert not Gap(0.676, 0.713, 0.592, "arcsec", chance=deviation).worse
+    assert not PredictionError(0.676, 0.713, 0.592, "arcsec", chance=deviation).worse
     assert not grows(0.2, 0.62, 0.592, 0.0)
 
 
 def test_noise_makes_one_of_several_errors_grow_as_seldom_as_one(rng):
     """Of nine errors one grew by 2.1 deviations, and a right name went."""
-    rises = rng.standard_normal((4_000, 9))
+    rises = rng.standard_normal((1_000, 9))
     after = np.sqrt(4.0 + 0.1 * rises)
     together = [any(grows(2.0, one, 1.0, 0.1, among=9) for one in row) for row in after]
     assert np.mean(together) < 0.04
@@ -101,15 +101,15 @@ def line(order, side):
         (7.0, 0.0, 0.5, True),
         (7.0, 1.0, 0.5, False),
         (7.0, 0.0, 1.01, False),
-        # Of other laws the bounds and the proof are judged elsewhere.
+        # Of other laws the bounds and the validation are judged elsewhere.
         (None, 1.0, 1.1, True),
     ],
 )
-def test_an_order_at_its_bound_or_without_proof_is_not_named(order, side, after, named):
+def test_an_order_at_its_bound_or_without_validation_is_not_named(order, side, after, named):
     chosen, other = line(order, side), line(2.0, 0.0)
     found = made_verdict("partial", FIT, chosen, (other,), freedom=100)
-    gap = SimpleNamespace(before=1.0, after=after)
-    found = without_unproved_lines(found, chosen.fit, [gap])
+    error = SimpleNamespace(before=1.0, after=after)
+    found = without_unvalidated_lines(found, chosen.fit, [error])
     assert (found.chosen is chosen) == named
     assert (found.status == "partial") == named
     assert chosen not in found.alternatives

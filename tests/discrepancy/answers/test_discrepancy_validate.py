@@ -1,4 +1,4 @@
-"""Revised models and the proof on held-out records."""
+"""Revised models and the validation on held-out records."""
 
 from dataclasses import fields, replace
 
@@ -13,7 +13,7 @@ from pymoo_hdte.discrepancy._answers.revision_drive import drive_model, revised_
 from pymoo_hdte.discrepancy._evidence.order_lines.parameters import base_parameters
 from pymoo_hdte.discrepancy._evidence.order_lines.prediction import coefficients_of
 from pymoo_hdte.discrepancy._selection.fitting import Fit
-from pymoo_hdte.discrepancy._verdicts.validation_drive import Gap, prove
+from pymoo_hdte.discrepancy._verdicts.validation_drive import PredictionError, validate_drive
 from pymoo_hdte.drive import load_datasheet, load_model
 from pymoo_hdte.drive.toml_text import model_toml, sheet_toml
 from pymoo_hdte.units import ARCSEC
@@ -110,52 +110,57 @@ def _of_ratio(campaign, ratio):
     return replace(campaign, believed=believed, running=(turned,), torsion=())
 
 
-def test_gap_shrinks_to_the_noise_where_the_effect_is_named(ripple):
-    proof = prove(ripple)
-    torque = proof.channels["input_torque"]
+def test_error_shrinks_to_the_noise_where_the_effect_is_named(ripple):
+    validation = validate_drive(ripple)
+    torque = validation.channels["input_torque"]
     assert torque.before > 10.0 * torque.noise_floor
     assert torque.after < 1.5 * torque.noise_floor
     assert torque.shrinkage > 0.97
-    assert proof.overall.after < 1.3
+    assert validation.overall.after < 1.3
     # The ripple stands at order 6 and nowhere else.
-    line = proof.by_order[1 + ORDERS.index(6.0)]
-    assert line.before == max(gap.before for gap in proof.by_order)
-    assert proof.records == tuple(record.name for record in ripple.campaign.held_out)
+    line = validation.by_order[1 + ORDERS.index(6.0)]
+    assert line.before == max(error.before for error in validation.by_order)
+    assert validation.records == tuple(record.name for record in ripple.campaign.held_out)
 
 
 def test_nothing_changes_where_nothing_is_named(clean):
-    proof = prove(clean)
-    for gap in (*proof.channels.values(), *proof.by_record, *proof.by_order, proof.overall):
-        assert gap.before == gap.after
-    assert proof.overall.shrinkage is None
+    validation = validate_drive(clean)
+    for error in (
+        *validation.channels.values(),
+        *validation.by_record,
+        *validation.by_order,
+        validation.overall,
+    ):
+        assert error.before == error.after
+    assert validation.overall.shrinkage is None
 
 
-def test_parts_add_up_to_the_gap(ripple):
-    proof = prove(ripple)
+def test_parts_add_up_to_the_error(ripple):
+    validation = validate_drive(ripple)
     for part in ("before", "after", "noise_floor"):
-        whole = getattr(proof.channels["transmission_error"], part) ** 2
-        by_record = [getattr(gap, part) ** 2 for gap in proof.by_record]
-        by_order = [getattr(gap, part) ** 2 for gap in proof.by_order]
+        whole = getattr(validation.channels["transmission_error"], part) ** 2
+        by_record = [getattr(error, part) ** 2 for error in validation.by_record]
+        by_order = [getattr(error, part) ** 2 for error in validation.by_order]
         assert np.mean(by_record) == pytest.approx(whole)
         assert np.sum(by_order) == pytest.approx(whole)
 
 
-def test_gap_is_the_root_mean_square_over_a_period(ripple):
-    proof = prove(ripple)
+def test_error_is_the_root_mean_square_over_a_period(ripple):
+    validation = validate_drive(ripple)
     data, fitted = ripple.held_out, ripple.verdict.chosen.fit
     predicted = data.predict(fitted.values[None, : len(data.base)], fitted.effects)[0]
     # All orders close over 50 input turns.
     angle = 2.0 * np.pi * 50.0 * np.arange(4000) / 4000.0
-    for record, gap in enumerate(proof.by_record):
+    for record, error in enumerate(validation.by_record):
         difference = (data.features.values - predicted)[record]
         parts = difference[data.features.places(0)]
         waves = np.exp(1j * np.outer(ORDERS, angle))
         signal = difference[0] + ((parts[:, 0] + 1j * parts[:, 1]) @ waves).real
-        assert gap.after == pytest.approx(np.sqrt(np.mean(signal**2)) / ARCSEC, rel=1e-9)
+        assert error.after == pytest.approx(np.sqrt(np.mean(signal**2)) / ARCSEC, rel=1e-9)
 
 
 def test_overlay_shows_the_record_that_was_measured(ripple):
-    error, torque = prove(ripple).overlays
+    error, torque = validate_drive(ripple).overlays
     for shown in (error, torque):
         assert (shown.turns[0], shown.turns[-1]) == (0.0, 2.0)
         curve = np.interp(shown.sample_turns, shown.turns, shown.measured)
@@ -166,21 +171,21 @@ def test_overlay_shows_the_record_that_was_measured(ripple):
 
 
 def test_overlay_begins_where_a_turn_of_the_record_does(ripple):
-    proof = prove(ripple)
-    (record,) = (one for one in ripple.campaign.held_out if one.name == proof.worst)
+    validation = validate_drive(ripple)
+    (record,) = (one for one in ripple.campaign.held_out if one.name == validation.worst)
     row = np.abs(np.diff(record.input_angle)).max() / (2.0 * np.pi)
-    for shown in proof.overlays:
+    for shown in validation.overlays:
         # Both turns are covered by samples from end to end.
         assert np.diff([0.0, *np.sort(shown.sample_turns), 2.0]).max() <= 1.01 * row
 
 
 def test_the_worst_record_is_that_of_the_largest_multiple_of_its_noise(ripple):
-    data, worst = ripple.held_out, prove(ripple).worst
+    data, worst = ripple.held_out, validate_drive(ripple).worst
     place = [record.name for record in data.features.records].index(worst)
     covariance = data.features.covariance.copy()
     covariance[place] *= 1e6
     drowned = replace(data, features=replace(data.features, covariance=covariance))
-    assert prove(_With(ripple, drowned)).worst != worst
+    assert validate_drive(_With(ripple, drowned)).worst != worst
 
 
 def test_the_worst_record_is_not_one_that_the_base_predicts(ripple):
@@ -191,13 +196,13 @@ def test_the_worst_record_is_not_one_that_the_base_predicts(ripple):
         # Here the base is right, and the ripple that the revised model adds is not.
         values[place] = predicted[place]
         followed = replace(data, features=replace(data.features, values=values))
-        assert prove(_With(ripple, followed)).worst != record.name
+        assert validate_drive(_With(ripple, followed)).worst != record.name
 
 
 def test_statistics_are_relative_to_what_was_measured(ripple):
-    proof = prove(ripple)
-    measured = proof.dte[0]
-    for predicted, metrics in zip(proof.dte[1:], proof.metrics, strict=True):
+    validation = validate_drive(ripple)
+    measured = validation.dte[0]
+    for predicted, metrics in zip(validation.dte[1:], validation.metrics, strict=True):
         relative = 100.0 * np.mean(np.abs(predicted - measured) / measured)
         assert metrics.mape_percent == pytest.approx(relative)
         assert metrics.mean_error == pytest.approx(np.mean(predicted - measured))
@@ -213,10 +218,10 @@ def test_floor_is_what_a_perfect_model_leaves(clean, rng):
     for _ in range(100):
         noise = np.einsum("rij,rj->ri", held_out.whiteners, rng.standard_normal(perfect.shape))
         noisy = replace(held_out, features=replace(held_out.features, values=perfect + noise))
-        proof = prove(_With(clean, noisy))
-        gaps = [*proof.channels.values(), proof.overall]
-        squares.append([gap.after**2 for gap in gaps])
-        floors.append([gap.noise_floor**2 for gap in gaps])
+        validation = validate_drive(_With(clean, noisy))
+        errors = [*validation.channels.values(), validation.overall]
+        squares.append([error.after**2 for error in errors])
+        floors.append([error.noise_floor**2 for error in errors])
     assert np.mean(squares, axis=0) == pytest.approx(np.mean(floors, axis=0), rel=0.1)
 
 
@@ -228,31 +233,31 @@ class _With:
         self.held_out = data
 
 
-def test_without_held_out_records_there_is_no_proof(clean):
+def test_without_held_out_records_there_is_no_validation(clean):
     campaign = replace(clean.campaign, running=clean.campaign.train)
-    assert prove(replace(clean, data=replace(clean.data, campaign=campaign))) is None
+    assert validate_drive(replace(clean, data=replace(clean.data, campaign=campaign))) is None
 
 
-def test_one_held_out_record_has_gaps_but_no_statistics(ripple):
+def test_one_held_out_record_has_errors_but_no_statistics(ripple):
     campaign = ripple.campaign
     running = (*campaign.train, campaign.held_out[0])
     fewer = replace(campaign, running=running)
-    proof = prove(replace(ripple, data=replace(ripple.data, campaign=fewer)))
-    assert proof.metrics is None
-    assert proof.channels["input_torque"].shrinkage > 0.9
+    validation = validate_drive(replace(ripple, data=replace(ripple.data, campaign=fewer)))
+    assert validation.metrics is None
+    assert validation.channels["input_torque"].shrinkage > 0.9
 
 
 def test_shrinkage_counts_from_the_floor():
-    assert Gap(5.0, 1.0, 1.0, "arcsec").shrinkage == 1.0
-    assert Gap(5.0, 5.0, 1.0, "arcsec").shrinkage == 0.0
-    assert Gap(5.0, 3.0, 1.0, "arcsec").shrinkage == 0.5
-    assert Gap(5.0, 3.0, 1.0, "arcsec").reduction == pytest.approx(0.4)
-    assert Gap(1.05, 1.0, 1.0, "arcsec").shrinkage is None
+    assert PredictionError(5.0, 1.0, 1.0, "arcsec").shrinkage == 1.0
+    assert PredictionError(5.0, 5.0, 1.0, "arcsec").shrinkage == 0.0
+    assert PredictionError(5.0, 3.0, 1.0, "arcsec").shrinkage == 0.5
+    assert PredictionError(5.0, 3.0, 1.0, "arcsec").reduction == pytest.approx(0.4)
+    assert PredictionError(1.05, 1.0, 1.0, "arcsec").shrinkage is None
 
 
 def test_peak_to_peak_is_that_of_the_measured_signal(clean):
-    proof = prove(clean)
-    for record, measured in zip(clean.campaign.held_out, proof.dte[0], strict=True):
+    validation = validate_drive(clean)
+    for record, measured in zip(clean.campaign.held_out, validation.dte[0], strict=True):
         error = record.transmission_error(BELIEVED.ratio) / ARCSEC
         # The extremes of about 3000 raw samples carry noise of about 1 arcsec.
         assert measured < np.ptp(error) < measured + 9.0
