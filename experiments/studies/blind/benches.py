@@ -14,6 +14,7 @@ from collections.abc import Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -54,9 +55,10 @@ def nuisances_of(bench: str) -> Nuisances:
     if not given:
         return alone
     try:
-        return replace(alone, **{GROUPS[group][0]: float(number)})
+        changed: dict[str, Any] = {GROUPS[group][0]: float(number)}
     except ValueError:
         raise InvalidInput("bench", bench, f"{group}= and a number") from None
+    return replace(alone, **changed)
 
 
 @dataclass(frozen=True)
@@ -107,7 +109,7 @@ class Comparison:
     @property
     def wrong(self) -> frozenset[str]:
         """Names that are given on the other bench only, and are not hidden."""
-        return set(self.real.names) - self.real.hidden - frozenset(self.ideal.names)
+        return frozenset(self.real.names) - self.real.hidden - frozenset(self.ideal.names)
 
 
 def compare(cases: Sequence[Case], benches: Sequence[str], campaign: Campaign) -> list[Comparison]:
