@@ -26,6 +26,7 @@ from experiments.studies.blind.data import outcome
 from experiments.studies.blind.outcome import Outcome
 from experiments.studies.blind.rig.nuisances import GROUPS, LEVELS, MILD, Nuisances
 from experiments.studies.blind.scoring import COLUMNS, verdict_scores
+from experiments.studies.blind.truth import may_be_named
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy._verdicts.drive import examine_drive
 
@@ -108,8 +109,9 @@ class Comparison:
 
     @property
     def wrong(self) -> frozenset[str]:
-        """Names that are given on the other bench only, and are not hidden."""
-        return frozenset(self.real.names) - self.real.hidden - frozenset(self.ideal.names)
+        """Names that are given on the other bench only, and are wrong there."""
+        allowed = may_be_named(self.real.case) | set(self.ideal.names)
+        return frozenset(self.real.names) - allowed
 
 
 def compare(cases: Sequence[Case], benches: Sequence[str], campaign: Campaign) -> list[Comparison]:
