@@ -15,9 +15,13 @@ from experiments.studies.blind.rig.campaign import Shown, made_visible, restrict
 from experiments.studies.blind.rig.files import write_campaign_folder
 from experiments.studies.blind.rig.hidden import Drawn
 from experiments.studies.blind.rig.machine import Matrix
+from experiments.studies.blind.rig.nuisances import Nuisances, bench_with
 from experiments.studies.blind.rig.sensors import Sensors
 from experiments.studies.blind.rig.session import ARCSEC, SHEET, Circumstances, draw_circumstances
 from pymoo_hdte.discrepancy import Campaign, read_campaign
+
+IDEAL = Nuisances()
+"""A bench without any nuisance."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +36,9 @@ class Hiding:
     effects : tuple of Drawn
         At the sizes that are hidden.
     session, twin : Shown
-        What sensors without noise show with the effects and without them.
+        What sensors without noise show with the effects and without them, on the same bench.
+    nuisances : Nuisances
+        That the bench has.
     """
 
     case: Case
@@ -40,6 +46,7 @@ class Hiding:
     effects: tuple[Drawn, ...]
     session: Shown
     twin: Shown
+    nuisances: Nuisances = IDEAL
 
     @property
     def quantities(self) -> Mapping[tuple[str, str], float]:
@@ -51,8 +58,12 @@ class Hiding:
         }
 
 
-def hiding(case: Case) -> Hiding:
-    """Run the session of a case: each effect at a size at which it alone is visible."""
+def hiding(case: Case, nuisances: Nuisances = IDEAL) -> Hiding:
+    """Run the session of a case: each effect at a size at which it alone is visible.
+
+    Sizes are those of the ideal bench, so that benches with and without nuisances hide the same. A
+    shaft that twists is left out beside an effect that has a third body too.
+    """
     about = draw_circumstances(case.generator("session"))
     about = stressed(about, case.stress, case.generator("stress"))
     twin = shown(about, ())
@@ -62,7 +73,13 @@ def hiding(case: Case) -> Hiding:
         effects.append(effect)
     if len(effects) > 1:
         session = shown(about, effects)
-    return Hiding(case, about, tuple(effects), session, twin)
+    if any(effect.hidden.third is not None for effect in effects):
+        nuisances = replace(nuisances, shaft_stiffness=0.0, shaft_damping=0.0)
+    if nuisances.groups:
+        about = bench_with(about, nuisances, lambda group: case.generator(f"nuisance {group}"))
+        twin = shown(about, ())
+        session = shown(about, effects) if effects else twin
+    return Hiding(case, about, tuple(effects), session, twin, nuisances)
 
 
 def rows_of(hidden: Hiding, session: Shown) -> tuple[list[Matrix], Matrix]:

@@ -51,6 +51,10 @@ WARMING = 49  # level; time, s; share that it loses
 RIPPLE = 60  # amplitude, N.m; order; phase; wave
 VIBRATION = 61  # amplitude, N.m; frequency, rad/s; phase
 LOAD_RIPPLE = 62  # share of the load; cycles per output turn; phase; wave
+# Of the bench; where a place is, it is the last value.
+GRAVITY = 63  # torque of the load, N.m; phase
+WANDER = 64  # share of the set speed; frequency, rad/s; phase; gains P and I of the loop
+COUPLING = 65  # torque, N.m; cycles per turn of its shaft; phase
 
 INPUT, OUTPUT = 0.0, 1.0
 

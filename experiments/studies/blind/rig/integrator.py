@@ -34,12 +34,16 @@ class Step(NamedTuple):
 
 
 class Readout(NamedTuple):
-    """Linear forms of states (n,) and torques (3,) that give what sensors see; see `LinearPart`."""
+    """Linear forms of states (n,) and torques (3,) that give what sensors see; see `LinearPart`.
+
+    ``shows_load`` is whether the load's own torque is part of what the output's sensor shows.
+    """
 
     motor: Values
     sensor: Values
     acceleration: Values
     acceleration_entry: Values
+    shows_load: bool
 
 
 def step_of(linear: LinearPart, length: float) -> Step:
@@ -73,7 +77,11 @@ def readout_of(linear: LinearPart) -> Readout:
     """Return what the sensors see of states and torques."""
     inertia = linear.sensor_inertia
     return Readout(
-        linear.motor, linear.sensor, inertia * linear.system[3], inertia * linear.entry[3]
+        linear.motor,
+        linear.sensor,
+        inertia * linear.system[3],
+        inertia * linear.entry[3],
+        linear.shows_load,
     )
 
 
@@ -168,7 +176,7 @@ def read_torques(
 ) -> tuple[float, float]:
     """Return the torques of motor and sensor, N.m."""
     # A rigid sensor carries the load and what accelerates it, one that gives way only its twist.
-    sensed = f[LOAD] if plant.load_row == 1 else 0.0
+    sensed = f[LOAD] if readout.shows_load else 0.0
     for i in range(len(y)):
         motor += readout.motor[i] * y[i]
         sensed += (readout.sensor[i] + readout.acceleration[i]) * y[i]

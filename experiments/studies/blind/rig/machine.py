@@ -72,6 +72,8 @@ class Machine:
         Time constant of the motor's torque, s.
     error_offset : float
         Constant of the static error, rad.
+    sensor_at_brake : bool
+        Whether the load's inertia turns before the torque sensor, and not behind it.
     """
 
     ratio: float
@@ -91,6 +93,7 @@ class Machine:
     third: ThirdBody | None = None
     lag: float = 0.0
     error_offset: float = field(default=0.0)
+    sensor_at_brake: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,6 +112,8 @@ class LinearPart:
         Inertia whose acceleration b'' adds to what the sensor shows, kg.m2.
     load_row : int
         Row of the load's torque in f.
+    shows_load : bool
+        Whether the sensor shows the load's torque itself.
     """
 
     system: Matrix
@@ -117,6 +122,7 @@ class LinearPart:
     sensor: Values
     sensor_inertia: float
     load_row: int
+    shows_load: bool
 
 
 def linear_part(machine: Machine) -> LinearPart:
@@ -154,4 +160,8 @@ def linear_part(machine: Machine) -> LinearPart:
         system[last] = command / machine.lag
         system[last, last] -= 1.0 / machine.lag
     load_row = 2 if third is not None and third.kind == SENSOR else 1
-    return LinearPart(system, entry, motor, coupling, sensor_inertia, load_row)
+    if machine.sensor_at_brake:
+        # Nothing that accelerates stands behind the sensor.
+        coupling, sensor_inertia = np.zeros(size), 0.0
+    shows_load = load_row == 1 or machine.sensor_at_brake
+    return LinearPart(system, entry, motor, coupling, sensor_inertia, load_row, shows_load)

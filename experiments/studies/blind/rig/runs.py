@@ -71,7 +71,11 @@ class Condition:
     @property
     def substeps(self) -> int:
         """Steps of the integrator between raw samples."""
-        longest = min(LONGEST_STEP, FINEST / (HIGHEST_ORDER * abs(self.speed)))
+        return self.substeps_for(HIGHEST_ORDER)
+
+    def substeps_for(self, order: float) -> int:
+        """Return the steps between raw samples where lines have orders up to this one."""
+        longest = min(LONGEST_STEP, FINEST / (order * abs(self.speed)))
         return max(1, math.ceil(1.0 / (self.rate * longest) - 1e-9))
 
 
@@ -93,6 +97,9 @@ def plant_of(
         True load (N.m), input angle (rad) and time of the session (s) at the first sample.
     """
     rows, speed = table(machine.elements), condition.speed
+    # Beyond half the sampling rate inertia swallows a ripple, and sensors filter what is left.
+    heard = (rows[:, 0] != el.RIPPLE) | (rows[:, 2] * abs(speed) < math.pi * condition.rate)
+    rows = rows[heard]
     held = load / machine.ratio + machine.input_damping * speed
     held += machine.output_damping * speed / machine.ratio**2
     plant = Plant(
@@ -147,7 +154,11 @@ def run(
     """
     linear = linear_part(machine)
     plant = plant_of(machine, linear, condition, load, start, clock)
+    ripples = plant.rows[plant.rows[:, 0] == el.RIPPLE, 2]
+    finest = float(ripples.max(initial=0.0))
     substeps = condition.substeps * refined
+    if finest > HIGHEST_ORDER:
+        substeps = condition.substeps_for(finest) * refined
     modes = np.abs(np.linalg.eigvals(linear.system).real)
     settling = max(
         SETTLED / modes[modes > 1e-6].min(), SETTLED_TURNS * 2.0 * math.pi / abs(condition.speed)

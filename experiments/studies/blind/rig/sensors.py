@@ -56,6 +56,51 @@ class Drift:
 
 
 @dataclass(frozen=True)
+class ZeroDrift:
+    """Zeros of the torque sensors that run away, N.m, with one time constant, s."""
+
+    input: float
+    output: float
+    time: float
+
+    def at(self, clock: Values) -> Matrix:
+        """Return the zeros at times (n,) of the session, N.m, shape (2, n)."""
+        return np.outer([self.input, self.output], -np.expm1(-clock / self.time))
+
+
+@dataclass(frozen=True)
+class ZeroStep:
+    """New zeros of the output angle (rad) and of both torques (N.m) from a time (s) on."""
+
+    angle: float
+    input: float
+    output: float
+    since: float
+
+
+@dataclass(frozen=True)
+class Mount:
+    """A base of the output encoder that the load turns back.
+
+    ``compliance`` in rad/(N.m), ``frequency`` of its resonance in rad/s, ``damping`` as a ratio.
+    It is much stiffer than the drive, so that the drive does not feel it.
+    """
+
+    compliance: float
+    frequency: float
+    damping: float
+
+    def turned(self, torque: Values, rate: float) -> Values:
+        """Return by how much the angle shows too little, rad, as ``torque`` (n,) in steady state.
+
+        A record is one turn, so that its spectrum has all lines but those that miss a whole number.
+        """
+        s = 2j * np.pi * np.fft.rfftfreq(len(torque), 1.0 / rate) / self.frequency
+        answer = self.compliance / (1.0 + 2.0 * self.damping * s + s * s)
+        return np.fft.irfft(answer * np.fft.rfft(torque), len(torque))
+
+
+@dataclass(frozen=True)
 class Sensors:
     """The sensors of one bench.
 
@@ -73,6 +118,13 @@ class Sensors:
         Share by which the output's torque sensor shows too much at `FULL_SCALE`.
     scale : tuple of ScaleError
     drift : tuple of Drift
+    zero_drift : ZeroDrift or None
+    zero_step : ZeroStep or None
+    mount : Mount or None
+    ranges : tuple of float
+        Torques of input and output beyond which nothing more is shown, N.m; zero for no limit.
+    torque_steps : tuple of float
+        Resolution of both torques, N.m; zero for none.
     """
 
     angle_noise: float
@@ -85,8 +137,13 @@ class Sensors:
     curvature: float = 0.0
     scale: tuple[ScaleError, ...] = ()
     drift: tuple[Drift, ...] = ()
+    zero_drift: ZeroDrift | None = None
+    zero_step: ZeroStep | None = None
+    mount: Mount | None = None
+    ranges: tuple[float, float] = (0.0, 0.0)
+    torque_steps: tuple[float, float] = (0.0, 0.0)
 
-    def shown(self, seen: Matrix, clock: Values) -> Matrix:
+    def shown(self, seen: Matrix, clock: Values, rate: float) -> Matrix:
         """Return what the sensors would show without noise, as ``seen``.
 
         Parameters
@@ -95,6 +152,8 @@ class Sensors:
             Input angle, output angle, torques of motor and load; rad and N.m.
         clock : ndarray, shape (n,)
             Time of the session, s.
+        rate : float
+            Samples per second.
         """
         shown = seen.copy()
         for error in self.scale:
@@ -103,6 +162,20 @@ class Sensors:
             shown[1] += drift.at(clock)
         shown[2] = (1.0 + self.gains[0]) * seen[2] + self.zeros[0]
         shown[3] = self.load_shown(seen[3])
+        if self.mount is not None:
+            shown[1] -= self.mount.turned(seen[3], rate)
+        if self.zero_drift is not None:
+            shown[2:] += self.zero_drift.at(clock)
+        if self.zero_step is not None:
+            step = self.zero_step
+            shown[1:] += np.outer([step.angle, step.input, step.output], clock >= step.since)
+        return self._within(shown)
+
+    def _within(self, shown: Matrix) -> Matrix:
+        """Return channels (k, n), the torques last, that stay within the ranges."""
+        for row, limit in zip(shown[-2:], self.ranges, strict=True):
+            if limit:
+                np.clip(row, -limit, limit, out=row)
         return shown
 
     def load_shown(self, torque: Values) -> Values:
@@ -122,6 +195,10 @@ class Sensors:
         # A sensor without steps averages the same, drawn with fewer numbers.
         torques = rows_of(shown[2:], averaged)
         torques = torques + torque_noise[:, None] * rng.standard_normal(torques.shape)
+        torques = self._within(torques)
+        for row, height in zip(torques, self.torque_steps, strict=True):
+            if height:
+                row[:] = height * np.rint(row / height)
         return np.vstack([rows_of(angles, averaged), torques])
 
 

@@ -94,6 +94,18 @@ def _conditions() -> tuple[Condition, ...]:
 CONDITIONS = _conditions()
 
 
+@dataclass(frozen=True)
+class Warming:
+    """Viscous friction that falls by a ``share`` in the end, with a time constant ``time``, s."""
+
+    share: float
+    time: float
+
+    def left(self, clock: float) -> float:
+        """Return what is left of the friction at a time of the session, s."""
+        return 1.0 + self.share * math.expm1(-clock / self.time)
+
+
 @dataclass(frozen=True, eq=False)
 class Circumstances:
     """What chance decides of a session.
@@ -110,6 +122,8 @@ class Circumstances:
         What the phasor of each line of the static error has more in this record, rad.
     offsets : ndarray, shape (r,)
         The same of its constant, rad.
+    warming : Warming or None
+        Of the bench.
     """
 
     machine: Machine
@@ -120,9 +134,18 @@ class Circumstances:
     clocks: Values
     unrepeated: Matrix
     offsets: Values
+    warming: Warming | None = None
 
     def machine_in(self, record: int, machine: Machine) -> Machine:
-        """Return a machine with the static error that it has in a record."""
+        """Return a machine with the static error and the warmth that it has in a record."""
+        if self.warming is not None:
+            middle = 0.5 * self.conditions[record].duration(machine.ratio)
+            left = self.warming.left(float(self.clocks[record]) + middle)
+            machine = replace(
+                machine,
+                input_damping=left * machine.input_damping,
+                output_damping=left * machine.output_damping,
+            )
         phasors = np.array(machine.amplitudes) * np.exp(1j * np.array(machine.phases))
         phasors += self.unrepeated[record]
         return replace(
@@ -188,7 +211,7 @@ def running(about: Circumstances, record: int, machine: Machine, sensors: Sensor
     condition, clock = about.conditions[record], float(about.clocks[record])
     machine = about.machine_in(record, machine)
     seen = run(machine, condition, float(about.loads[record]), float(about.starts[record]), clock)
-    return sensors.shown(seen, clock + np.arange(seen.shape[1]) / condition.rate)
+    return sensors.shown(seen, clock + np.arange(seen.shape[1]) / condition.rate, condition.rate)
 
 
 def sweep_torque() -> Values:
@@ -207,6 +230,8 @@ def sweep(machine: Machine, sensors: Sensors) -> Matrix:
     torque = sweep_torque()
     angle = -locked_torsion(machine, torque, 1.0 / SWEEP_RATE)
     shown = angle.copy()
+    if sensors.mount is not None:
+        shown -= sensors.mount.compliance * torque
     for error in sensors.scale:
         shown += error.at(angle) - error.at(np.zeros(1))
     return np.array([shown, sensors.load_shown(torque)])

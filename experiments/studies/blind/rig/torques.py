@@ -335,6 +335,17 @@ def torques(
             load += row[1] * math.cos(row[2] * clock + row[3])
         elif kind == el.LOAD_RIPPLE:
             load += plant.load * row[1] * wave(row[4], row[2] * out_angle + row[3])[0]
+        elif kind == el.GRAVITY:
+            load += row[1] * math.sin(out_angle + row[2])
+        elif kind == el.WANDER:
+            # The loop follows a set speed and its integral, neither of which is quite even.
+            size, x = row[1] * plant.speed, row[2] * clock + row[3]
+            motor += size * (row[4] * math.cos(x) + row[5] / row[2] * math.sin(x))
+        elif kind == el.COUPLING:
+            if row[7] == el.OUTPUT:
+                on_output += row[1] * math.cos(row[2] * out_angle + row[3])
+            else:
+                on_input += row[1] * math.cos(row[2] * angle + row[3])
         elif kind >= el.DRY:
             if kind == el.MESH_FRICTION:
                 moved[e] = relaxed(memory[e], mesh, (time - since) / row[2])

@@ -1,0 +1,202 @@
+"""Paired blind campaigns: what a case is called on an ideal bench and on one with nuisances.
+
+``python -m experiments.studies.blind.benches --cases 3,11,24 --benches ideal,mild,lag,wander=4e-4``
+runs each case on each bench, goes on where it was interrupted, and prints alarms and lost names. A
+bench is ``ideal``, a level with all nuisances, or one group of them alone at the level ``mild``,
+whose leading number another one may replace.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections.abc import Sequence
+from contextlib import nullcontext
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from experiments.runner.campaign import Campaign, Run
+from experiments.runner.workers import make_executor
+from experiments.studies.blind.campaigns import IDEAL, campaign_of, hiding
+from experiments.studies.blind.cases import Case, all_cases
+from experiments.studies.blind.data import outcome
+from experiments.studies.blind.outcome import Outcome
+from experiments.studies.blind.rig.nuisances import GROUPS, LEVELS, MILD, Nuisances
+from experiments.studies.blind.scoring import COLUMNS, verdict_scores
+from experiments.studies.blind.truth import may_be_named
+from pymoo_hdte.checks import InvalidInput
+from pymoo_hdte.discrepancy._verdicts.drive import examine_drive
+
+IDEAL_BENCH = "ideal"
+ALONE = tuple(group for group in GROUPS if MILD.has(group))
+"""Groups that the level has, each a bench of its own."""
+
+
+def nuisances_of(bench: str) -> Nuisances:
+    """Return the nuisances of a bench by its name.
+
+    Raises
+    ------
+    InvalidInput
+        For an unknown name, or a number that is none.
+    """
+    if bench == IDEAL_BENCH:
+        return IDEAL
+    if bench in LEVELS:
+        return LEVELS[bench]
+    group, given, number = bench.partition("=")
+    if group not in GROUPS:
+        raise InvalidInput("bench", bench, ", ".join((IDEAL_BENCH, *LEVELS, *GROUPS)))
+    if group == "sensor_at_brake":
+        return Nuisances(sensor_at_brake=True)
+    alone = MILD.alone(group)
+    if not given:
+        return alone
+    try:
+        changed: dict[str, Any] = {GROUPS[group][0]: float(number)}
+    except ValueError:
+        raise InvalidInput("bench", bench, f"{group}= and a number") from None
+    return replace(alone, **changed)
+
+
+@dataclass(frozen=True)
+class BenchJob:
+    """A case on a bench; its run has one row of `scoring.COLUMNS`, nan beyond the verdict."""
+
+    case: Case
+    bench: str
+
+    @property
+    def key(self) -> str:
+        """Case and bench in one name."""
+        return f"{self.case.key}_{self.bench}"
+
+    def execute(self) -> Run:
+        """Run and analyse; seconds are those of the processor."""
+        hidden = hiding(self.case, nuisances_of(self.bench))
+        campaign = campaign_of(hidden, hidden.session)
+        begin = time.process_time()
+        scores = verdict_scores(self.case, examine_drive(campaign).verdict)
+        seconds = time.process_time() - begin
+        row = [scores.get(column, np.nan) for column in COLUMNS]
+        return Run(COLUMNS, np.array([row]), seconds, (seconds,))
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """A case on the ideal bench and on another."""
+
+    bench: str
+    ideal: Outcome
+    real: Outcome
+
+    @property
+    def alarm(self) -> bool:
+        """Whether nothing is hidden, and the nuisances alone are called something.
+
+        A case that the ideal bench raises an alarm for too says nothing about nuisances.
+        """
+        adequate = self.ideal.status == "adequate"
+        return not self.ideal.hidden and adequate and self.real.status != "adequate"
+
+    @property
+    def lost(self) -> frozenset[str]:
+        """Hidden names that are given on the ideal bench and not on the other."""
+        return (self.ideal.hidden & set(self.ideal.names)) - set(self.real.names)
+
+    @property
+    def wrong(self) -> frozenset[str]:
+        """Names that are given on the other bench only, and are wrong there."""
+        allowed = may_be_named(self.real.case) | set(self.ideal.names)
+        return frozenset(self.real.names) - allowed
+
+
+def compare(cases: Sequence[Case], benches: Sequence[str], campaign: Campaign) -> list[Comparison]:
+    """Run cases on benches, or read those that have run."""
+    names = list(dict.fromkeys((IDEAL_BENCH, *benches)))
+    jobs = [BenchJob(case, bench) for bench in names for case in cases]
+    runs = campaign.run(jobs, "benches")
+    outcomes = {
+        (job.case, job.bench): outcome(job.case, run) for job, run in zip(jobs, runs, strict=True)
+    }
+    return [
+        Comparison(bench, outcomes[case, IDEAL_BENCH], outcomes[case, bench])
+        for bench in names
+        if bench != IDEAL_BENCH
+        for case in cases
+    ]
+
+
+def text_of(comparisons: Sequence[Comparison]) -> str:
+    """Return a line for each comparison, and one for each bench with its counts."""
+    lines = []
+    for bench in dict.fromkeys(comparison.bench for comparison in comparisons):
+        chosen = [comparison for comparison in comparisons if comparison.bench == bench]
+        lines += [_line(comparison) for comparison in chosen]
+        clean = sum(not comparison.ideal.hidden for comparison in chosen)
+        alarms = sum(comparison.alarm for comparison in chosen)
+        lost = sum(len(comparison.lost) for comparison in chosen)
+        named = sum(len(c.ideal.hidden & set(c.ideal.names)) for c in chosen)
+        wrong = sum(len(comparison.wrong) for comparison in chosen)
+        lines.append(
+            f"{bench}: {alarms} alarms in {clean} clean campaigns, {lost} of {named} names lost, "
+            f"{wrong} new wrong names\n"
+        )
+    return "\n".join(lines)
+
+
+def _line(comparison: Comparison) -> str:
+    case = comparison.ideal.case
+    said = [
+        f"{each.status} {' '.join(each.chosen) if each.names else ''}".strip()
+        for each in (comparison.ideal, comparison.real)
+    ]
+    return f"  {comparison.bench:16} {case.kind} {case.number} ({case.truth}): {' -> '.join(said)}"
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line; return the exit code."""
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument(
+        "--cases", type=_numbers, required=True, help="places in the list of cases: 3,11,24 or 1-24"
+    )
+    parser.add_argument(
+        "--benches",
+        default="mild",
+        help=f"of {IDEAL_BENCH}, {', '.join((*LEVELS, *GROUPS))}; alone for each nuisance alone",
+    )
+    parser.add_argument("--workers", type=int, default=1)
+    parser.add_argument("--out", type=Path, default=Path("results"), help="default results")
+    options = parser.parse_args(arguments)
+    benches: list[str] = []
+    for bench in options.benches.split(","):
+        benches += ALONE if bench == "alone" else (bench,)
+    try:
+        for bench in benches:
+            nuisances_of(bench)
+    except InvalidInput as error:
+        parser.error(str(error))
+    cases = all_cases()
+    if not all(1 <= number <= len(cases) for number in options.cases):
+        parser.error(f"--cases must lie between 1 and {len(cases)}")
+    options.out.mkdir(parents=True, exist_ok=True)
+    executor = make_executor(options.workers, None)
+    with executor or nullcontext():
+        chosen = [cases[number - 1] for number in options.cases]
+        print(text_of(compare(chosen, benches, Campaign(options.out, executor))))
+    return 0
+
+
+def _numbers(text: str) -> list[int]:
+    numbers: list[int] = []
+    for part in text.split(","):
+        begin, dash, end = part.partition("-")
+        numbers += range(int(begin), int(end if dash else begin) + 1)
+    return numbers
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
