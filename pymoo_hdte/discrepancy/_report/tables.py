@@ -69,6 +69,7 @@ class EffectRow:
     lower: float
     upper: float
     unit: str
+    at_bound: bool = False
 
     @property
     def is_headline(self) -> bool:
@@ -94,20 +95,23 @@ class HypothesisRow:
 def effect_rows(
     effects: Sequence[Mapping[str, Any]], error_orders: Sequence[float] = ()
 ) -> list[EffectRow]:
-    """Return the parameters of the effects of a verdict document; angles in arcsec."""
+    """Return the parameters of the effects of a verdict document; of a drive, angles in arcsec."""
     rows = []
     for effect in effects:
-        where = "" if effect["order"] is None else f", order {effect['order']:.4g}"
+        # Only effects of a mechanism have no order, not even None.
+        of_drive, order = "order" in effect, effect.get("order")
+        where = "" if order is None else f", order {order:.4g}"
         of_effect = f"{effect['name'].replace('_', ' ')} ({effect['port']}{where})"
-        label = "" if effect["name"] == "parameter" else of_effect
+        label = "" if of_drive and effect["name"] == "parameter" else of_effect
         for name, quantity in effect["parameters"].items():
-            angle = quantity["unit"] == "rad" and not name.endswith("phase")
+            angle = of_drive and quantity["unit"] == "rad" and not name.endswith("phase")
             size, unit = (ARCSEC, "arcsec") if angle else (1.0, _shown(quantity["unit"]))
             value, low, high = (
                 number / size for number in (quantity["value"], *quantity["interval95"])
             )
             words = name_by_order(name, error_orders) if not label else name.replace("_", " ")
-            rows.append(EffectRow(label, words, value, low, high, unit))
+            at_bound = quantity.get("at_bound", False)
+            rows.append(EffectRow(label, words, value, low, high, unit, at_bound))
     return rows
 
 
