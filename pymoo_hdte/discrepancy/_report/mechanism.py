@@ -23,6 +23,9 @@ from pymoo_hdte.discrepancy._report.mechanism_figures import (
     misfit_over_motion,
     overlay,
 )
+from pymoo_hdte.discrepancy._report.plots import Plot, plot_files
+from pymoo_hdte.discrepancy._report.plots_mechanism import mechanism_plots
+from pymoo_hdte.discrepancy._report.tables import effect_rows
 from pymoo_hdte.discrepancy._report.torsion import torsion_document, torsion_picture
 from pymoo_hdte.discrepancy._verdicts.joint import JointFinding, revised_joint
 from pymoo_hdte.discrepancy._verdicts.mechanism_finding import MechanismFinding
@@ -77,8 +80,11 @@ def write_mechanism_report(
         words = f"Torques: {document['sentence']} Torsion: {torsion['sentence']}"
         document |= {"status": joint.status, "sentence": words, "torsion": torsion}
         document["location"]["sentence"] += f" {torsion['location']}"
-    page_text = _page(finding, document, errors, joint)
-    FOLDER.write(Path(out), page_text, document, {MODEL_FILE: model_text(revised)})
+    plots = mechanism_plots(finding, joint)
+    document["plots"] = [plot.as_dict() for plot in plots]
+    page_text = _page(finding, document, errors, joint, plots)
+    files = {MODEL_FILE: model_text(revised), **plot_files(plots)}
+    FOLDER.write(Path(out), page_text, document, files)
     return document
 
 
@@ -87,6 +93,7 @@ def _page(
     document: dict[str, Any],
     errors: Sequence[MechanismPredictionError],
     joint: JointFinding | None,
+    plots: Sequence[Plot],
 ) -> str:
     pictures = {
         "torsion": data_uri(torsion_picture(joint)) if joint else "",
@@ -94,8 +101,8 @@ def _page(
         "frequency": data_uri(misfit_over_frequency(finding)),
         "errors": data_uri(errors_figure(errors)) if errors else "",
     }
-    rows = _effect_rows(document["effects"])
-    sizes = [row for row in rows if not row["parameter"].endswith("phase")]
+    rows = effect_rows(document["effects"])
+    sizes = [row for row in rows if row.is_headline]
     shown = _shown(errors)
     pictures["overlay"] = data_uri(overlay(finding, shown)) if shown else ""
     chosen = finding.verdict.chosen
@@ -105,13 +112,14 @@ def _page(
         "mechanism.html.j2",
         document=document,
         torsion=document.get("torsion"),
-        torsion_rows=_effect_rows(document["torsion"]["effects"]) if joint else [],
+        torsion_rows=effect_rows(document["torsion"]["effects"]) if joint else [],
         rows=rows,
         sizes=sizes[:_SIZES],
         more=len(sizes) > _SIZES,
         errors=errors,
         shown=shown,
         pictures=pictures,
+        plots=plots,
         certainty=how_sure_of_records(finding.verdict),
         compared=[*compared, *document["alternatives"]],
         extent_sentence=extent_sentence(errors),
@@ -166,19 +174,3 @@ def _change(before: float, after: float) -> str:
     if not np.isfinite(before + after):
         return "diverges for one of the models,"
     return f"falls by {percent(1.0 - after / before)}" if after < before else "does not fall,"
-
-
-def _effect_rows(effects: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
-    return [
-        {
-            "effect": f"{effect['name'].replace('_', ' ')} ({effect['port']})",
-            "parameter": name.replace("_", " "),
-            "value": parameter["value"],
-            "lower": parameter["interval95"][0],
-            "upper": parameter["interval95"][1],
-            "at_bound": parameter["at_bound"],
-            "unit": "" if parameter["unit"] == "1" else parameter["unit"],
-        }
-        for effect in effects
-        for name, parameter in effect["parameters"].items()
-    ]

@@ -1,0 +1,134 @@
+"""Plots that stand as files beside a report: a picture, and the plotted numbers as CSV."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from pymoo_hdte._reports.figures import AFTER, BEFORE, FAINT, GREY, svg
+
+MOST_POINTS = 1500
+"""Points of a panel beyond which rows are skipped, evenly."""
+_COLOURS = (AFTER, BEFORE, "#009E73", "#CC79A7", "#000000", "#E69F00", "#56B4E9")
+_MARKERS, _DASHES = "osx^+vD", ("-", "--", "-.", ":")
+_MOST_WORDS = 8
+"""Series beyond which a legend stands in more columns."""
+
+
+@dataclass(frozen=True, eq=False)
+class Series:
+    """Numbers under one name, drawn as points or as a line.
+
+    Attributes
+    ----------
+    label : str
+        Series of one label have one colour and one entry in the legend.
+    x, y : ndarray, shape (n,)
+        In the units of the panel.
+    drawn : {"points", "line"}
+    """
+
+    label: str
+    x: NDArray[np.float64]
+    y: NDArray[np.float64]
+    drawn: str = "line"
+
+
+@dataclass(frozen=True, eq=False)
+class Panel:
+    """Series over the same axes; the axes' names hold their units."""
+
+    title: str
+    x_name: str
+    y_name: str
+    series: tuple[Series, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Plot:
+    """Panels below each other, with the stem of their files and a caption.
+
+    Attributes
+    ----------
+    name : {"friction", "torsion", "campbell"}
+    title, caption : str
+    panels : tuple of Panel
+    """
+
+    name: str
+    title: str
+    caption: str
+    panels: tuple[Panel, ...]
+
+    def figure(self) -> Figure:
+        """Return the picture."""
+        figure = Figure(figsize=(8.4, 0.5 + 3.1 * len(self.panels)), layout="constrained")
+        axes = figure.subplots(len(self.panels), 1, squeeze=False)[:, 0]
+        for axis, panel in zip(axes, self.panels, strict=True):
+            _draw(axis, panel)
+        return figure
+
+    def table(self) -> str:
+        """Return the plotted numbers as CSV, a row a point."""
+        text = io.StringIO()
+        rows = csv.writer(text, lineterminator="\n")
+        rows.writerow(["panel", "series", "drawn", "x_name", "x", "y_name", "y"])
+        for panel in self.panels:
+            for series in panel.series:
+                words = panel.title, series.label, series.drawn
+                for x, y in zip(series.x.tolist(), series.y.tolist(), strict=True):
+                    rows.writerow([*words, panel.x_name, repr(x), panel.y_name, repr(y)])
+        return text.getvalue()
+
+    def files(self) -> dict[str, str]:
+        """Return the files by name."""
+        return {f"{self.name}.csv": self.table(), f"{self.name}.svg": svg(self.figure())}
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the entry in the verdict as plain values."""
+        return {"name": self.name, "csv": f"{self.name}.csv", "picture": f"{self.name}.svg"}
+
+
+def plot_files(plots: Sequence[Plot]) -> dict[str, str]:
+    """Return the files of plots, by name."""
+    return {name: text for plot in plots for name, text in plot.files().items()}
+
+
+def _draw(axis: Axes, panel: Panel) -> None:
+    labels = list(dict.fromkeys(series.label for series in panel.series))
+    told: set[str] = set()
+    lines_last = sorted(panel.series, key=lambda series: series.drawn == "line")
+    for series in lines_last:
+        place = labels.index(series.label)
+        colour = _COLOURS[place % len(_COLOURS)]
+        label = None if series.label in told else series.label
+        told.add(series.label)
+        if series.drawn == "line":
+            style = _DASHES[place % len(_DASHES)]
+            axis.plot(series.x, series.y, style, color=colour, lw=1.8, label=label)
+        else:
+            marker = _MARKERS[place % len(_MARKERS)]
+            axis.plot(
+                series.x, series.y, marker, color=colour, mfc="none", ms=4, alpha=0.7, label=label
+            )
+    axis.set_xlabel(panel.x_name)
+    axis.set_ylabel(panel.y_name)
+    if panel.title:
+        axis.set_title(panel.title, fontsize=10, loc="left")
+    axis.axhline(0.0, color=GREY, lw=0.6)
+    axis.grid(color=FAINT, linewidth=0.6)
+    axis.set_axisbelow(True)
+    axis.spines[["top", "right"]].set_visible(False)
+    # Beside the axes, where it hides no point.
+    axis.legend(
+        frameon=False, fontsize=8, loc="upper left", bbox_to_anchor=(1.0, 1.0),
+        ncols=1 + (len(labels) > _MOST_WORDS * 2),
+    )  # fmt: skip
