@@ -25,7 +25,11 @@ from pymoo_hdte.discrepancy._report.mechanism_figures import (
 )
 from pymoo_hdte.discrepancy._report.plots import Plot, plot_files
 from pymoo_hdte.discrepancy._report.plots_mechanism import mechanism_plots
-from pymoo_hdte.discrepancy._report.tables import effect_rows
+from pymoo_hdte.discrepancy._report.tables import (
+    compared_rows,
+    effect_rows,
+    mechanism_parameter_rows,
+)
 from pymoo_hdte.discrepancy._report.torsion import torsion_document, torsion_picture
 from pymoo_hdte.discrepancy._verdicts.joint import JointFinding, revised_joint
 from pymoo_hdte.discrepancy._verdicts.mechanism_finding import MechanismFinding
@@ -103,15 +107,18 @@ def _page(
     }
     rows = effect_rows(document["effects"])
     sizes = [row for row in rows if row.is_headline]
+    nominal = {name: value.value for name, value in finding.mechanism.quantities.items()}
     shown = _shown(errors)
     pictures["overlay"] = data_uri(overlay(finding, shown)) if shown else ""
-    chosen = finding.verdict.chosen
+    chosen, torsion = finding.verdict.chosen, document.get("torsion")
     compared = [evidence(finding, chosen)] if chosen else []
     return page(
         "pymoo_hdte.discrepancy._report",
         "mechanism.html.j2",
         document=document,
-        torsion=document.get("torsion"),
+        torsion=torsion,
+        torsion_parameters=mechanism_parameter_rows(torsion["base"], {}) if torsion else [],
+        torsion_compared=compared_rows(torsion["alternatives"]) if torsion else [],
         torsion_rows=effect_rows(document["torsion"]["effects"]) if joint else [],
         rows=rows,
         sizes=sizes[:_SIZES],
@@ -121,10 +128,10 @@ def _page(
         pictures=pictures,
         plots=plots,
         certainty=how_sure_of_records(finding.verdict),
-        compared=[*compared, *document["alternatives"]],
+        compared=compared_rows([*compared, *document["alternatives"]]),
         extent_sentence=extent_sentence(errors),
         believed_effects=believed_in_words(document),
-        believed={name: value.value for name, value in finding.mechanism.quantities.items()},
+        parameters=mechanism_parameter_rows(document["base"], nominal),
     )
 
 

@@ -6,6 +6,7 @@ import csv
 import io
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -13,14 +14,14 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from pymoo_hdte._reports.figures import AFTER, BEFORE, FAINT, GREY, svg
+from pymoo_hdte._reports.figures import AFTER, BEFORE, FAINT, GREY, svg, svg_uri
 
 MOST_POINTS = 1500
 """Points of a panel beyond which rows are skipped, evenly."""
 _COLOURS = (AFTER, BEFORE, "#009E73", "#CC79A7", "#000000", "#E69F00", "#56B4E9")
-_MARKERS, _DASHES = "osx^+vD", ("-", "--", "-.", ":")
-_MOST_WORDS = 8
-"""Series beyond which a legend stands in more columns."""
+_MARKERS, _DASHES = "os^vDP*", ("-", "--", "-.", ":")
+_MANY = 200
+"""Points beyond which they are small and pale, so that a line over them shows."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,7 +34,8 @@ class Series:
         Series of one label have one colour and one entry in the legend.
     x, y : ndarray, shape (n,)
         In the units of the panel.
-    drawn : {"points", "line"}
+    drawn : {"points", "held out", "line"}
+        Held-out points are filled.
     """
 
     label: str
@@ -76,6 +78,16 @@ class Plot:
             _draw(axis, panel)
         return figure
 
+    @cached_property
+    def picture(self) -> str:
+        """The picture as SVG."""
+        return svg(self.figure())
+
+    @property
+    def address(self) -> str:
+        """The picture as the address of an inline SVG."""
+        return svg_uri(self.picture)
+
     def table(self) -> str:
         """Return the plotted numbers as CSV, a row a point."""
         text = io.StringIO()
@@ -90,7 +102,7 @@ class Plot:
 
     def files(self) -> dict[str, str]:
         """Return the files by name."""
-        return {f"{self.name}.csv": self.table(), f"{self.name}.svg": svg(self.figure())}
+        return {f"{self.name}.csv": self.table(), f"{self.name}.svg": self.picture}
 
     def as_dict(self) -> dict[str, Any]:
         """Return the entry in the verdict as plain values."""
@@ -105,20 +117,22 @@ def plot_files(plots: Sequence[Plot]) -> dict[str, str]:
 def _draw(axis: Axes, panel: Panel) -> None:
     labels = list(dict.fromkeys(series.label for series in panel.series))
     told: set[str] = set()
-    lines_last = sorted(panel.series, key=lambda series: series.drawn == "line")
-    for series in lines_last:
+    for series in panel.series:
         place = labels.index(series.label)
         colour = _COLOURS[place % len(_COLOURS)]
         label = None if series.label in told else series.label
         told.add(series.label)
         if series.drawn == "line":
             style = _DASHES[place % len(_DASHES)]
-            axis.plot(series.x, series.y, style, color=colour, lw=1.8, label=label)
+            axis.plot(series.x, series.y, style, color=colour, lw=1.8, label=label, zorder=3)
         else:
             marker = _MARKERS[place % len(_MARKERS)]
+            many = len(series.x) > _MANY
             axis.plot(
-                series.x, series.y, marker, color=colour, mfc="none", ms=4, alpha=0.7, label=label
-            )
+                series.x, series.y, marker, color=colour, label=label,
+                mfc=colour if series.drawn == "held out" else "none",
+                ms=3 if many else 5, alpha=0.35 if many else 0.9,
+            )  # fmt: skip
     axis.set_xlabel(panel.x_name)
     axis.set_ylabel(panel.y_name)
     if panel.title:
@@ -128,7 +142,4 @@ def _draw(axis: Axes, panel: Panel) -> None:
     axis.set_axisbelow(True)
     axis.spines[["top", "right"]].set_visible(False)
     # Beside the axes, where it hides no point.
-    axis.legend(
-        frameon=False, fontsize=8, loc="upper left", bbox_to_anchor=(1.0, 1.0),
-        ncols=1 + (len(labels) > _MOST_WORDS * 2),
-    )  # fmt: skip
+    axis.legend(frameon=False, fontsize=8, loc="upper left", bbox_to_anchor=(1.0, 1.0))

@@ -45,9 +45,11 @@ def _friction(finding: DriveFinding) -> Plot:
     fitted, ratio = finding.verdict.accepted, finding.campaign.believed.ratio
     held_out = finding.held_out
     series: list[Series] = []
-    parts = [(finding.data, "")] + ([] if held_out is None else [(held_out, ", held out")])
+    parts = [(finding.data, "points")]
+    if held_out is not None:
+        parts.append((held_out, "held out"))
     scale = max(float(np.abs(data.features.conditions.output_torque).max()) for data, _ in parts)
-    for data, suffix in parts:
+    for data, drawn in parts:
         when = data.features.conditions
         through = when.output_torque / ratio
         base = fitted.values[None, : len(data.base)]
@@ -60,14 +62,14 @@ def _friction(finding: DriveFinding) -> Plot:
                 for values in (data.features.values, predicted)
             )
             label = f"{load:z.0f} N.m"
-            series.append(Series(label + suffix, speed[ordered], measured, "points"))
-            if not suffix:
+            series.append(Series(label, speed[ordered], measured, drawn))
+            if drawn == "points":
                 series.append(Series(label, speed[ordered], modelled))
     return Plot(
         "friction",
         "Friction over speed",
-        "Mean input torque less the load over the ratio, by load. Points: records; lines: the "
-        "accepted model at the conditions of the fitted records.",
+        "Mean input torque less the load over the ratio, by load. Points: records, filled where held out; "
+        "lines: the accepted model at the conditions of the fitted records.",
         (Panel("", _SPEED, "friction at the input [N.m]", tuple(series)),),
     )
 
@@ -120,7 +122,7 @@ def _campbell(finding: DriveFinding, model: DriveModel, document: Mapping[str, A
         series.append(Series("resonance", speeds, np.full(2, mode.frequency)))
     if mode.resonates and within.size:
         at = np.full(within.shape, mode.frequency)
-        series.append(Series("excited resonance", within, at, "points"))
+        series.append(Series("where they meet", within, at, "points"))
     where = "none within the speeds of the records"
     if mode.resonates and within.size:
         where = ", ".join(f"{speed:.0f} r/min" for speed in np.sort(within))

@@ -100,7 +100,7 @@ def _friction_at(finding: MechanismFinding, port: Port) -> Panel | None:
         curve = friction(PortMotion(here, grid, None if middle is None else here + middle))
         series += [
             Series(label, speed[rows], force[rows], "points"),
-            Series(label, grid, curve),
+            Series(label if middle is not None else "model", grid, curve),
         ]
     title = f"At {'sensor ' if port.read else ''}{port.name}"
     return Panel(title, f"speed [{unit}]", f"friction [{force_unit}]", tuple(series))
@@ -122,9 +122,8 @@ def _of_friction(effects: Sequence[LawAt], port: str, stiffness: float) -> list:
 
 def _bands(load: Values, unit: str) -> Iterator[tuple[str, NDArray[np.int_], float | None]]:
     """Return label, rows and median load of bands of load; one band where it is unknown."""
-    if np.any(np.isnan(load)) or np.ptp(load) == 0.0:
-        known = None if np.any(np.isnan(load)) else float(load[0])
-        yield "all records", np.arange(len(load)), known
+    if np.any(np.isnan(load)):
+        yield "records", np.arange(len(load)), None
         return
     for rows in np.array_split(np.argsort(load, kind="stable"), _LOADS):
         low, high = float(load[rows].min()), float(load[rows].max())

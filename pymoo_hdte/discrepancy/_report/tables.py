@@ -82,13 +82,16 @@ class EffectRow:
 
 @dataclass(frozen=True)
 class HypothesisRow:
-    """Evidence for a set of effects; ``bic`` above that of the best, what is explained in words."""
+    """Evidence for a set of effects; ``bic`` above that of the best, what is explained in words.
+
+    Of a mechanism without ``chi_square``, and ``bic`` above that of what was chosen, if anything.
+    """
 
     label: str
     role: str
-    chi_square: float
+    chi_square: float | None
     explained: str
-    bic: float
+    bic: float | None
     at_bounds: str
 
 
@@ -147,6 +150,40 @@ def parameter_rows(finding: DriveFinding) -> list[ParameterRow]:
     return [
         _parameter_row(finding.campaign, parameter, entries[parameter.name], bool(has_interval))
         for parameter, has_interval in zip(finding.data.base, known, strict=False)
+    ]
+
+
+def mechanism_parameter_rows(
+    fitted: Mapping[str, Mapping[str, Any]], nominal: Mapping[str, float]
+) -> list[ParameterRow]:
+    """Return the rows of fitted parameters of a verdict document, beside their nominal values."""
+    return [
+        ParameterRow(
+            name.replace("_", " "),
+            _shown(entry.get("unit", "")),
+            nominal.get(name),
+            entry["value"],
+            tuple(entry["interval95"]),
+            None,
+            None,
+            entry["at_bound"],
+        )
+        for name, entry in fitted.items()
+    ]
+
+
+def compared_rows(compared: Sequence[Mapping[str, Any]]) -> list[HypothesisRow]:
+    """Return the evidence of a verdict document on a mechanism, without its chi-square."""
+    return [
+        HypothesisRow(
+            entry["label"],
+            entry["role"],
+            None,
+            percent(entry["explained"]),
+            entry["bic_gap"],
+            "",
+        )
+        for entry in compared
     ]
 
 
