@@ -72,7 +72,7 @@ class Plot:
 
     def figure(self) -> Figure:
         """Return the picture."""
-        figure = Figure(figsize=(8.4, 0.5 + 3.1 * len(self.panels)), layout="constrained")
+        figure = Figure(figsize=(6.4, 0.3 + 2.8 * len(self.panels)), layout="constrained")
         axes = figure.subplots(len(self.panels), 1, squeeze=False)[:, 0]
         for axis, panel in zip(axes, self.panels, strict=True):
             _draw(axis, panel)

@@ -67,9 +67,9 @@ def _friction(finding: DriveFinding) -> Plot:
                 series.append(Series(label, speed[ordered], modelled))
     return Plot(
         "friction",
-        "Friction over speed",
-        "Mean input torque less the load over the ratio, by load. Points: records, filled where held out; "
-        "lines: the accepted model at the conditions of the fitted records.",
+        "friction over speed",
+        "Mean input torque less the load over the ratio, by load. Points: records, filled where "
+        "held out; lines: the accepted model at the conditions of the fitted records.",
         (Panel("", _SPEED, "friction at the input [N.m]", tuple(series)),),
     )
 
@@ -97,7 +97,7 @@ def _torsion(finding: DriveFinding) -> Plot:
         series.append(Series(f"model of {sweep}", points.torque, modelled / ARCSEC))
     return Plot(
         "torsion",
-        "Torsion over torque",
+        "torsion over torque",
         "Points: means of consecutive rows of the torsion sweep; line: the accepted model along "
         "the same path.",
         (Panel("", "output torque [N.m]", "torsion [arcsec]", tuple(series)),),

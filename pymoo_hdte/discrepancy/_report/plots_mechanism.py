@@ -43,7 +43,7 @@ def mechanism_plots(finding: MechanismFinding, joint: JointFinding | None = None
         plots.append(
             Plot(
                 "friction",
-                "Friction over speed",
+                "friction over speed",
                 "Lines: damper and friction of the accepted model. Points: what these records say, "
                 "the residual of the force balance with that friction added back.",
                 panels,
@@ -140,14 +140,11 @@ def _torsion(finding: JointFinding) -> Plot:
         torque = motor_torque(finding, balance)[::stride]
         twist = balance.ports[gear].position
         unexplained = balance.in_time(residual[0]) / finding.stiffness
-        name = balance.record.name
-        measured.append(Series(f"{name}", torque, twist[::stride] / ARCSEC, "points"))
-        modelled.append(
-            Series(f"model of {name}", torque, (twist - unexplained)[::stride] / ARCSEC, "points")
-        )
+        measured.append(Series("measured", torque, twist[::stride] / ARCSEC, "points"))
+        modelled.append(Series("model", torque, (twist - unexplained)[::stride] / ARCSEC, "points"))
     return Plot(
         "torsion",
-        "Torsion over torque",
+        "torsion over torque",
         "Measured torsion of the fitted records, and that of the accepted model at the same times.",
         (Panel("", _TORQUE, f"torsion of {gear} [arcsec]", (*measured, *modelled)),),
     )
