@@ -1,5 +1,5 @@
-from pymoo_hdte.discrepancy._answers.revision_machine import RevisedValues, read_revised_values
-from pymoo_hdte.discrepancy._evidence.model_evidence import ModelEvidence
+from pymoo_hdte.discrepancy._answers.revision_own_machine import RevisedValues, read_revised_values
+from pymoo_hdte.discrepancy._evidence.own_machine import ModelEvidence
 from pymoo_hdte.discrepancy._plan.limits import PlanLimits, read_limits
 from pymoo_hdte.discrepancy._plan.plan import Plan, plan_tests
 from pymoo_hdte.discrepancy._records.believed_model import read_drive_model
@@ -16,7 +16,7 @@ from pymoo_hdte.discrepancy._records.residual_spectrum import residual_spectrum
 from pymoo_hdte.discrepancy._records.rig_files import MeasuredMechanism, read_rig
 from pymoo_hdte.discrepancy._records.rig_model import MechanismModel, read_mechanism_model
 from pymoo_hdte.discrepancy._report.folder import check_report_folder
-from pymoo_hdte.discrepancy._verdicts.machine import Machine
+from pymoo_hdte.discrepancy._verdicts.own_machine import Machine
 from pymoo_hdte.discrepancy.analysis import (
     Analysis,
     DriveAnalysis,

@@ -11,11 +11,11 @@ from typing import Any, cast, overload
 from pymoo_hdte._one_thread import ONE_THREAD
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy._answers.next_test_drive import Proposal, next_experiment
-from pymoo_hdte.discrepancy._answers.next_test_machine import Repetition, next_repetition
 from pymoo_hdte.discrepancy._answers.next_test_mechanism import NextTest, next_test
+from pymoo_hdte.discrepancy._answers.next_test_own_machine import Repetition, next_repetition
 from pymoo_hdte.discrepancy._answers.revision_drive import revised_model
-from pymoo_hdte.discrepancy._answers.revision_machine import RevisedValues, revised_values
 from pymoo_hdte.discrepancy._answers.revision_mechanism import revised_mechanism
+from pymoo_hdte.discrepancy._answers.revision_own_machine import RevisedValues, revised_values
 from pymoo_hdte.discrepancy._answers.where.balances import MechanismLocation, locate_in_mechanism
 from pymoo_hdte.discrepancy._answers.where.location import Location, locate
 from pymoo_hdte.discrepancy._answers.where.parts import PartLocation, locate_in_parts
@@ -29,17 +29,17 @@ from pymoo_hdte.discrepancy._selection.rules import RULES, Rules
 from pymoo_hdte.discrepancy._selection.verdict import Verdict
 from pymoo_hdte.discrepancy._verdicts.drive import examine_drive
 from pymoo_hdte.discrepancy._verdicts.drive_finding import DriveFinding
-from pymoo_hdte.discrepancy._verdicts.held_out import Progress
 from pymoo_hdte.discrepancy._verdicts.joint import JointFinding, examine_joint, revised_joint
-from pymoo_hdte.discrepancy._verdicts.machine import (
+from pymoo_hdte.discrepancy._verdicts.mechanism import examine_mechanism
+from pymoo_hdte.discrepancy._verdicts.mechanism_finding import MechanismFinding
+from pymoo_hdte.discrepancy._verdicts.mechanism_simulation import Progress
+from pymoo_hdte.discrepancy._verdicts.own_machine import (
     HeldOutErrors,
     Machine,
     MachineFinding,
     examine_machine,
     held_out_errors,
 )
-from pymoo_hdte.discrepancy._verdicts.mechanism import examine_mechanism
-from pymoo_hdte.discrepancy._verdicts.mechanism_finding import MechanismFinding
 from pymoo_hdte.discrepancy._verdicts.validation_drive import Validation, validate_drive
 from pymoo_hdte.discrepancy._verdicts.validation_mechanism import (
     MechanismPredictionError,
@@ -150,9 +150,8 @@ class Analysis(ABC):
 
     Examples
     --------
-    >>> analysis = analyse(read_campaign("campaign"))  # doctest: +SKIP
-    >>> analysis.verdict.status, analysis.locate().sentence  # doctest: +SKIP
-    >>> analysis.report("report")  # doctest: +SKIP
+    >>> issubclass(DriveAnalysis, Analysis), issubclass(MachineAnalysis, Analysis)
+    (True, True)
     """
 
     finding: Any
@@ -219,6 +218,11 @@ class DriveAnalysis(Analysis):
     ----------
     finding : DriveFinding
         Campaign, features of its records and verdict.
+
+    Examples
+    --------
+    >>> analysis = analyse(read_campaign("campaign"))  # doctest: +SKIP
+    >>> problem = RobustDTE(model=analysis.revised_model())  # doctest: +SKIP
     """
 
     finding: DriveFinding
@@ -291,6 +295,11 @@ class MechanismAnalysis(Analysis):
         The mechanism as it is believed, and its records.
     finding : MechanismFinding
         Force balances of the records, verdict, and unexplained residual.
+
+    Examples
+    --------
+    >>> analysis = analyse(read_rig("my_rig"))  # doctest: +SKIP
+    >>> analysis.revised_model().effects  # doctest: +SKIP
     """
 
     finding: MechanismFinding
@@ -383,6 +392,22 @@ class MachineAnalysis(Analysis):
     machine : Machine
     finding : MachineFinding
         Evidence and verdict.
+
+    Examples
+    --------
+    >>> from types import SimpleNamespace
+    >>> from pymoo_hdte.effects import unknown
+    >>> class Pulls(ModelEvidence):
+    ...     base = (unknown("stiffness", 90.0, 110.0, 100.0),)
+    ...     def residuals(self, values, effects):
+    ...         return [{"force": (values["stiffness"] - 98.0) * np.ones(8)}]
+    ...     def sizes(self, fitted):
+    ...         return {}
+    >>> record = SimpleNamespace(name="pull", role="train")
+    >>> machine = SimpleNamespace(records=[record], evidence=lambda records: Pulls())
+    >>> analysis = analyse(machine)
+    >>> analysis.verdict.status, round(analysis.revised_model().values["stiffness"], 1)
+    ('adequate', 98.0)
     """
 
     finding: MachineFinding
@@ -407,7 +432,7 @@ class MachineAnalysis(Analysis):
         return revised_values(self.finding)
 
     def _write(self, out: str | Path) -> dict[str, Any]:
-        from pymoo_hdte.discrepancy._report.machine import write_machine_report
+        from pymoo_hdte.discrepancy._report.own_machine import write_machine_report
 
         answers = self.locate(), self.validate(), self.next_experiment()
         return write_machine_report(self.finding, *answers, out)

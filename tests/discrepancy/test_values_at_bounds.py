@@ -17,8 +17,8 @@ from pymoo_hdte.discrepancy._evidence.force_balances.evidence import measured_da
 from pymoo_hdte.discrepancy._evidence.order_lines.parameters import base_parameters
 from pymoo_hdte.discrepancy._report.mechanism import write_mechanism_report
 from pymoo_hdte.discrepancy._selection.fitting import fit
-from pymoo_hdte.discrepancy._verdicts.held_out import simulate_held_out
 from pymoo_hdte.discrepancy._verdicts.mechanism_finding import MechanismFinding
+from pymoo_hdte.discrepancy._verdicts.mechanism_simulation import simulate_held_out
 from pymoo_hdte.discrepancy._verdicts.validation_drive import validate_drive
 from pymoo_hdte.discrepancy._verdicts.validation_mechanism import validate_mechanism
 from pymoo_hdte.mechanism import BelievedValue, Input, Mechanism, Port

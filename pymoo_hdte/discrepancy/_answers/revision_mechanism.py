@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pymoo_hdte.discrepancy._evidence.force_balances.unexplained import fitted_values
 from pymoo_hdte.discrepancy._records.rig_model import MechanismModel
-from pymoo_hdte.discrepancy._verdicts.held_out import laws_of
 from pymoo_hdte.discrepancy._verdicts.mechanism_finding import MechanismFinding
+from pymoo_hdte.discrepancy._verdicts.mechanism_simulation import laws_of
 
 MODEL_FILE = "revised_model.toml"
 

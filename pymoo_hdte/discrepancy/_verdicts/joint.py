@@ -15,17 +15,17 @@ from pymoo_hdte.discrepancy._evidence.force_balances.preconditions import check_
 from pymoo_hdte.discrepancy._evidence.force_balances.unexplained import fitted_values
 from pymoo_hdte.discrepancy._records.rig_model import MechanismModel
 from pymoo_hdte.discrepancy._selection.rules import RULES, Rules
-from pymoo_hdte.discrepancy._verdicts.held_out import Progress, laws_of
-from pymoo_hdte.discrepancy._verdicts.held_out_torsion import (
+from pymoo_hdte.discrepancy._verdicts.joint_torsion import examine_torsion, lines_of
+from pymoo_hdte.discrepancy._verdicts.mechanism import examine_mechanism
+from pymoo_hdte.discrepancy._verdicts.mechanism_finding import MechanismFinding
+from pymoo_hdte.discrepancy._verdicts.mechanism_simulation import Progress, laws_of
+from pymoo_hdte.discrepancy._verdicts.validation_mechanism import MechanismPredictionError
+from pymoo_hdte.discrepancy._verdicts.validation_torsion import (
     stiffness_of,
     torsion_after_held_out_test,
     torsion_errors,
     without_unvalidated_lines,
 )
-from pymoo_hdte.discrepancy._verdicts.joint_torsion import examine_torsion, lines_of
-from pymoo_hdte.discrepancy._verdicts.mechanism import examine_mechanism
-from pymoo_hdte.discrepancy._verdicts.mechanism_finding import MechanismFinding
-from pymoo_hdte.discrepancy._verdicts.validation_mechanism import MechanismPredictionError
 from pymoo_hdte.drive._effects.static_error import KinematicTorsion
 from pymoo_hdte.mechanism import ErrorLine, LawAt, Mechanism, Port, Record
 

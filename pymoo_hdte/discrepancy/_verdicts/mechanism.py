@@ -33,13 +33,13 @@ from pymoo_hdte.discrepancy._selection.candidate import Candidate
 from pymoo_hdte.discrepancy._selection.fitting import Fit, fit
 from pymoo_hdte.discrepancy._selection.rules import RULES, Rules
 from pymoo_hdte.discrepancy._selection.verdict import Verdict
-from pymoo_hdte.discrepancy._verdicts.held_out import (
+from pymoo_hdte.discrepancy._verdicts.mechanism_choice import judged
+from pymoo_hdte.discrepancy._verdicts.mechanism_finding import MechanismFinding
+from pymoo_hdte.discrepancy._verdicts.mechanism_simulation import (
     Progress,
     mechanism_after_held_out_test,
     simulate_held_out,
 )
-from pymoo_hdte.discrepancy._verdicts.mechanism_choice import judged
-from pymoo_hdte.discrepancy._verdicts.mechanism_finding import MechanismFinding
 from pymoo_hdte.discrepancy._verdicts.validation_mechanism import grown, validate_mechanism
 from pymoo_hdte.mechanism import LawAt, Mechanism, Record
 

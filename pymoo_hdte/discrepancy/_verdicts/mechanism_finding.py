@@ -15,7 +15,7 @@ from pymoo_hdte.discrepancy._evidence.force_balances.unexplained import (
 )
 from pymoo_hdte.discrepancy._selection.fitting import Fit
 from pymoo_hdte.discrepancy._selection.verdict import Verdict
-from pymoo_hdte.discrepancy._verdicts.held_out import SimulatedRecord
+from pymoo_hdte.discrepancy._verdicts.mechanism_simulation import SimulatedRecord
 from pymoo_hdte.mechanism import LawAt, Mechanism, Record
 
 

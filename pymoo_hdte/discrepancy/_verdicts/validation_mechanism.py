@@ -16,13 +16,13 @@ from numpy.typing import NDArray
 from pymoo_hdte.discrepancy._evidence.force_balances.evidence import measured_data
 from pymoo_hdte.discrepancy._evidence.force_balances.unexplained import root_mean_square
 from pymoo_hdte.discrepancy._selection.rules import RULES, Rules
-from pymoo_hdte.discrepancy._verdicts.held_out import (
+from pymoo_hdte.discrepancy._verdicts.mechanism_finding import MechanismFinding
+from pymoo_hdte.discrepancy._verdicts.mechanism_simulation import (
     Extent,
     SimulatedRecord,
     laws_of,
     simulate_held_out,
 )
-from pymoo_hdte.discrepancy._verdicts.mechanism_finding import MechanismFinding
 from pymoo_hdte.discrepancy._verdicts.prediction_error import grows
 from pymoo_hdte.mechanism import Record
 from pymoo_hdte.mechanism.quantity_units import unit_of

@@ -10,8 +10,8 @@ from pymoo_hdte.discrepancy._evidence.order_lines.candidates import out_of_toler
 from pymoo_hdte.discrepancy._selection.excess import HeldOutTest
 from pymoo_hdte.discrepancy._selection.reason import HELD_OUT_ERROR_GROWS, NOT_VALIDATED, Reason
 from pymoo_hdte.discrepancy._selection.rules import RULES
-from pymoo_hdte.discrepancy._verdicts.held_out_torsion import without_unvalidated_lines
 from pymoo_hdte.discrepancy._verdicts.prediction_error import PredictionError, grows
+from pymoo_hdte.discrepancy._verdicts.validation_torsion import without_unvalidated_lines
 
 FIT = SimpleNamespace(misfit=1.0)
 

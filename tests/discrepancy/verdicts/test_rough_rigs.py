@@ -10,12 +10,12 @@ from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy._answers.joint_open_questions import wiring_caveats
 from pymoo_hdte.discrepancy._evidence.force_balances.joint_halves import joint_of, torsion_half
 from pymoo_hdte.discrepancy._report.torsion import torsion_document
-from pymoo_hdte.discrepancy._verdicts.held_out_torsion import (
+from pymoo_hdte.discrepancy._verdicts.joint import JointFinding, examine_joint
+from pymoo_hdte.discrepancy._verdicts.joint_torsion import examine_torsion
+from pymoo_hdte.discrepancy._verdicts.validation_torsion import (
     torsion_after_held_out_test,
     torsion_errors,
 )
-from pymoo_hdte.discrepancy._verdicts.joint import JointFinding, examine_joint
-from pymoo_hdte.discrepancy._verdicts.joint_torsion import examine_torsion
 from pymoo_hdte.effects.stiffness import SoftWindup
 from pymoo_hdte.mechanism import BelievedValue, ErrorLine
 

@@ -26,14 +26,14 @@ from pymoo_hdte.discrepancy._evidence.force_balances.joint_halves import (
 from pymoo_hdte.discrepancy._records.rig_model import model_text, read_mechanism_model
 from pymoo_hdte.discrepancy._report.torsion import torsion_document, torsion_limits
 from pymoo_hdte.discrepancy._selection.rules import RULES
-from pymoo_hdte.discrepancy._verdicts.held_out_torsion import (
+from pymoo_hdte.discrepancy._verdicts.joint import JointFinding, examine_joint
+from pymoo_hdte.discrepancy._verdicts.joint_torsion import examine_torsion
+from pymoo_hdte.discrepancy._verdicts.validation_mechanism import sentences_on_rest
+from pymoo_hdte.discrepancy._verdicts.validation_torsion import (
     predicted_torsion,
     torsion_after_held_out_test,
     torsion_errors,
 )
-from pymoo_hdte.discrepancy._verdicts.joint import JointFinding, examine_joint
-from pymoo_hdte.discrepancy._verdicts.joint_torsion import examine_torsion
-from pymoo_hdte.discrepancy._verdicts.validation_mechanism import sentences_on_rest
 from pymoo_hdte.effects.friction import CoulombFriction
 from pymoo_hdte.effects.gravity import Gravity
 from pymoo_hdte.effects.hysteresis import MaxwellSlip

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from pymoo_hdte.discrepancy._verdicts.machine import MachineFinding
+from pymoo_hdte.discrepancy._verdicts.own_machine import MachineFinding
 
 
 @dataclass(frozen=True)

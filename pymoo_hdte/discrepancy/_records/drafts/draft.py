@@ -58,7 +58,7 @@ class Draft:
         ]
         if edits:
             lines = ", ".join(map(str, edits))
-            sentences.append(f"Correct or confirm what is marked {EDIT}, in lines {lines}.")
+            sentences.append(f"Correct or confirm what is marked {EDIT}: line {lines}.")
         sentences.append(
             f"Then: pymoo-hdte discrepancy {self.logs.folder} --out {self.logs.folder / 'report'}"
         )

@@ -9,12 +9,12 @@ from experiments.studies.measured.rigs import MEASURED, RIGS
 from pymoo_hdte.discrepancy._evidence.force_balances.joint_halves import joint_of, torsion_half
 from pymoo_hdte.discrepancy._records.rig_files import read_rig
 from pymoo_hdte.discrepancy._report.torsion import torsion_document
-from pymoo_hdte.discrepancy._verdicts.held_out_torsion import (
+from pymoo_hdte.discrepancy._verdicts.joint import JointFinding
+from pymoo_hdte.discrepancy._verdicts.joint_torsion import examine_torsion
+from pymoo_hdte.discrepancy._verdicts.validation_torsion import (
     torsion_after_held_out_test,
     torsion_errors,
 )
-from pymoo_hdte.discrepancy._verdicts.joint import JointFinding
-from pymoo_hdte.discrepancy._verdicts.joint_torsion import examine_torsion
 from pymoo_hdte.drive._effects.static_error import KinematicTorsion
 from pymoo_hdte.effects.hysteresis import MaxwellSlip
 from pymoo_hdte.effects.stiffness import HardeningStiffness

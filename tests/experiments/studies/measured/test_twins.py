@@ -11,9 +11,9 @@ import pytest
 
 from experiments.studies.measured.rigs import MEASURED, RIGS, torques_of
 from pymoo_hdte.discrepancy._records.rig_files import read_rig
-from pymoo_hdte.discrepancy._verdicts.held_out import fitted_mechanism
 from pymoo_hdte.discrepancy._verdicts.mechanism import examine_mechanism
 from pymoo_hdte.discrepancy._verdicts.mechanism_finding import MechanismFinding
+from pymoo_hdte.discrepancy._verdicts.mechanism_simulation import fitted_mechanism
 from pymoo_hdte.effects.friction import CoulombFriction, NonlinearDrag
 from pymoo_hdte.effects.gravity import Gravity
 from pymoo_hdte.effects.linear import LinearSpring

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pymoo_hdte.checks import InvalidInput
-from pymoo_hdte.discrepancy._evidence.model_evidence import ModelEvidence
+from pymoo_hdte.discrepancy._evidence.own_machine import ModelEvidence
 from pymoo_hdte.discrepancy._selection.candidate import Candidate, out_of_tolerance
 from pymoo_hdte.discrepancy._selection.excess import Excess, HeldOutTest
 from pymoo_hdte.discrepancy._selection.fitting import Fit, Response, Unknowns, Vector, built

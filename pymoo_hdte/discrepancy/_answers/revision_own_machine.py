@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from pymoo_hdte._io.toml import toml_text, toml_with_lines
-from pymoo_hdte.discrepancy._verdicts.machine import MachineFinding
+from pymoo_hdte.discrepancy._verdicts.own_machine import MachineFinding
 from pymoo_hdte.mechanism import LawAt
 from pymoo_hdte.mechanism.effects import read_law, table_of
 
@@ -25,6 +25,15 @@ class RevisedValues:
         Of the base, fitted, SI.
     effects : tuple of LawAt
         Those that the model had, and those that are named.
+
+    Examples
+    --------
+    >>> print(RevisedValues("ring-down tests", {"damping": 0.8}).to_toml())
+    title = "ring-down tests"
+    <BLANKLINE>
+    [values]
+    damping = 0.8
+    <BLANKLINE>
     """
 
     title: str
@@ -52,6 +61,14 @@ def read_revised_values(path: str | Path) -> RevisedValues:
         With file and line, for a wrong or missing field or an effect that is not registered.
     OSError
         If the file cannot be read.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> text = RevisedValues("ring-down tests", {"damping": 0.8}).to_toml()
+    >>> _ = Path("revised_model.toml").write_text(text)
+    >>> read_revised_values("revised_model.toml").values
+    {'damping': 0.8}
     """
     with toml_with_lines(Path(path)) as top:
         title, table = top.text("title"), top.table("values")

@@ -9,8 +9,8 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 
 from pymoo_hdte.checks import InvalidInput, one_of
-from pymoo_hdte.discrepancy._evidence.model_evidence import ModelEvidence
-from pymoo_hdte.discrepancy._evidence.predicted_records import PredictedRecords
+from pymoo_hdte.discrepancy._evidence.own_machine import ModelEvidence
+from pymoo_hdte.discrepancy._evidence.own_records import PredictedRecords
 from pymoo_hdte.discrepancy._selection.fitting import fit
 from pymoo_hdte.discrepancy._selection.rules import RULES, Rules
 from pymoo_hdte.discrepancy._selection.verdict import Verdict, judge
@@ -24,6 +24,14 @@ class Machine(Protocol):
     """A kind of machine of your own: its records, and how they are compared with its model.
 
     Where it has a ``title``, reports begin with it.
+
+    Examples
+    --------
+    >>> class Oscillator:
+    ...     records = ()
+    ...     def evidence(self, records): ...
+    >>> isinstance(Oscillator(), Machine)
+    True
     """
 
     @property

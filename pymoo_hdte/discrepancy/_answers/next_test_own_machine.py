@@ -13,7 +13,7 @@ import numpy as np
 
 from pymoo_hdte.discrepancy._answers.separation import unimitated
 from pymoo_hdte.discrepancy._selection.hypothesis import Hypothesis
-from pymoo_hdte.discrepancy._verdicts.machine import MachineFinding
+from pymoo_hdte.discrepancy._verdicts.own_machine import MachineFinding
 from pymoo_hdte.effects.sentence_blanks import in_words
 
 

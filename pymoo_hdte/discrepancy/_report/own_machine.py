@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from pymoo_hdte._reports.html import number, page, percent
-from pymoo_hdte.discrepancy._answers.next_test_machine import Repetition
-from pymoo_hdte.discrepancy._answers.revision_machine import MODEL_FILE, revised_values
+from pymoo_hdte.discrepancy._answers.next_test_own_machine import Repetition
+from pymoo_hdte.discrepancy._answers.revision_own_machine import MODEL_FILE, revised_values
 from pymoo_hdte.discrepancy._answers.where.parts import PartLocation
 from pymoo_hdte.discrepancy._report.certainty import how_sure_of_records
 from pymoo_hdte.discrepancy._report.document import (
@@ -28,7 +28,7 @@ from pymoo_hdte.discrepancy._report.tables import (
     mechanism_parameter_rows,
 )
 from pymoo_hdte.discrepancy._report.words import caveats
-from pymoo_hdte.discrepancy._verdicts.machine import HeldOutErrors, MachineFinding
+from pymoo_hdte.discrepancy._verdicts.own_machine import HeldOutErrors, MachineFinding
 from pymoo_hdte.mechanism.effects import table_of
 
 
@@ -89,7 +89,7 @@ def write_machine_report(
     nominal = {parameter.name: parameter.start for parameter in finding.data.base}
     html = page(
         "pymoo_hdte.discrepancy._report",
-        "machine.html.j2",
+        "own_machine.html.j2",
         document=document,
         rows=effect_rows(document["effects"], ()),
         hypotheses=hypothesis_rows(verdict, ()),

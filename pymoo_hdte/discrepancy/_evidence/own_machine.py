@@ -40,7 +40,17 @@ class ModelEvidence(ABC):
 
     Examples
     --------
-    See ``docs/examples/ring_down.py``, a machine kind in one file.
+    A machine kind in one file is ``docs/examples/ring_down.py``; this one has a single channel.
+
+    >>> from pymoo_hdte.effects import unknown
+    >>> class Springs(ModelEvidence):
+    ...     base = (unknown("stiffness", 90.0, 110.0, 100.0),)
+    ...     def residuals(self, values, effects):
+    ...         return [{"force": [values["stiffness"] - 98.0]}]
+    ...     def sizes(self, fitted):
+    ...         return {}
+    >>> Springs().residuals({"stiffness": 100.0}, ())
+    [{'force': [2.0]}]
     """
 
     base: tuple[Parameter, ...]

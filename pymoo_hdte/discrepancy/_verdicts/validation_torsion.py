@@ -13,8 +13,8 @@ from pymoo_hdte.discrepancy._selection.excess import HeldOutTest
 from pymoo_hdte.discrepancy._selection.fitting import Fit
 from pymoo_hdte.discrepancy._selection.hypothesis import bounded_unknowns, label_of
 from pymoo_hdte.discrepancy._selection.verdict import Verdict
-from pymoo_hdte.discrepancy._verdicts.held_out import laws_of
 from pymoo_hdte.discrepancy._verdicts.mechanism_finding import MechanismFinding
+from pymoo_hdte.discrepancy._verdicts.mechanism_simulation import laws_of
 from pymoo_hdte.discrepancy._verdicts.validation_mechanism import (
     MechanismPredictionError,
     chance_of,
