@@ -10,6 +10,7 @@ from typing import Any, cast, overload
 
 from pymoo_hdte._one_thread import ONE_THREAD
 from pymoo_hdte.checks import InvalidInput
+from pymoo_hdte.discrepancy._answers.descriptive_model import DescriptiveModel, descriptive_model
 from pymoo_hdte.discrepancy._answers.next_test_drive import Proposal, next_experiment
 from pymoo_hdte.discrepancy._answers.next_test_mechanism import NextTest, next_test
 from pymoo_hdte.discrepancy._answers.next_test_own_machine import Repetition, next_repetition
@@ -323,13 +324,26 @@ class MechanismAnalysis(Analysis):
         """Return the mechanism with fitted values, and the effects that it has."""
         return revised_mechanism(self.measured.title, self.finding)
 
+    def descriptive_model(self) -> DescriptiveModel:
+        """Return the model with all terms that predict the force balances better.
+
+        There is one whatever the verdict. It describes, and does not diagnose. Of a joint with two
+        encoders it is that of the balance of torques.
+        """
+        return self._descriptive
+
     def _write(self, out: str | Path) -> dict[str, Any]:
         # Plotting is slow to import, and only a report needs it.
         from pymoo_hdte.discrepancy._report.mechanism import write_mechanism_report
 
         answers = self.validate(), self.next_experiment()
         return write_mechanism_report(
-            self.measured.title, self.finding, *answers, out, joint=self._beside
+            self.measured.title,
+            self.finding,
+            *answers,
+            out,
+            joint=self._beside,
+            descriptive=self.descriptive_model(),
         )
 
     @property
@@ -346,6 +360,11 @@ class MechanismAnalysis(Analysis):
     @ONE_THREAD
     def _test(self) -> NextTest:
         return next_test(self.finding)
+
+    @cached_property
+    @ONE_THREAD
+    def _descriptive(self) -> DescriptiveModel:
+        return descriptive_model(self.measured.title, self.finding)
 
 
 class JointAnalysis(MechanismAnalysis):

@@ -48,8 +48,8 @@ class PortState:
     load : ndarray or None
         Torque that the machine passes on through the port, N.m; None where a solver does not know
         it. At the input of a drive it is what the output delivers to its load, bearings and laws,
-        over the ratio, without what accelerates inertias; at a port of another mechanism, what its
-        ``load`` says.
+        over the ratio, without what accelerates inertias; at its mesh the load; at a port of
+        another mechanism, what its ``load`` says.
     temperature : ndarray or float
         Temperature of the machine in kelvin; NaN where it is not known.
     recurs : bool
@@ -208,7 +208,7 @@ class Behaviour:
     """Whether the force is a driving force, whatever the direction of motion."""
     loaded: ClassVar[bool] = False
     """Whether the force depends on the torque that the port passes on, `PortState.load`, which is
-    known at the input of a drive and where a mechanism states it."""
+    known at the input and the mesh of a drive and where a mechanism states it."""
     warmed: ClassVar[bool] = False
     """Whether the force depends on `PortState.temperature`, which only records of a drive have."""
     varies_stiffness: ClassVar[bool] = False

@@ -84,6 +84,10 @@ def mirror(coefficients):
         load_torque=-coefficients.load_torque,
         stiffness_phase=-coefficients.stiffness_phase,
         error_phasors=-coefficients.error_phasors.conj(),
+        # The load has turned round as well.
+        load_errors=tuple(
+            (order, by_load.conjugate()) for order, by_load in coefficients.load_errors
+        ),
         laws=tuple((port, mirrored(law)) for port, law in coefficients.laws),
     )
 

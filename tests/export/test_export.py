@@ -9,6 +9,7 @@ import pytest
 
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy import MechanismModel
+from pymoo_hdte.drive._effects import LoadDamping
 from pymoo_hdte.effects.bouc_wen import BoucWen
 from pymoo_hdte.effects.friction import (
     CoulombFriction,
@@ -57,6 +58,7 @@ LAWS = {
     "direction_dependent_friction": DirectionalFriction(0.3, 0.1),
     "linear_stiffness": LinearSpring(2.0),
     "viscous_friction": LinearDamper(0.5),
+    "load_dependent_damping": LoadDamping(0.6, 4.0),
     "load_dependent_friction": LoadFriction(0.2, 0.1, 0.7, 4.0),
     "torque_ripple": PeriodicTorque(7.0, 1.0, 0.3),
     "hardening_stiffness": HardeningStiffness(5.0, 0.3, 0.4, 3.0),

@@ -4,6 +4,8 @@ from pymoo_hdte.drive._effects import (
     KinematicErrorLine,
     KinematicReaction,
     LawAtPort,
+    LoadDamping,
+    LoadDependentError,
     PreslidingFriction,
     drive_effects,
 )
@@ -45,6 +47,8 @@ EFFECTS = [
     LawAtPort("temperature_dependent_friction", "input", TemperatureFriction(1e-4, 0.03, 300.0)),
     KinematicErrorLine(3.0, 2 * ARCSEC, 0.7),
     KinematicReaction(),
+    LoadDependentError(3.0, 2 * ARCSEC, 0.7, 40.0),
+    LawAtPort("load_dependent_damping", "mesh", LoadDamping(4.0, 40.0)),
 ]
 
 

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import dct
 
+from pymoo_hdte.discrepancy._answers.descriptive_model import descriptive_model
 from pymoo_hdte.discrepancy._verdicts.mechanism_finding import MechanismFinding
 from pymoo_hdte.mechanism import Record
 from pymoo_hdte.mechanism.motion import margin_of, motion_of, smooth
@@ -31,6 +32,7 @@ _VALIDATED = 0.3
 _AS_GOOD = 1.1
 """Ratio of mean squares up to which the model with fewer terms is taken."""
 _THRESHOLDS = np.geomspace(1e-3, 0.3, 12)
+_SIDES = "descriptive", "six_terms"
 _LAGS, _DEGREE, _TERMS = 2, 3, 12
 """Of NARMAX models: past samples, powers, and most terms."""
 
@@ -119,7 +121,7 @@ class Answer:
 def answers(finding: MechanismFinding) -> list[Answer]:
     """Return the answers of all tools on a mechanism of one coordinate and one input."""
     given = []
-    for tool in (least_squares, sparse_regression, narmax):
+    for tool in (least_squares, six_terms, descriptive, sparse_regression, narmax):
         began = time.process_time()
         answer = tool(finding)
         given.append(Answer(*answer, time.process_time() - began))
@@ -132,11 +134,31 @@ Said = tuple[str, str, frozenset[str] | None, float | None, float | None]
 def least_squares(finding: MechanismFinding) -> Said:
     """Fit inertia, viscous and Coulomb friction, an offset, and the spring that is believed."""
     names = ["a", "v", "sign v", "1", *(["q"] if _sprung(finding) else [])]
+    return _least_squares("least squares", finding, names)
+
+
+def six_terms(finding: MechanismFinding) -> Said:
+    """Fit what a practitioner fits to a joint: the same, and gravity whether it can pull or not."""
+    return _least_squares("six terms", finding, ["a", "v", "sign v", "sin q", "cos q", "1"])
+
+
+def _least_squares(tool: str, finding: MechanismFinding, names: Sequence[str]) -> Said:
     train, test = terms_of(finding, "train", names), terms_of(finding, "held_out", names)
     values: Values = np.linalg.lstsq(train.columns, train.force, rcond=None)[0].astype(float)
-    of_force = test.explained(values)
     named = frozenset({"coulomb_friction"})
-    return "least squares", _in_words(names, values), named, of_force, None
+    return tool, _in_words(names, values), named, test.explained(values), None
+
+
+def descriptive(finding: MechanismFinding) -> Said:
+    """Describe the records by all terms that predict better, whatever the verdict (our own)."""
+    model = descriptive_model("", finding)
+    (coordinate,) = finding.mechanism.coordinates
+    errors = [one for one in model.held_out if one.quantity == coordinate]
+    words = " + ".join(dict.fromkeys(effect.name for effect, _ in model.effects)).replace("_", " ")
+    # Both were judged on the same rows, which are fewer than those of the other tools.
+    ours, theirs = (sum(getattr(one, name) ** 2 for one in errors) for name in _SIDES)
+    of_force = 1.0 - ours / theirs * (1.0 - (six_terms(finding)[3] or 0.0))
+    return "descriptive model", words or "nothing", None, of_force, None
 
 
 def sparse_regression(finding: MechanismFinding) -> Said:

@@ -10,6 +10,11 @@ import numpy as np
 
 from pymoo_hdte._reports.figures import data_uri
 from pymoo_hdte._reports.html import number, page, percent
+from pymoo_hdte.discrepancy._answers.descriptive_model import (
+    DESCRIPTIVE_FILE,
+    BalanceErrors,
+    DescriptiveModel,
+)
 from pymoo_hdte.discrepancy._answers.next_test_mechanism import NextTest
 from pymoo_hdte.discrepancy._answers.revision_mechanism import MODEL_FILE, revised_mechanism
 from pymoo_hdte.discrepancy._records.rig_model import model_text
@@ -46,6 +51,7 @@ def write_mechanism_report(
     test: NextTest,
     out: str | Path,
     joint: JointFinding | None = None,
+    descriptive: DescriptiveModel | None = None,
 ) -> dict[str, Any]:
     """Write a report with verdict and revised model; return the verdict's document.
 
@@ -60,6 +66,8 @@ def write_mechanism_report(
         New, empty, or an earlier report, which is replaced.
     joint : JointFinding, optional
         Of a joint with two encoders, ``finding`` being on its torques.
+    descriptive : DescriptiveModel, optional
+        Model with all terms that predict better, which becomes a section and a file.
 
     Returns
     -------
@@ -86,8 +94,16 @@ def write_mechanism_report(
         document["location"]["sentence"] += f" {torsion['location']}"
     plots = mechanism_plots(finding, joint)
     document["plots"] = [plot.as_dict() for plot in plots]
-    page_text = _page(finding, document, errors, joint, plots)
     files = {MODEL_FILE: model_text(revised), **plot_files(plots)}
+    if descriptive is not None:
+        files[DESCRIPTIVE_FILE] = model_text(descriptive.model)
+        sentence = descriptive_sentence(descriptive)
+        document["descriptive_model"] = {
+            "file": DESCRIPTIVE_FILE,
+            "sentence": sentence,
+            **descriptive.as_dict(),
+        }
+    page_text = _page(finding, document, errors, joint, plots)
     FOLDER.write(Path(out), page_text, document, files)
     return document
 
@@ -123,6 +139,7 @@ def _page(
         rows=rows,
         sizes=sizes[:_SIZES],
         more=len(sizes) > _SIZES,
+        descriptive=document.get("descriptive_model"),
         errors=errors,
         shown=shown,
         pictures=pictures,
@@ -165,6 +182,36 @@ def validation_sentence(
                 f"{quantity} by {kind} {change} from {number(before)} to {number(after)} {unit}"
             )
     return f"Root mean square errors: {'; '.join(words)}. {extent_sentence(errors)}"
+
+
+def descriptive_sentence(model: DescriptiveModel) -> str:
+    """Return in words what a descriptive model holds, and how it predicts what was held out."""
+    effects = dict.fromkeys(
+        f"{effect.name.replace('_', ' ')} ({effect.port})" for effect, _ in model.effects
+    )
+    holds = f", with {', '.join(effects)}" if effects else ", without any effect"
+    words = [
+        f"This model describes and does not diagnose: it holds what predicts better{holds}."
+        " Whether its terms are the causes is a matter of the verdict."
+    ]
+    by_quantity: dict[str, list[BalanceErrors]] = {}
+    for errors in model.held_out or model.cross_validated:
+        by_quantity.setdefault(errors.quantity, []).append(errors)
+    where = "held-out records" if model.held_out else "records, each part predicted from the others"
+    for quantity, several in by_quantity.items():
+        base, accepted, ours, six = (
+            float(np.sqrt(np.mean([getattr(one, name) ** 2 for one in several])))
+            for name in ("base", "accepted", "descriptive", "six_terms")
+        )
+        words.append(
+            f"Root mean square that is left of the balance of {quantity} in the {where}: "
+            f"{number(ours)} {several[0].unit}, where least squares with six terms leaves "
+            f"{number(six)}, the nominal model {number(base)} and the revised one "
+            f"{number(accepted)}."
+        )
+        if ours > accepted:
+            words.append("There the revised model predicts better.")
+    return " ".join(words)
 
 
 def extent_sentence(errors: Sequence[MechanismPredictionError]) -> str:

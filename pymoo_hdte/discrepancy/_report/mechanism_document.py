@@ -180,6 +180,12 @@ def limits(finding: MechanismFinding) -> list[str]:
         for actuator in finding.mechanism.inputs
         if not actuator.scaled
     ]
+    sentences += [
+        f"The inertial force of {name} is smaller than what the model leaves of its balance: a "
+        "simulation of its motion tells little, and the held-out force balance is what validates."
+        for name in finding.mechanism.coordinates
+        if name in finding.judged_by_balance and finding.simulated
+    ]
     sentences += _not_validated(finding)
     if not any(record.role == "held_out" for record in finding.records):
         sentences.append("No record was held out: the correction is not validated.")
@@ -197,6 +203,9 @@ def _not_validated(finding: MechanismFinding) -> list[str]:
         return []
     sizes = []
     for name in finding.mechanism.coordinates:
+        if name in finding.judged_by_balance:
+            sizes.append(f"the force balance of {name} comes no nearer to zero")
+            continue
         before, after, _ = (
             np.mean([record.powers(name) for record in finding.simulated], axis=0) ** 0.5
         )

@@ -37,8 +37,10 @@ from pymoo_hdte.discrepancy._verdicts.mechanism_choice import judged
 from pymoo_hdte.discrepancy._verdicts.mechanism_finding import MechanismFinding
 from pymoo_hdte.discrepancy._verdicts.mechanism_simulation import (
     Progress,
+    held_out_balances,
     mechanism_after_held_out_test,
     simulate_held_out,
+    without_mass,
 )
 from pymoo_hdte.discrepancy._verdicts.validation_mechanism import grown, validate_mechanism
 from pymoo_hdte.mechanism import LawAt, Mechanism, Record
@@ -105,8 +107,11 @@ def examine_mechanism(
     # A ripple beyond the band moves nothing that could be measured, and takes a solver many steps.
     fits = verdict.base, verdict.accepted
     simulated = simulate_held_out(mechanism, records, data, fits, known, progress)
-    verdict = mechanism_after_held_out_test(verdict, simulated)
-    finding = MechanismFinding(mechanism, records, cutoff, data, verdict, ripples, simulated)
+    light = without_mass(mechanism, data, verdict.accepted)
+    judges = light if verdict.accepted is not verdict.base else ()
+    balances = held_out_balances(mechanism, records, data, fits, judges)
+    verdict = mechanism_after_held_out_test(verdict, simulated, balances)
+    finding = MechanismFinding(mechanism, records, cutoff, data, verdict, ripples, simulated, light)
     if verdict.accepted is verdict.base:
         return finding
     return replace(

@@ -42,6 +42,9 @@ class MechanismFinding:
         ``"adequate"``, but ``"named"`` without a chosen hypothesis.
     simulated : tuple of SimulatedRecord
         The held-out records by the base and by what the training records named.
+    judged_by_balance : frozenset of str
+        Coordinates of which the force balance is validated, since their mass is too small for a
+        simulation: see `without_mass`.
     """
 
     mechanism: Mechanism
@@ -51,6 +54,7 @@ class MechanismFinding:
     verdict: Verdict
     ripples: Ripples = NO_RIPPLES
     simulated: tuple[SimulatedRecord, ...] = ()
+    judged_by_balance: frozenset[str] = frozenset()
 
     @property
     def accepted(self) -> Fit:

@@ -6,20 +6,25 @@ measured positions and the speeds of their smoothed course.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pymoo_hdte.discrepancy._evidence.force_balances.evidence import MeasuredData
-from pymoo_hdte.discrepancy._evidence.force_balances.unexplained import fitted_values
+from pymoo_hdte.discrepancy._evidence.force_balances.evidence import MeasuredData, measured_data
+from pymoo_hdte.discrepancy._evidence.force_balances.unexplained import (
+    fitted_values,
+    root_mean_square,
+)
 from pymoo_hdte.discrepancy._selection.excess import HeldOutTest
 from pymoo_hdte.discrepancy._selection.fitting import Fit
 from pymoo_hdte.discrepancy._selection.verdict import Verdict
 from pymoo_hdte.discrepancy._verdicts.windows import Reach, Windows, reach_of, windows_of
 from pymoo_hdte.mechanism import LawAt, Mechanism, Record
+from pymoo_hdte.mechanism.balances import quantity_names
 from pymoo_hdte.mechanism.motion import SmoothedMotion, motion_of, smooth
 from pymoo_hdte.mechanism.simulation import simulate_mechanism
 
@@ -214,27 +219,93 @@ def _state(motion: SmoothedMotion, row: int) -> tuple[float, float]:
     return float(motion.position[row]), float(motion.speed[row])
 
 
+def without_mass(mechanism: Mechanism, data: MeasuredData, fitted: Fit) -> frozenset[str]:
+    """Return the coordinates whose motion a simulation cannot judge.
+
+    Their inertial force is smaller than what the model leaves of their balance, so that a simulated
+    motion is more of the residual, integrated twice, than of the model.
+    """
+    values = fitted_mechanism(mechanism, fitted).inertias
+    left, names = root_mean_square(data, fitted.residuals), quantity_names(mechanism)
+    samples = sum(balance.moving.count for balance in data.spectra)
+    found = []
+    for place, name in enumerate(mechanism.coordinates):
+        row = names.index(f"inertia of {name}")
+        power = sum(
+            float(np.sum((balance.terms[place, row] * balance.kept[place]) ** 2))
+            for balance in data.spectra
+        )
+        if values[name].value * (power / samples) ** 0.5 < left[place]:
+            found.append(name)
+    return frozenset(found)
+
+
 def mechanism_after_held_out_test(
-    verdict: Verdict, simulated: Sequence[SimulatedRecord]
+    verdict: Verdict,
+    simulated: Sequence[SimulatedRecord],
+    balances: Mapping[str, Values] | None = None,
 ) -> Verdict:
     """Return the verdict, ``unlisted`` where held-out records contradict what it names.
 
     Simulated, their positions do not come nearer to the measured ones as they should, though the
-    change is large enough to be seen in them.
+    change is large enough to be seen in them. Of coordinates that have ``balances``, see
+    `held_out_balances`, these are judged instead.
     """
     if verdict.accepted is verdict.base or not simulated:
         return verdict
-    return verdict.after_held_out_test(_held_out_test(simulated))
+    return verdict.after_held_out_test(_held_out_test(simulated, balances or {}))
 
 
-def _held_out_test(simulated: Sequence[SimulatedRecord]) -> HeldOutTest:
-    """Return the held-out test of simulated positions, in units of what was to be expected.
+def held_out_balances(
+    mechanism: Mechanism,
+    records: Sequence[Record],
+    data: MeasuredData,
+    fits: tuple[Fit, Fit],
+    names: Collection[str],
+) -> dict[str, Values]:
+    """Return the sums of squares of held-out force balances by coordinate, shape (3,).
 
+    Before and after, and of the change, in units of what the model after leaves of the training
+    records.
+
+    Parameters
+    ----------
+    mechanism, records, data, fits
+        As of `simulate_held_out`.
+    names : collection of str
+        Coordinates that are judged.
+    """
+    found = {name: np.zeros(3) for name in names}
+    left = root_mean_square(data, fits[1].residuals)
+    for record in (record for record in records if record.role == "held_out" and names):
+        held_out = measured_data(mechanism, [record], data.spectra[0].cutoff, data.known)
+        floor = root_mean_square(held_out, np.ones(len(held_out.frequency)))
+        before, after = (
+            held_out.residuals(one.values[: len(held_out.base)], laws_of(one.effects))
+            for one in fits
+        )
+        powers = [root_mean_square(held_out, one) ** 2 for one in (before, after, after - before)]
+        counts = [len(rows) for rows in held_out.rows_of_parts()]
+        for name in names:
+            place = held_out.names.index(name)
+            expected = max(left[place], floor[place]) ** 2
+            found[name] += counts[place] * np.array([one[place] for one in powers]) / expected
+    return found
+
+
+def _held_out_test(
+    simulated: Sequence[SimulatedRecord], balances: Mapping[str, Values] = MappingProxyType({})
+) -> HeldOutTest:
+    """Return the held-out test of simulated positions, and of balances in their place.
+
+    In units of what was to be expected.
     A window of a free coordinate gives one independent value, since its error builds up.
     """
-    sums = np.zeros(3)
+    sums = np.sum([np.zeros(3), *balances.values()], axis=0)
     for record in simulated:
         for name, expected in record.expected.items():
+            if name in balances:
+                continue
             powers = np.array(record.powers(name))
             diverges = ~np.isfinite(powers[:2])
             if diverges.any():

@@ -11,6 +11,8 @@ from pymoo_hdte.drive._effects.base import (
 )
 from pymoo_hdte.drive._effects.encoder import ENCODER_LINE, Eccentricity
 from pymoo_hdte.drive._effects.encoder_zero import NewZero, ThermalDrift
+from pymoo_hdte.drive._effects.load_damping import LoadDamping
+from pymoo_hdte.drive._effects.load_error import LoadDependentError
 from pymoo_hdte.drive._effects.mesh_stiffness import MeshStiffnessVariation
 from pymoo_hdte.drive._effects.presliding import PreslidingFriction
 from pymoo_hdte.drive._effects.shafts import CoupledInertia, DampingReference, LoadInertia
@@ -26,6 +28,8 @@ __all__ = [
     "KinematicErrorLine",
     "KinematicReaction",
     "LawAtPort",
+    "LoadDamping",
+    "LoadDependentError",
     "LoadInertia",
     "MeshStiffnessVariation",
     "NewZero",

@@ -44,6 +44,8 @@ class DriveSizes(Sizes):
         Duration of the session, s.
     changes : tuple of float
         Times of the session between records, at which a reading may have changed at once, s.
+    loads_differ : bool
+        Whether the records are taken under different loads.
     """
 
     error: float = 0.0
@@ -53,6 +55,7 @@ class DriveSizes(Sizes):
     inertia: float = 0.0
     duration: float = 0.0
     changes: tuple[float, ...] = ()
+    loads_differ: bool = False
 
     def further(self) -> Self:
         """Return the sizes without the orders of believed lines of the error."""

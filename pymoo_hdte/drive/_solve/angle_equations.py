@@ -155,7 +155,11 @@ class AngleEquations:
     def _laws(
         self, port: str, position: Values, speed: Values, load: Values | None = None
     ) -> Response:
-        """Return the sum of the laws at a port, which passes on ``load`` besides them."""
+        """Return the sum of the laws at a port, which passes on ``load`` besides them.
+
+        What the mesh passes on is the load itself: a damping that followed the torque that
+        accelerates inertias would rectify it.
+        """
         laws = [law for place, law in self.coefficients.laws if place == port]
         if not laws:
             return _NO_LAW
@@ -166,6 +170,7 @@ class AngleEquations:
             return self.torus.phase(order / slower)
 
         stiffness = self.coefficients.stiffness[:, None]
+        load = self.load if port == "mesh" else load
         warmth = np.reshape(self.coefficients.temperature, (-1, 1))
         around = (self._path, self._back)
         state = PortState(position, speed, phase, stiffness, *around, load, warmth, recurs=True)

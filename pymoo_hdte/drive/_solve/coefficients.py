@@ -70,6 +70,9 @@ class Coefficients:
     coupled : tuple of (float, float)
         Inertias beyond the output coupling that a viscous clutch drives: each J in kg.m2 with the
         time in s after which it has come to speed, J over the damping of the clutch.
+    load_errors : tuple of (float, complex)
+        Lines of theta_s in proportion to the load: each an order with a phasor in rad per N.m.
+        Solvers know them by `at_loads`.
 
     Examples
     --------
@@ -98,6 +101,7 @@ class Coefficients:
     temperature: float | NDArray[np.float64] = np.nan
     load_rates: tuple[tuple[int, float], ...] = ()
     coupled: tuple[tuple[float, float], ...] = ()
+    load_errors: tuple[tuple[float, complex], ...] = ()
 
     def rows(self, rows: slice | NDArray[np.int_]) -> Coefficients:
         """Return the coefficients of some of the designs.
@@ -114,6 +118,29 @@ class Coefficients:
         values = {field.name: getattr(self, field.name) for field in fields(self)}
         parts = {k: v[rows] for k, v in values.items() if k in _BY_DESIGN and np.ndim(v)}
         return replace(self, **parts)
+
+    def at_loads(self, load_torque: float | NDArray[np.float64]) -> Coefficients:
+        """Return the coefficients with the lines of ``load_errors`` among those of theta_s.
+
+        Parameters
+        ----------
+        load_torque : float or ndarray, shape (n,)
+            N.m at the output.
+
+        Returns
+        -------
+        Coefficients
+        """
+        if not self.load_errors:
+            return self
+        orders, by_load = zip(*self.load_errors, strict=True)
+        load = np.broadcast_to(load_torque, len(self.stiffness))
+        return replace(
+            self,
+            error_orders=np.append(self.error_orders, orders),
+            error_phasors=np.hstack([self.error_phasors, np.outer(load, by_load)]),
+            load_errors=(),
+        )
 
     def torque_at(
         self, input_speed: NDArray[np.float64], load_torque: NDArray[np.float64]

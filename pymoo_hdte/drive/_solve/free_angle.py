@@ -50,6 +50,7 @@ _SHRINKS = 0.1
 def torus_of(coefficients: Coefficients) -> Torus:
     """Return a torus that holds all excited orders with room for their combinations."""
     excited = [float(order) for order in coefficients.error_orders]
+    excited += [order for order, _ in coefficients.load_errors]
     for port, law in coefficients.laws:
         scale = 1.0 / coefficients.ratio if port == "output" else 1.0
         excited += [scale * order for order in law.orders]
@@ -125,6 +126,7 @@ def harmonic_balance(
     load = np.broadcast_to(coefficients.load_torque if load_torque is None else load_torque, n)
     if np.any(speed == 0.0):
         raise InvalidInput("input_speed", 0.0, "other than 0")
+    coefficients = coefficients.at_loads(load)
     torus = torus_of(coefficients) if torus is None else torus
     if start is not None and not np.array_equal(start.torus.orders, torus.orders):
         start = None

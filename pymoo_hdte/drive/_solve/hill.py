@@ -119,6 +119,7 @@ def _solved(coefficients: Coefficients) -> tuple[NDArray[np.bool_], OrderSpectru
 
     Rows that were not are 0.
     """
+    coefficients = coefficients.at_loads(coefficients.load_torque)
     if coefficients.laws or coefficients.reaction or coefficients.load_rates:
         balance = continued_from_neighbours(coefficients, harmonic_balance(coefficients))
         phasors = np.where(balance.converged[:, None], balance.transmission_error, 0.0)

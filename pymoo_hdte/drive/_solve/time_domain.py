@@ -71,6 +71,7 @@ def equations_of_motion(
     """Return the right-hand side of Eq. (9) for the first design in ``coefficients``."""
     if coefficients.load_rates:
         raise InvalidInput("load_rates", coefficients.load_rates, "none in the time domain")
+    coefficients = coefficients.at_loads(coefficients.load_torque)
     ratio, load = coefficients.ratio, coefficients.load_torque
     stiffness, damping = float(coefficients.stiffness[0]), float(coefficients.damping[0])
     depth, phase = coefficients.stiffness_depth, coefficients.stiffness_phase
@@ -118,7 +119,7 @@ def equations_of_motion(
         torsion_rate = error_rate - envelope_rate * static - envelope * slope * rate
         varying = 1.0 + depth * math.cos(2.0 * position + phase)
         mesh_torque = stiffness * varying * torsion + damping * torsion_rate
-        mesh_torque += laws("mesh", torsion, torsion_rate, position)
+        mesh_torque += laws("mesh", torsion, torsion_rate, position, load * envelope)
         memory_states = np.split(state[:of_clutches], of_laws)[1:] if remembering else []
         slips = state[of_clutches:].tolist()
         for law, states in zip(remembering, memory_states, strict=True):

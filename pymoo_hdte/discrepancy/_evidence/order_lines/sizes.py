@@ -52,6 +52,8 @@ class Scales:
         Whether the load opposes the motion in some records and drives it in others.
     temperature : float
         Mean of the records, K, if all have a temperature and these spread enough; else 0.
+    loads_differ : bool
+        Whether the records are taken under different loads.
     """
 
     speed: float
@@ -65,6 +67,7 @@ class Scales:
     temperature: float = 0.0
     changes: tuple[float, ...] = ()
     swept: bool = False
+    loads_differ: bool = False
 
 
 def scales_of(data: Data, base: Fit) -> Scales:
@@ -99,6 +102,7 @@ def scales_of(data: Data, base: Fit) -> Scales:
         temperature=_temperature(data),
         changes=_changes(when.elapsed),
         swept=bool(data.torsion),
+        loads_differ=bool(np.ptp(when.output_torque) > least),
     )
 
 
@@ -168,6 +172,8 @@ def port_sizes(
         "mesh": scales.torque,
         "sensor": 0.0,
     }
+    damping = dict.fromkeys(residual, 0.0)
+    damping |= {"input": believed.input_damping, "mesh": believed.damping}
     lines = zip(believed.error_orders, believed.error_amplitudes, strict=True)
     shared = DriveSizes(
         force=0.0,
@@ -190,6 +196,7 @@ def port_sizes(
         duration=scales.duration,
         temperature=scales.temperature,
         changes=scales.changes,
+        loads_differ=scales.loads_differ,
     )
     slower = {"input": 1.0, "mesh": 1.0, "output": believed.ratio, "sensor": believed.ratio}
     return {
@@ -201,7 +208,7 @@ def port_sizes(
             residual=residual[port],
             largest=largest[port],
             speed=shared.speed / slower[port],
-            damping=believed.input_damping if port == "input" else 0.0,
+            damping=damping[port],
             load=scales.torque / believed.ratio if port == "input" else 0.0,
             swept=scales.swept and port == "output",
             slower=slower[port],
