@@ -17,9 +17,16 @@ from pymoo_hdte.drive import UnstableDrive
 DOCUMENT = {
     "status": "named",
     "sentence": "There is play between the teeth.",
-    "effects": [{"name": "backlash", "port": "mesh"}],
+    "effects": [
+        {
+            "name": "backlash",
+            "port": "mesh",
+            "order": None,
+            "parameters": {"width": {"value": 1e-4, "interval95": [9e-5, 1.1e-4], "unit": "rad"}},
+        }
+    ],
     "location": {"sentence": "In the mean."},
-    "gap_sentence": "Off by 3 before, 1 after.",
+    "held_out": {"before": 3.0, "after": 1.0, "unit": "arcsec"},
     "limits": ["No record was held out."],
     "next_experiment": {"description": "a sweep through zero"},
 }
