@@ -45,7 +45,8 @@ def test_the_verdict_is_printed_in_words(ready, capsys):
     assert run() == 0
     printed = capsys.readouterr().out
     for words in (
-        "named: backlash at the mesh",
+        "named",
+        "backlash (mesh)",
         "play between",
         "In the mean",
         "held out",
@@ -164,8 +165,9 @@ def test_what_a_terminal_cannot_show_is_replaced():
 def test_a_full_disk_behind_stdout_is_one_line():
     code = (
         "import sys; from pymoo_hdte.cli import command_line as cli, discrepancy;"
+        "from pymoo_hdte.discrepancy._report import summary;"
         "discrepancy._analysed = lambda *a: {'a': 1};"
-        "discrepancy._summary = lambda *a: 'found';"
+        "summary.summary = lambda *a: 'found';"
         "sys.exit(cli.main(['discrepancy', 'x', '--out', 'y']))"
     )
     with open("/dev/full", "w") as full:
