@@ -21,6 +21,11 @@ def svg(figure: Figure) -> str:
     return buffer.getvalue().decode()
 
 
+def svg_uri(text: str) -> str:
+    """Return a picture in SVG as the address of an inline one."""
+    return "data:image/svg+xml;base64," + base64.b64encode(text.encode()).decode()
+
+
 def data_uri(figure: Figure) -> str:
     """Return a figure as the address of an inline SVG."""
-    return "data:image/svg+xml;base64," + base64.b64encode(svg(figure).encode()).decode()
+    return svg_uri(svg(figure))

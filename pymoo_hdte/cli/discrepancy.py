@@ -56,6 +56,7 @@ def _add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def _run(options: argparse.Namespace, say: Say) -> Outcome:
     from pymoo_hdte.discrepancy._report.folder import FOLDER
+    from pymoo_hdte.discrepancy._report.summary import summary
     from pymoo_hdte.effects import register, registered
 
     believed = options.believed, options.sheet
@@ -65,7 +66,7 @@ def _run(options: argparse.Namespace, say: Say) -> Outcome:
             register(effect)
         with errors_by_line(options.effects):
             document = _analysed(options, believed, say)
-    return Outcome(document, _summary(document, options.out))
+    return Outcome(document, summary(document, str(options.out / PAGE_FILE)))
 
 
 def _analysed(options: argparse.Namespace, believed: ModelFiles, say: Say) -> dict[str, Any]:
@@ -122,39 +123,6 @@ def _believing(measured: Any, model: Path | None, sheet: Path | None) -> Any:
         return measured
     read = read_drive_model(model, sheet) if of_drive else read_mechanism_model(model)
     return measured.believing(read)
-
-
-def _summary(document: dict[str, Any], out: Path) -> str:
-    torsion: dict[str, Any] = document.get("torsion", {"effects": [], "limits": []})
-    names = " + ".join(_name(effect) for effect in (*document["effects"], *torsion["effects"]))
-    lines = [
-        f"{document['status']}{': ' + names if names else ''}",
-        document["sentence"],
-        *([relevance["sentence"]] if (relevance := document.get("relevance")) else []),
-        document["location"]["sentence"],
-        f"Validation: {document['gap_sentence']}",
-        *document["limits"],
-        *_remarks(document.get("record_remarks", [])),
-        *torsion["limits"],
-        f"Next: {document['next_experiment']['description']}",
-        *([f"For the torsion: {test}"] if (test := torsion.get("next_experiment")) else []),
-        f"Report: {out / PAGE_FILE}",
-    ]
-    return "\n".join(lines)
-
-
-def _remarks(remarks: list[str]) -> list[str]:
-    """Return one line on how records were read; the report has all remarks."""
-    if len(remarks) < 2:
-        return remarks
-    further = len(remarks) - 1
-    return [f"{remarks[0]} The report has {further} more such remark{'s' if further > 1 else ''}."]
-
-
-def _name(effect: dict[str, Any]) -> str:
-    if effect["name"] == "parameter":
-        return str(effect["port"]).replace("_", " ")
-    return f"{effect['name']} at the {effect['port']}"
 
 
 DISCREPANCY = Command(

@@ -17,9 +17,16 @@ from pymoo_hdte.drive import UnstableDrive
 DOCUMENT = {
     "status": "named",
     "sentence": "There is play between the teeth.",
-    "effects": [{"name": "backlash", "port": "mesh"}],
+    "effects": [
+        {
+            "name": "backlash",
+            "port": "mesh",
+            "order": None,
+            "parameters": {"width": {"value": 1e-4, "interval95": [9e-5, 1.1e-4], "unit": "rad"}},
+        }
+    ],
     "location": {"sentence": "In the mean."},
-    "gap_sentence": "Off by 3 before, 1 after.",
+    "held_out": {"before": 3.0, "after": 1.0, "unit": "arcsec"},
     "limits": ["No record was held out."],
     "next_experiment": {"description": "a sweep through zero"},
 }
@@ -38,7 +45,8 @@ def test_the_verdict_is_printed_in_words(ready, capsys):
     assert run() == 0
     printed = capsys.readouterr().out
     for words in (
-        "named: backlash at the mesh",
+        "named",
+        "backlash (mesh)",
         "play between",
         "In the mean",
         "held out",
@@ -157,8 +165,9 @@ def test_what_a_terminal_cannot_show_is_replaced():
 def test_a_full_disk_behind_stdout_is_one_line():
     code = (
         "import sys; from pymoo_hdte.cli import command_line as cli, discrepancy;"
+        "from pymoo_hdte.discrepancy._report import summary;"
         "discrepancy._analysed = lambda *a: {'a': 1};"
-        "discrepancy._summary = lambda *a: 'found';"
+        "summary.summary = lambda *a: 'found';"
         "sys.exit(cli.main(['discrepancy', 'x', '--out', 'y']))"
     )
     with open("/dev/full", "w") as full:

@@ -8,7 +8,13 @@ from pymoo_hdte._reports.folder import ReportFolder
 from pymoo_hdte.discrepancy._answers.descriptive_model import DESCRIPTIVE_FILE
 from pymoo_hdte.discrepancy._answers.revision_drive import MODEL_FILE, SHEET_FILE
 
-FOLDER = ReportFolder("verdict.json", optional=(MODEL_FILE, SHEET_FILE, DESCRIPTIVE_FILE))
+PLOT_FILES = tuple(
+    f"{name}.{suffix}" for name in ("friction", "torsion", "campbell") for suffix in ("csv", "svg")
+)
+"""Names of all files of plots that a report may have: pictures, and the plotted numbers."""
+FOLDER = ReportFolder(
+    "verdict.json", optional=(MODEL_FILE, SHEET_FILE, DESCRIPTIVE_FILE, *PLOT_FILES)
+)
 
 
 def check_report_folder(out: str | Path) -> None:

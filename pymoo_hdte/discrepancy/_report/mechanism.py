@@ -28,6 +28,13 @@ from pymoo_hdte.discrepancy._report.mechanism_figures import (
     misfit_over_motion,
     overlay,
 )
+from pymoo_hdte.discrepancy._report.plots import Plot, plot_files
+from pymoo_hdte.discrepancy._report.plots_mechanism import mechanism_plots
+from pymoo_hdte.discrepancy._report.tables import (
+    compared_rows,
+    effect_rows,
+    mechanism_parameter_rows,
+)
 from pymoo_hdte.discrepancy._report.torsion import torsion_document, torsion_picture
 from pymoo_hdte.discrepancy._verdicts.joint import JointFinding, revised_joint
 from pymoo_hdte.discrepancy._verdicts.mechanism_finding import MechanismFinding
@@ -85,7 +92,9 @@ def write_mechanism_report(
         words = f"Torques: {document['sentence']} Torsion: {torsion['sentence']}"
         document |= {"status": joint.status, "sentence": words, "torsion": torsion}
         document["location"]["sentence"] += f" {torsion['location']}"
-    files = {MODEL_FILE: model_text(revised)}
+    plots = mechanism_plots(finding, joint)
+    document["plots"] = [plot.as_dict() for plot in plots]
+    files = {MODEL_FILE: model_text(revised), **plot_files(plots)}
     if descriptive is not None:
         files[DESCRIPTIVE_FILE] = model_text(descriptive.model)
         sentence = descriptive_sentence(descriptive)
@@ -94,7 +103,7 @@ def write_mechanism_report(
             "sentence": sentence,
             **descriptive.as_dict(),
         }
-    page_text = _page(finding, document, errors, joint)
+    page_text = _page(finding, document, errors, joint, plots)
     FOLDER.write(Path(out), page_text, document, files)
     return document
 
@@ -104,6 +113,7 @@ def _page(
     document: dict[str, Any],
     errors: Sequence[MechanismPredictionError],
     joint: JointFinding | None,
+    plots: Sequence[Plot],
 ) -> str:
     pictures = {
         "torsion": data_uri(torsion_picture(joint)) if joint else "",
@@ -111,18 +121,21 @@ def _page(
         "frequency": data_uri(misfit_over_frequency(finding)),
         "errors": data_uri(errors_figure(errors)) if errors else "",
     }
-    rows = _effect_rows(document["effects"])
-    sizes = [row for row in rows if not row["parameter"].endswith("phase")]
+    rows = effect_rows(document["effects"])
+    sizes = [row for row in rows if row.is_headline]
+    nominal = {name: value.value for name, value in finding.mechanism.quantities.items()}
     shown = _shown(errors)
     pictures["overlay"] = data_uri(overlay(finding, shown)) if shown else ""
-    chosen = finding.verdict.chosen
+    chosen, torsion = finding.verdict.chosen, document.get("torsion")
     compared = [evidence(finding, chosen)] if chosen else []
     return page(
         "pymoo_hdte.discrepancy._report",
         "mechanism.html.j2",
         document=document,
-        torsion=document.get("torsion"),
-        torsion_rows=_effect_rows(document["torsion"]["effects"]) if joint else [],
+        torsion=torsion,
+        torsion_parameters=mechanism_parameter_rows(torsion["base"], {}) if torsion else [],
+        torsion_compared=compared_rows(torsion["alternatives"]) if torsion else [],
+        torsion_rows=effect_rows(document["torsion"]["effects"]) if joint else [],
         rows=rows,
         sizes=sizes[:_SIZES],
         more=len(sizes) > _SIZES,
@@ -130,11 +143,12 @@ def _page(
         errors=errors,
         shown=shown,
         pictures=pictures,
+        plots=plots,
         certainty=how_sure_of_records(finding.verdict),
-        compared=[*compared, *document["alternatives"]],
+        compared=compared_rows([*compared, *document["alternatives"]]),
         extent_sentence=extent_sentence(errors),
         believed_effects=believed_in_words(document),
-        believed={name: value.value for name, value in finding.mechanism.quantities.items()},
+        parameters=mechanism_parameter_rows(document["base"], nominal),
     )
 
 
@@ -214,19 +228,3 @@ def _change(before: float, after: float) -> str:
     if not np.isfinite(before + after):
         return "diverges for one of the models,"
     return f"falls by {percent(1.0 - after / before)}" if after < before else "does not fall,"
-
-
-def _effect_rows(effects: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
-    return [
-        {
-            "effect": f"{effect['name'].replace('_', ' ')} ({effect['port']})",
-            "parameter": name.replace("_", " "),
-            "value": parameter["value"],
-            "lower": parameter["interval95"][0],
-            "upper": parameter["interval95"][1],
-            "at_bound": parameter["at_bound"],
-            "unit": "" if parameter["unit"] == "1" else parameter["unit"],
-        }
-        for effect in effects
-        for name, parameter in effect["parameters"].items()
-    ]

@@ -22,7 +22,11 @@ from pymoo_hdte.discrepancy._report.document import (
     with_believed_effects,
 )
 from pymoo_hdte.discrepancy._report.folder import FOLDER
-from pymoo_hdte.discrepancy._report.tables import effect_rows, hypothesis_rows
+from pymoo_hdte.discrepancy._report.tables import (
+    effect_rows,
+    hypothesis_rows,
+    mechanism_parameter_rows,
+)
 from pymoo_hdte.discrepancy._report.words import caveats
 from pymoo_hdte.discrepancy._verdicts.own_machine import HeldOutErrors, MachineFinding
 from pymoo_hdte.mechanism.effects import table_of
@@ -56,7 +60,7 @@ def write_machine_report(
     """
     FOLDER.check(Path(out))
     verdict, unit_of = finding.verdict, lambda name: finding.data.model.units.get(name, "1")
-    document = {
+    document: dict[str, Any] = {
         "schema_version": SCHEMA_VERSION,
         "campaign": finding.title,
         "status": verdict.status,
@@ -82,13 +86,14 @@ def write_machine_report(
             **{name: version(name) for name in ("pymoo-hdte", "numpy", "scipy")},
         },
     }
+    nominal = {parameter.name: parameter.start for parameter in finding.data.base}
     html = page(
         "pymoo_hdte.discrepancy._report",
         "own_machine.html.j2",
         document=document,
         rows=effect_rows(document["effects"], ()),
         hypotheses=hypothesis_rows(verdict, ()),
-        nominal={parameter.name: parameter.start for parameter in finding.data.base},
+        parameters=mechanism_parameter_rows(document["base"]["parameters"], nominal),
         errors=errors,
         certainty=how_sure_of_records(verdict),
         known=believed_in_words(document),

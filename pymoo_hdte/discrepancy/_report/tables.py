@@ -69,6 +69,7 @@ class EffectRow:
     lower: float
     upper: float
     unit: str
+    at_bound: bool = False
 
     @property
     def is_headline(self) -> bool:
@@ -81,33 +82,39 @@ class EffectRow:
 
 @dataclass(frozen=True)
 class HypothesisRow:
-    """Evidence for a set of effects; ``bic`` above that of the best, what is explained in words."""
+    """Evidence for a set of effects; ``bic`` above that of the best, what is explained in words.
+
+    Of a mechanism without ``chi_square``, and ``bic`` above that of what was chosen, if anything.
+    """
 
     label: str
     role: str
-    chi_square: float
+    chi_square: float | None
     explained: str
-    bic: float
+    bic: float | None
     at_bounds: str
 
 
 def effect_rows(
     effects: Sequence[Mapping[str, Any]], error_orders: Sequence[float] = ()
 ) -> list[EffectRow]:
-    """Return the parameters of the effects of a verdict document; angles in arcsec."""
+    """Return the parameters of the effects of a verdict document; of a drive, angles in arcsec."""
     rows = []
     for effect in effects:
-        where = "" if effect["order"] is None else f", order {effect['order']:.4g}"
+        # Only effects of a mechanism have no order, not even None.
+        of_drive, order = "order" in effect, effect.get("order")
+        where = "" if order is None else f", order {order:.4g}"
         of_effect = f"{effect['name'].replace('_', ' ')} ({effect['port']}{where})"
-        label = "" if effect["name"] == "parameter" else of_effect
+        label = "" if of_drive and effect["name"] == "parameter" else of_effect
         for name, quantity in effect["parameters"].items():
-            angle = quantity["unit"] == "rad" and not name.endswith("phase")
+            angle = of_drive and quantity["unit"] == "rad" and not name.endswith("phase")
             size, unit = (ARCSEC, "arcsec") if angle else (1.0, _shown(quantity["unit"]))
             value, low, high = (
                 number / size for number in (quantity["value"], *quantity["interval95"])
             )
             words = name_by_order(name, error_orders) if not label else name.replace("_", " ")
-            rows.append(EffectRow(label, words, value, low, high, unit))
+            at_bound = quantity.get("at_bound", False)
+            rows.append(EffectRow(label, words, value, low, high, unit, at_bound))
     return rows
 
 
@@ -143,6 +150,40 @@ def parameter_rows(finding: DriveFinding) -> list[ParameterRow]:
     return [
         _parameter_row(finding.campaign, parameter, entries[parameter.name], bool(has_interval))
         for parameter, has_interval in zip(finding.data.base, known, strict=False)
+    ]
+
+
+def mechanism_parameter_rows(
+    fitted: Mapping[str, Mapping[str, Any]], nominal: Mapping[str, float]
+) -> list[ParameterRow]:
+    """Return the rows of fitted parameters of a verdict document, beside their nominal values."""
+    return [
+        ParameterRow(
+            name.replace("_", " "),
+            _shown(entry.get("unit", "")),
+            nominal.get(name),
+            entry["value"],
+            tuple(entry["interval95"]),
+            None,
+            None,
+            entry["at_bound"],
+        )
+        for name, entry in fitted.items()
+    ]
+
+
+def compared_rows(compared: Sequence[Mapping[str, Any]]) -> list[HypothesisRow]:
+    """Return the evidence of a verdict document on a mechanism, without its chi-square."""
+    return [
+        HypothesisRow(
+            entry["label"],
+            entry["role"],
+            None,
+            percent(entry["explained"]),
+            entry["bic_gap"],
+            "",
+        )
+        for entry in compared
     ]
 
 

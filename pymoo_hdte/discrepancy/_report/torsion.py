@@ -19,6 +19,7 @@ from pymoo_hdte.discrepancy._answers.joint_open_questions import (
 from pymoo_hdte.discrepancy._report.document import sentence
 from pymoo_hdte.discrepancy._report.mechanism_document import evidence, offered
 from pymoo_hdte.discrepancy._report.mechanism_values import effects, quantities
+from pymoo_hdte.discrepancy._report.plots_mechanism import motor_torque
 from pymoo_hdte.discrepancy._report.words import in_a_sentence
 from pymoo_hdte.discrepancy._selection.candidate import Candidate
 from pymoo_hdte.discrepancy._selection.reason import NOT_VALIDATED, Reason
@@ -255,14 +256,8 @@ def torsion_picture(finding: JointFinding) -> Figure:
         fits.append((torsion.accepted, AFTER, "x", "after"))
     coefficients = [torsion.data.coefficients(fit.residuals) for fit, *_ in fits]
     for record, balance in enumerate(torsion.data.spectra):
-        motion, rows = balance.ports[gear], balance.record.time
-        torque = sum(
-            actuator.gain.value
-            * actuator.acts[finding.joint.motor]
-            * balance.record.channels[actuator.name]
-            for actuator in torsion.mechanism.inputs
-        )
-        over = np.interp(balance.time, rows, np.asarray(torque)), motion.shaft
+        motion = balance.ports[gear]
+        over = motor_torque(finding, balance), motion.shaft
         stride = slice(None, None, max(1, len(balance.time) * len(torsion.data.spectra) // _POINTS))
         for column, x in enumerate(over):
             axes[0, column].plot(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -31,6 +31,8 @@ from pymoo_hdte.discrepancy._report.figures import (
 )
 from pymoo_hdte.discrepancy._report.folder import FOLDER
 from pymoo_hdte.discrepancy._report.optimum import OptimumShift
+from pymoo_hdte.discrepancy._report.plots import Plot, plot_files
+from pymoo_hdte.discrepancy._report.plots_drive import drive_plots
 from pymoo_hdte.discrepancy._report.tables import (
     effect_rows,
     fault_rows,
@@ -95,31 +97,34 @@ def write_report(
     limits = campaign_limits(finding)
     document["limits"] = [limit_sentence(limit) for limit in limits]
     document["limit_codes"] = [limit.as_dict() for limit in limits]
-    model_files, shift = _revision(finding, optimum_shift)
+    model_files, model, shift = _revision(finding, optimum_shift)
     document["revised_model"] = {"file": MODEL_FILE if model_files else None}
     document["robust_optimum"] = _shift_document(shift)
     document["gap_sentence"] = validation_sentence(finding, validation)
     if hints := sensor_hints(finding.campaign):
         document["sensor_hints"] = hints
-    html = _page(finding, location, validation, document, shift)
-    FOLDER.write(Path(out), html, document, model_files)
+    plots = drive_plots(finding, model, document)
+    document["plots"] = [plot.as_dict() for plot in plots]
+    html = _page(finding, location, validation, document, shift, plots)
+    FOLDER.write(Path(out), html, document, {**model_files, **plot_files(plots)})
     return document
 
 
 def _revision(
     finding: DriveFinding, optimum_shift: OptimumOf
-) -> tuple[dict[str, str], OptimumShift]:
-    """Return the files of the revised model, and its effect on the robust optimum."""
+) -> tuple[dict[str, str], DriveModel | None, OptimumShift]:
+    """Return the files of the revised model, that model, and its effect on the robust optimum."""
     try:
         model = revised_model(finding)
         before = drive_model(finding.campaign, finding.verdict.base, "before", "the fitted base")
     except InvalidInput as error:
-        return {}, OptimumShift((), f"The revised drive is no drive model: {error}.")
+        return {}, None, OptimumShift((), f"The revised drive is no drive model: {error}.")
     how_to_read = f'# Read it with load_model("{MODEL_FILE}", load_datasheet("{SHEET_FILE}")).\n'
     files = {MODEL_FILE: how_to_read + model_toml(model), SHEET_FILE: sheet_toml(model.sheet)}
     if not finding.verdict.accepted.candidates:
-        return files, OptimumShift((), "No effect was added, so the optimum stays where it was.")
-    return files, optimum_shift(before, model)
+        stays = "No effect was added, so the optimum stays where it was."
+        return files, model, OptimumShift((), stays)
+    return files, model, optimum_shift(before, model)
 
 
 def _shift_document(shift: OptimumShift) -> dict[str, Any]:
@@ -146,6 +151,7 @@ def _page(
     validation: Validation | None,
     document: dict[str, Any],
     shift: OptimumShift,
+    plots: Sequence[Plot],
 ) -> str:
     orders = finding.campaign.believed.error_orders
     pictures = {
@@ -172,6 +178,7 @@ def _page(
         certainty=how_sure(finding),
         next_test=document["next_experiment"]["description"],
         pictures=pictures,
+        plots=plots,
         hypotheses=hypothesis_rows(finding.verdict, orders),
         parameters=parameter_rows(finding),
         metrics=metric_rows(validation),

@@ -170,6 +170,29 @@ class Observations:
         self, vectors: Vector, known: Sequence[DriveEffect], effects: Sequence[DriveEffect]
     ) -> NDArray[np.float64]:
         """Return whitened residuals of the sweeps where the believed effects are ``known``."""
+        swept = self._swept(vectors, known, effects)
+        residuals = [
+            (torsion - points.angle) @ points.whitening.T
+            for torsion, points in zip(swept, self.torsion, strict=True)
+        ]
+        return np.hstack(residuals)
+
+    def swept_torsion(
+        self, vector: Vector, effects: Sequence[DriveEffect]
+    ) -> list[NDArray[np.float64]]:
+        """Return the torsion at the points of each sweep, rad, shapes (n_points,).
+
+        ``vector`` are the base parameters, shape (n_base,).
+        """
+        ((_, known),) = of_equal_numbers(
+            self.campaign.believed.effects, self._values_by_name(vector[None])
+        )
+        return [torsion[0] for torsion in self._swept(vector[None], known, effects)]
+
+    def _swept(
+        self, vectors: Vector, known: Sequence[DriveEffect], effects: Sequence[DriveEffect]
+    ) -> list[NDArray[np.float64]]:
+        """Return the torsion (v, n_points) of each sweep where the believed effects are known."""
         values = self._values_by_name(vectors)
         coefficients = coefficients_of(self.campaign.believed, values, (*known, *effects), 1)
         stiffness = coefficients.stiffness * values["locked_stiffness"]
@@ -179,15 +202,15 @@ class Observations:
         sensors = (values[f"output_torque_{part}"].tolist() for part in ("gain", "zero"))
         for row, sensor in enumerate(zip(*sensors, strict=True)):
             of_sensors.setdefault(sensor, []).append(row)
-        residuals = []
+        swept = []
         for points in self.torsion:
             torsion = np.empty((len(vectors), len(points.angle)))
             for (gain, zero), rows in of_sensors.items():
                 group = coefficients if len(of_sensors) == 1 else coefficients.rows(np.array(rows))
                 path = (points.path - zero) / (1.0 + gain)
                 torsion[rows] = mean_torsion(group, path)[:, points.intervals]
-            residuals.append((torsion - points.angle) @ points.whitening.T)
-        return np.hstack(residuals)
+            swept.append(torsion)
+        return swept
 
     @property
     def n_sweep_residuals(self) -> int:
