@@ -195,7 +195,11 @@ def test_page_lists_the_library():
     listed = [name for row in rows for name in re.findall(r"`(\w+)`", row)]
     # A clearance that varies belongs to the mesh of a drive, and is looked for there only; and what
     # is a form of another alone is tried in drives only.
-    of_drives = {"clearance_variation", "shear_thinning_drag", "bouc_wen_hysteresis"}
+    # So is damping by the load that a mesh passes on.
+    of_drives = {
+        *("clearance_variation", "shear_thinning_drag", "bouc_wen_hysteresis"),
+        "load_dependent_damping",
+    }
     assert sorted(listed) == sorted({one.name for one in law_effects()} - of_drives)
 
 
