@@ -95,7 +95,7 @@ def highest_frequency(
     Raises
     ------
     InvalidInput
-        If the position exceeds its noise at no frequency, or not at the lowest ones.
+        If the position exceeds its noise at no frequency.
     """
     # Second differences, because the spectrum of a position falls too steeply for a window.
     difference = np.diff(position, 2)
@@ -104,28 +104,21 @@ def highest_frequency(
     )
     noise = 2.0 * step * deviation**2 * (2.0 * np.sin(np.pi * frequency * step)) ** 4
     stands_out = power[1:] > _STANDS_OUT * noise[1:]
-    strongest = int(np.argmax(power[1:] / frequency[1:] ** 4))
-    # The lowest frequencies contain the leakage of the window even for white noise.
+    moves = power[1:] / frequency[1:] ** 4
+    strongest = int(np.argmax(moves))
+    # The lowest frequencies contain the leakage of the window even for white noise. Where nothing
+    # moves so slowly, a band of twice as many above them, which noise has seldom, is the motion.
     if not (np.all(stands_out[:_FEWEST]) or (strongest >= _FEWEST and stands_out[strongest])):
-        raise _no_cutoff(frequency[1:], power[1:] / np.maximum(noise[1:], 1e-300))
+        in_a_row = np.convolve(stands_out[_FEWEST:], np.ones(2 * _FEWEST), "valid")
+        shown = _FEWEST + np.flatnonzero(in_a_row == 2 * _FEWEST)
+        if not shown.size:
+            allowed = f"more than {_STANDS_OUT:g} at some frequency, or its motion is unknown"
+            ratio = float(np.max(power[1:] / np.maximum(noise[1:], 1e-300)))
+            raise InvalidInput("power of a position over that of its noise", ratio, allowed)
+        strongest = int(shown[np.argmax(moves[shown])])
     quiet = np.flatnonzero(~stands_out[strongest:])
     end = strongest + quiet[0] if quiet.size else len(stands_out)
     return float(min(frequency[end], highest_share(step, share)))
-
-
-def _no_cutoff(frequency: Values, ratio: Values) -> InvalidInput:
-    """Return why no cutoff was found, and at which frequencies a motion shows, if at any."""
-    shown = frequency[_FEWEST:][ratio[_FEWEST:] > _STANDS_OUT]
-    if not shown.size:
-        allowed = f"more than {_STANDS_OUT:g} at some frequency, or nothing is known of its motion"
-        return InvalidInput(
-            "power of a position over that of its noise", float(np.max(ratio)), allowed
-        )
-    allowed = (
-        f"one that is stated, in Hz: below {frequency[_FEWEST]:.2g} Hz the position is not above "
-        f"its noise; it is between {shown[0]:.2g} and {shown[-1]:.2g} Hz"
-    )
-    return InvalidInput("cutoff", None, allowed)
 
 
 def highest_share(step: float, share: float = _HIGHEST_SHARE) -> float:

@@ -5,7 +5,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.fft import dct
+from scipy.signal import butter, sosfiltfilt
 
+from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.effects.friction import CoulombFriction, NonlinearDrag
 from pymoo_hdte.effects.hysteresis import MaxwellSlip
 from pymoo_hdte.effects.law import PortState, periodic_phase
@@ -267,3 +269,21 @@ def test_in_time_undoes_the_transform():
     balance = ForceBalance(two_masses(), closed(), CUTOFF)
     signal = balance.in_time(balance.terms[0, 0])
     assert np.sum(signal**2) == pytest.approx(np.sum(balance.terms[0, 0] ** 2))
+
+
+def test_a_motion_without_slow_parts_is_known_up_to_its_band(rng):
+    """A pendulum swings about its own frequency only; noise below it says nothing."""
+    band = butter(6, (0.7, 2.5), "bandpass", fs=1.0 / 0.03, output="sos")
+    position = 0.1 * sosfiltfilt(band, rng.standard_normal(6000))
+    noise = 1e-3 * rng.standard_normal(len(position))
+    assert 2.0 < highest_frequency(position + noise, 0.03, 1e-3) <= 10.0 / 3.0
+
+
+def test_noise_alone_is_no_motion(rng):
+    refused = 0
+    for _ in range(50):
+        try:
+            highest_frequency(1e-3 * rng.standard_normal(900), 0.01, 1e-3)
+        except InvalidInput:
+            refused += 1
+    assert refused >= 47
