@@ -297,7 +297,8 @@ def reported(tmp_path_factory):
 
 
 def test_every_file_is_there(reported):
-    assert files_of(reported / "one").keys() == set(FOLDER.files)
+    # The model that describes is one of mechanisms.
+    assert files_of(reported / "one").keys() == {*FOLDER.files} - {"descriptive_model.toml"}
 
 
 @pytest.mark.nightly

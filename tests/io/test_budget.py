@@ -235,7 +235,7 @@ def test_the_time_grows_in_proportion_to_the_length(tmp_path, monkeypatch):
     monkeypatch.setenv("PYMOO_HDTE_MOST_BYTES", "1_000_000_000")
     monkeypatch.setenv("PYMOO_HDTE_MOST_ROWS", "1_000_000_000")
     # As many blocks as a file four times as long has.
-    monkeypatch.setattr("pymoo_hdte._io.text_table.BLOCK", text_lines.BLOCK // 4)
+    monkeypatch.setattr("pymoo_hdte._io.csv_table.BLOCK", text_lines.BLOCK // 4)
 
     def seconds(content):
         path = tmp_path / "t.csv"

@@ -71,7 +71,7 @@ def _sensor_off(reason: Reason) -> str:
     )
 
 
-_LIMITS: dict[str, Callable[[Reason], str]] = {
+LIMITS: dict[str, Callable[[Reason], str]] = {
     codes.SAME_READING: lambda reason: (
         "Both angles begin at the same reading in every record. If their counters were zeroed "
         "there, zeros differ from record to record, and with them the phases of all lines: state "
@@ -139,7 +139,7 @@ _LIMITS: dict[str, Callable[[Reason], str]] = {
 
 def limit_sentence(limit: Reason) -> str:
     """Return a limit of the records as a sentence."""
-    return _LIMITS[limit.code](limit)
+    return LIMITS[limit.code](limit)
 
 
 def what_is_missing(candidates: Sequence[Candidate]) -> str:

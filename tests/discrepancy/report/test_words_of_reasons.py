@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from pymoo_hdte.discrepancy._report.words import in_a_sentence
+from pymoo_hdte.discrepancy._report.words import LIMITS, in_a_sentence, limit_sentence
 from pymoo_hdte.discrepancy._selection import reason as codes
 from pymoo_hdte.discrepancy._selection.reason import Reason
 
@@ -13,16 +13,20 @@ NUMBERS = {
     codes.ABOVE_NOISE: {"times_noise": 3.0},
     codes.EXPLAINS_TOO_LITTLE: {"share": 0.6},
     codes.HARMONIC_OF_ANOTHER: {"backlash:mesh@1": 2.0},
+    codes.SENSOR_OFF: {"fitted": 0.1, "stated": 0.01},
+    codes.LINES_ABOVE: {"20": 20.0, "highest": 18.0},
+    codes.HARMONIC_ABOVE: {"order": 10.0, "highest": 18.0},
 }
 
 
 @pytest.mark.parametrize("code", CODES)
 def test_every_code_has_a_sentence_and_is_plain_data(code):
-    reason = Reason.of(code, "hysteresis:mesh", NUMBERS.get(code, {"level": 0.5}))
-    assert in_a_sentence(reason)
+    effect = "input_torque_gain" if code == codes.SENSOR_OFF else "hysteresis:mesh"
+    reason = Reason.of(code, effect, NUMBERS.get(code, {"level": 0.5}))
+    assert (limit_sentence if code in LIMITS else in_a_sentence)(reason)
     assert json.loads(json.dumps(reason.as_dict())) == {
         "code": code,
-        "effect": "hysteresis:mesh",
+        "effect": effect,
         "numbers": dict(reason.numbers),
     }
 
