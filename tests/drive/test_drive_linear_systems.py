@@ -125,6 +125,7 @@ def test_a_steady_state_does_not_depend_on_how_its_steps_are_found(effects, monk
     assert difference < 1e-10 * np.abs(expected.torsion).max()
 
 
+@pytest.mark.nightly
 def test_three_beats_at_once_leave_most_of_the_memory_free():
     """Matrices of 24 rows with 689 harmonics and what they are made of took 1.2 GB."""
     coefficients = with_another_beat(drives(24, LOOP, *FRICTION))

@@ -90,6 +90,7 @@ def test_a_name_that_the_held_out_record_shows_is_given_and_one_at_rest_says_not
         assert verdict.shown_in_held_out == (record is shown)
 
 
+@pytest.mark.nightly
 def test_a_free_joint_is_simulated_until_it_drifts_and_its_name_stands():
     finding = found_on_joint(0.05)
     assert [one.name for one in finding.accepted.candidates] == ["coulomb_friction"]

@@ -27,6 +27,7 @@ def analysis_and_report():
     return reported(analyse(with_effects(campaign, rig, [PLANTED])))
 
 
+@pytest.mark.nightly
 def test_a_hidden_one_is_named_or_in_a_class_that_holds_it(tmp_path):
     analysis, files = analysis_and_report()
     put_files(files, tmp_path)

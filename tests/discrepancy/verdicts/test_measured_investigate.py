@@ -335,6 +335,7 @@ def test_play_takes_the_stiffness_that_is_fitted_and_not_the_believed_one():
     assert balanced.shrinkage > 0.9
 
 
+@pytest.mark.nightly
 def test_an_interval_that_is_printed_with_zero_in_it_leaves_no_plain_name(monkeypatch):
     """Of coloured residuals it is wider than the curvature of the fit says."""
 

@@ -198,6 +198,7 @@ def test_a_stored_fit_runs_again():
     assert run.values[:, 0] == pytest.approx(stored, rel=1e-4)
 
 
+@pytest.mark.nightly
 def test_the_report_is_made_from_the_committed_ladder(tmp_path):
     result = calibration.run(Context(1, tmp_path, Campaign(tmp_path)))
     numbers = result.tables[0]

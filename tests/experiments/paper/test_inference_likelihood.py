@@ -60,6 +60,7 @@ def calibrated():
     }
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("number", range(len(KNOWN)))
 @pytest.mark.parametrize("reading", ["peak_to_peak", "semi_amplitude"])
 def test_the_fast_dte_is_that_of_the_drive_model(number, reading):

@@ -94,6 +94,7 @@ def test_steps_of_the_paper_are_those_of_table_8():
     assert steps_of(OBSERVED) == pytest.approx([0.484, 0.468, -0.460, -0.136])
 
 
+@pytest.mark.nightly
 def test_the_report_says_what_the_fits_say(tmp_path, fits):
     result = experiment.run(Context(1, tmp_path, Campaign(tmp_path)))
     meeting = [one for one in fits if one.target == "common" and gives_trade_off(one)]

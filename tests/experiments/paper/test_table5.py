@@ -180,6 +180,7 @@ def test_both_intervals_of_theta_s_stand_beside_the_same_bands():
     assert half_widths == pytest.approx([3.0 * std, 0.35 * nominal[0] / ARCSEC])
 
 
+@pytest.mark.nightly
 def test_the_page_shows_the_spread_over_hypercubes(tmp_path, monkeypatch):
     monkeypatch.setattr(table5, "HYPERCUBES", {table5.SCATTER: 3, table5.BAND: 2})
     result = table5.run(Context(1, tmp_path, Campaign(tmp_path)))

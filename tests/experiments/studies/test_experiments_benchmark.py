@@ -55,6 +55,7 @@ def test_the_time_of_measured_rigs_is_shown_beside_what_is_allowed():
     assert "21 s of CPU (two); 20 are allowed" in finding.sentence
 
 
+@pytest.mark.nightly
 def test_the_time_of_verdicts_is_shown_beside_what_is_allowed(monkeypatch):
     pytest.importorskip("pysindy", reason="needs the extra blind")
     clean = [case for case in CASES if case.kind == "none"][:1]

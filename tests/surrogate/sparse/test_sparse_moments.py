@@ -104,6 +104,7 @@ def test_values_are_sums_of_products_of_chebyshev_polynomials():
     assert SparsePolynomial(SET, two)(cube) == pytest.approx(expected, rel=1e-12, abs=1e-12)
 
 
+@pytest.mark.nightly
 def test_many_designs_at_once_have_the_moments_of_few(monkeypatch):
     given_ = inputs()
     two = np.random.default_rng(5).normal(size=(2, len(SET)))

@@ -39,6 +39,7 @@ def same_again(stored):
     assert found.equivalents == stored.equivalents, stored.case.key
 
 
+@pytest.mark.nightly
 def test_the_cheapest_ends_as_it_is_stored(outcomes):
     same_again(min(outcomes, key=lambda one: sum(one.seconds) or 1e9))
 

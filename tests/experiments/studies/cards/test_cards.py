@@ -65,6 +65,7 @@ def test_two_wells_are_two_optima_and_half_of_the_starts_reach_the_better():
     assert reached == pytest.approx(0.5, abs=0.2)
 
 
+@pytest.mark.nightly
 def test_the_toy_has_one_optimum_and_one_piece():
     found = hardness(RobustToy(), np.random.default_rng(1), starts=3)
     assert (found.optima, found.best_reached, found.pieces, found.feasible) == (1, 1.0, 1, 1.0)

@@ -228,6 +228,7 @@ def test_a_part_without_which_runs_fail_costs_everything(rng):
     assert np.isfinite(low[0])
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     ("experiment", "algorithms"),
     [(peers, set(CONTESTANTS)), (swarm_parts, {OURS, *SWARM_VARIANTS})],

@@ -109,6 +109,7 @@ def test_whatever_is_no_clear_error_fails(fault, words, monkeypatch):
     assert words in said
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     ("then", "expected"),
     [

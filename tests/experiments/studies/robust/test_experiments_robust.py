@@ -88,6 +88,7 @@ def test_hyperbolic_sets_have_the_size_that_openturns_says():
             assert terms_up_to(degree, norm, 4, 600) == size
 
 
+@pytest.mark.nightly
 def test_a_watched_growth_stops_where_the_problem_of_the_same_seed_does():
     task = Task("Ishigami")
     growth = Growth(task, 0.01, 70, whole_curve=False)
