@@ -123,13 +123,13 @@ def _campbell(finding: DriveFinding, model: DriveModel, document: Mapping[str, A
     if mode.resonates and within.size:
         at = np.full(within.shape, mode.frequency)
         series.append(Series("where they meet", within, at, "points"))
-    where = "none within the speeds of the records"
+    meeting = "They do not meet within the speeds of the records"
     if mode.resonates and within.size:
-        where = ", ".join(f"{speed:.0f} r/min" for speed in np.sort(within))
+        meeting = f"They meet at {', '.join(f'{speed:.0f} r/min' for speed in np.sort(within))}"
     return Plot(
         "campbell",
         "Campbell diagram",
         f"Resonance of the revised drive at {mode.frequency:.3g} Hz (damping ratio "
-        f"{mode.damping_ratio:.2g}) and orders of its error; they meet at: {where}.",
+        f"{mode.damping_ratio:.2g}) and orders of its error. {meeting}.",
         (Panel("", _SPEED, "frequency [Hz]", tuple(series)),),
     )
