@@ -45,9 +45,13 @@ class MovingRows:
     ----------
     weight : ndarray, shape (n,)
         0 for rows that are left out. It rises from there, so that what follows them joins smoothly.
+    rests : bool
+        Whether the machine stands still for so long that no rows would remain without its rests,
+        which then stay in. Dry friction is not determined by such a record.
     """
 
     weight: Values
+    rests: bool = False
 
     @property
     def count(self) -> int:
@@ -131,7 +135,9 @@ def moving_rows(
         np.pad(~around_rests, edges, mode="edge"), window / window.sum(), mode="valid"
     )
     enough = 2.0 * np.count_nonzero(away) * step * cutoff >= _FEWEST
-    return MovingRows(away if enough and rests.any() else np.ones_like(away))
+    if not rests.any():
+        return MovingRows(np.ones_like(away))
+    return MovingRows(away) if enough else MovingRows(np.ones_like(away), rests=True)
 
 
 def _long(still: NDArray[np.bool_], least: int) -> NDArray[np.bool_]:

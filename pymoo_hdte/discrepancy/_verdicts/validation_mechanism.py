@@ -188,8 +188,11 @@ def _simulated(
 
 def _balanced(finding: MechanismFinding, record: Record) -> list[MechanismPredictionError]:
     data = measured_data(finding.mechanism, [record], finding.cutoff, finding.data.known)
-    n_base = len(data.base)
+    n_base, accepted = len(data.base), finding.accepted.effects
     (balance,) = data.spectra
+    # At rest a force says only that friction holds it, whatever law is right.
+    if balance.moving.rests and any(effect.law.breakaway for effect in laws_of(accepted)):
+        return []
     whitened = [
         data.residuals(fitted.values[:n_base], laws_of(fitted.effects))
         for fitted in (finding.verdict.base, finding.accepted)

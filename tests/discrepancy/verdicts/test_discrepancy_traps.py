@@ -29,7 +29,7 @@ def clean(seed):
 def unsearched(monkeypatch):
     """Leave the candidates as screened: to fit them only names what the alarm is already about."""
 
-    def as_screened(data, candidates, start, **settings):
+    def as_screened(data, candidates, start, *settings, **named):
         return fit(data, candidates, start, 1)
 
     monkeypatch.setattr(fitted_sets, "fit", as_screened)
