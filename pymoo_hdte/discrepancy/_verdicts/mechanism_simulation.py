@@ -279,6 +279,8 @@ def held_out_balances(
     left = root_mean_square(data, fits[1].residuals)
     for record in (record for record in records if record.role == "held_out" and names):
         held_out = measured_data(mechanism, [record], data.spectra[0].cutoff, data.known)
+        if held_out.says_nothing_of(laws_of(fits[1].effects)):
+            continue
         floor = root_mean_square(held_out, np.ones(len(held_out.frequency)))
         before, after = (
             held_out.residuals(one.values[: len(held_out.base)], laws_of(one.effects))

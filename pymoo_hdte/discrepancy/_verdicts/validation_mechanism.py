@@ -188,10 +188,9 @@ def _simulated(
 
 def _balanced(finding: MechanismFinding, record: Record) -> list[MechanismPredictionError]:
     data = measured_data(finding.mechanism, [record], finding.cutoff, finding.data.known)
-    n_base, accepted = len(data.base), finding.accepted.effects
+    n_base = len(data.base)
     (balance,) = data.spectra
-    # At rest a force says only that friction holds it, whatever law is right.
-    if balance.moving.rests and any(effect.law.breakaway for effect in laws_of(accepted)):
+    if data.says_nothing_of(laws_of(finding.accepted.effects)):
         return []
     whitened = [
         data.residuals(fitted.values[:n_base], laws_of(fitted.effects))

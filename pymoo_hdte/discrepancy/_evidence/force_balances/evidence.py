@@ -107,6 +107,14 @@ class MeasuredData(WhitenedBalances):
         """Return None, because the noise of measured motion and force is that of the sensors."""
         return
 
+    def says_nothing_of(self, effects: Sequence[LawAt]) -> bool:
+        """Tell whether a record rests throughout and effects hold it by dry friction.
+
+        At rest a force says only that friction holds it, whatever law is right.
+        """
+        held = any(effect.law.breakaway for effect in effects)
+        return held and all(balance.moving.rests for balance in self.spectra)
+
     def with_residual_as_noise(self, residuals: Vector) -> MeasuredData:
         """Return the data with whitened residuals (n,) beyond the sensors' noise as further noise.
 
