@@ -33,14 +33,7 @@ CASES = (
     *("drag-coulomb", "hardening-soft-windup", "kinematic-eccentricity"),
     *("load-dependent-friction", "nothing-all-values-off", "stiffness-off"),
     *("nothing-encoder-spikes", "nothing-encoder-jump", "rig-11", "amplitude-off"),
-    pytest.param(
-        "load-dependent-order",
-        marks=pytest.mark.xfail(
-            strict=True,
-            reason="its effect is in no list, and the play that stands for it, which is not named, "
-            "has a minimum for each set of flanks: one is 31 lower than where its fit ends",
-        ),
-    ),
+    "load-dependent-order",
 )
 
 
