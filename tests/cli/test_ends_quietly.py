@@ -36,6 +36,7 @@ ARGUMENTS = {
     "plan": ["model.toml", "--limits", "limits.toml"],
     "discrepancy": ["campaign"],
     "export": ["model.toml", "--to", "urdf"],
+    "init": ["logs"],
 }
 HELD = """
 import sys, time
@@ -64,7 +65,8 @@ def interrupted(program, arguments, module, folder):
     "name", others_at_night([command.name for command in COMMANDS], "discrepancy", "simulate")
 )
 def test_ctrl_c_during_imports_of_a_command(name, tmp_path):
-    arguments = [name, *ARGUMENTS[name], "--out", "new/out"]
+    command = next(command for command in COMMANDS if command.name == name)
+    arguments = [name, *ARGUMENTS[name], *(["--out", "new/out"] if command.out else [])]
     done = interrupted("pymoo_hdte.cli", arguments, "scipy", tmp_path)
     assert done.stderr == "pymoo-hdte: interrupted, nothing was written\n"
     assert done.returncode == INTERRUPTED
