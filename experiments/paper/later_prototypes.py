@@ -107,7 +107,7 @@ def of_the_first_page() -> dict[str, str]:
     if row.adjusted >= ALIKE:
         return {}
     return {
-        WITHIN_PAPER: f"{row.name} of the five prototypes in Table 6 is not of the series of Table "
-        f"3 (means {1e4 * row.mean:.3f}e-4 and {1e4 * row.series_mean:.3f}e-4, p = "
+        WITHIN_PAPER: f"{row.name} of the five prototypes in Table 6 does not fit the series of "
+        f"Table 3 (means {1e4 * row.mean:.3f}e-4 and {1e4 * row.series_mean:.3f}e-4, p = "
         f"{significant(row.adjusted, 1)})"
     }

@@ -160,9 +160,9 @@ def of_the_first_page() -> str:
     """Say how many values the printed tests belong to, and what the outlier rule removes."""
     low, high = common_sizes()
     return (
-        f"W and p of all errors in Table 2 belong to {low} to {high} values, where "
-        f"{N_PROTOTYPES} prototypes were measured; and no reading of {N_REPEATS} can lie beyond "
-        f"{largest_deviation(N_REPEATS):.2f} standard deviations, so that the 3-sigma rule of "
+        f"W and p of all errors in Table 2 are those of {low} to {high} values, but only "
+        f"{N_PROTOTYPES} prototypes were measured; none of {N_REPEATS} readings can lie beyond "
+        f"{largest_deviation(N_REPEATS):.2f} standard deviations, so the 3-sigma rule of "
         "Section 2.1 removes nothing"
     )
 

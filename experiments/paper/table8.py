@@ -296,8 +296,8 @@ def dominated(model: str) -> str:
     """Say which share of random designs dominates the paper's optima, for the first page."""
     shares = [significant(100.0 * share, 2) for share in sorted(dominating_shares(model).values())]
     return (
-        f"{shares[0]} to {shares[-1]} % of random designs are better than each of the paper's "
-        f"optima in mean and deviation at once on the model {model}: the paper optimised another "
+        f"on the model {model}, {shares[0]} to {shares[-1]} % of random designs are better in both "
+        "mean and deviation than any given optimum of the paper: the paper optimised another "
         "model, or a surrogate of runs with errors"
     )
 

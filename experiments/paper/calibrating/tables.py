@@ -126,8 +126,8 @@ def of_the_first_page(best: Outcome) -> str:
     drive = simplest()
     return (
         f"with {len(best.candidate.effects)} effects and {best.n_parameters} parameters fitted to "
-        f"{len(FITS['table8'])} numbers, the printed equations give these within {seen}, root mean "
-        f"square, and numbers held out within {unseen}; a rigid drive with "
+        f"{len(FITS['table8'])} numbers, the printed equations give these with a "
+        f"root-mean-square error of {seen}, and held-out numbers with {unseen}; a rigid drive with "
         f"{significant(100.0 * drive.torsion_share, 2)} % of its torsion read as error has "
         f"{N_PARAMETERS} parameters and a BIC of {_bic_of(drive):.1f} against {_bic(best):.1f}"
     )

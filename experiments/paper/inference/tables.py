@@ -101,10 +101,10 @@ def of_the_first_page(fits: Sequence[Fit]) -> str:
     meeting, simplest = _meeting(noisy), rigid(noisy)
     return (
         f"{len(_meeting(common)) or 'none'} of {len(common)} fitted drive models "
-        f"{_give(len(_meeting(common)) or 1)} its numbers and the steps between its optima, and "
-        f"{count or 'none'} its optima as well; with solver noise of at most {LARGEST:.1f} arcsec, "
-        f"{len(meeting)} of {len(noisy)} give numbers and steps, {len(gives_both(noisy))} of them "
-        f"the optima too{_simplest_clause(simplest)}"
+        f"{_give(len(_meeting(common)) or 1)} the paper's numbers and the steps between its "
+        f"optima, but {count or 'none'} also {_give(count or 1)} the optima; with solver noise "
+        f"of at most {LARGEST:.1f} arcsec, {len(meeting)} of {len(noisy)} give numbers and steps, "
+        f"and {len(gives_both(noisy))} of them the optima too{_simplest_clause(simplest)}"
     )
 
 

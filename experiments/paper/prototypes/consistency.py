@@ -295,7 +295,7 @@ def of_the_first_page() -> dict[str, str]:
     lead = significant(bounds().least_lead, 3)
     return {
         WITHIN_PAPER: f"by the paper's own statistics, the prediction for prototype No. {HIGHEST} "
-        f"must lead that for No. {LOWEST} by {lead} arcsec or more, while theta_s is "
+        f"must be at least {lead} arcsec above that for No. {LOWEST}, although theta_s is "
         f"{significant(excess(), 2)} arcsec larger on No. {LOWEST} and the optimisation moves the "
         f"mean by {significant(gain, 2)} % only: the validation by D_i contradicts the tables"
     }
