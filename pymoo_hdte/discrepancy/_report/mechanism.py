@@ -189,10 +189,10 @@ def descriptive_sentence(model: DescriptiveModel) -> str:
     effects = dict.fromkeys(
         f"{effect.name.replace('_', ' ')} ({effect.port})" for effect, _ in model.effects
     )
-    holds = f", with {', '.join(effects)}" if effects else ", without any effect"
+    holds = f"Its effects: {', '.join(effects)}." if effects else "It has no effects."
     words = [
-        f"This model describes and does not diagnose: it holds what predicts better{holds}."
-        " Whether its terms are the causes is a matter of the verdict."
+        f"This model is made for prediction: it holds the terms that predict better. {holds}"
+        " Only the verdict says whether a term is a cause."
     ]
     by_quantity: dict[str, list[BalanceErrors]] = {}
     for errors in model.held_out or model.cross_validated:
@@ -204,10 +204,10 @@ def descriptive_sentence(model: DescriptiveModel) -> str:
             for name in ("base", "accepted", "descriptive", "six_terms")
         )
         words.append(
-            f"Root mean square that is left of the balance of {quantity} in the {where}: "
-            f"{number(ours)} {several[0].unit}, where least squares with six terms leaves "
-            f"{number(six)}, the nominal model {number(base)} and the revised one "
-            f"{number(accepted)}."
+            f"Root mean square residual of the force balance of {quantity} in the {where}: "
+            f"{number(ours)} {several[0].unit} with this model, {number(six)} with least squares "
+            f"of six terms, {number(base)} with the nominal model and {number(accepted)} with the "
+            "revised one."
         )
         if ours > accepted:
             words.append("There the revised model predicts better.")
@@ -221,7 +221,7 @@ def extent_sentence(errors: Sequence[MechanismPredictionError]) -> str:
         f"{extent.windows} of {extent.room} windows of {extent.length:.3g} s in {record}"
         for record, extent in of_records.items()
     ]
-    return f"Simulated, each from its measured state: {', '.join(words)}."
+    return f"Simulated, each window from its measured state: {', '.join(words)}."
 
 
 def _change(before: float, after: float) -> str:

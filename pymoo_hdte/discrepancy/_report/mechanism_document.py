@@ -181,8 +181,8 @@ def limits(finding: MechanismFinding) -> list[str]:
         if not actuator.scaled
     ]
     sentences += [
-        f"The inertial force of {name} is smaller than what the model leaves of its balance: a "
-        "simulation of its motion tells little, and the held-out force balance is what validates."
+        f"The inertial force of {name} is smaller than the residual of its force balance. A "
+        "simulation of its motion therefore says little; the held-out force balance validates."
         for name in finding.mechanism.coordinates
         if name in finding.judged_by_balance and finding.simulated
     ]

@@ -127,8 +127,8 @@ def _torsion_error(errors: Iterable[Mapping[str, Any]]) -> Iterable[str]:
 
 
 def _change(name: str, before: float | None, after: float | None, unit: str) -> str:
-    return f"{name} {_finite(before)} before, {_finite(after)} after {unit}"
+    return f"{name} {_finite(before, unit)} before, {_finite(after, unit)} after"
 
 
-def _finite(size: float | None) -> str:
-    return "diverges" if size is None else number(size)
+def _finite(size: float | None, unit: str) -> str:
+    return "diverges" if size is None else f"{number(size)} {unit}".rstrip()

@@ -241,9 +241,9 @@ def chance_of(expected: float, change: float, values: float) -> float:
 def sentences_on_rest(finding: MechanismFinding) -> list[str]:
     """Return a sentence for each training record of which rows at rest are left out."""
     return [
-        f"{balance.left_out} rows of {balance.record.name} at rest are left out, because dry "
-        "friction may have any force up to its breakaway there. Effects that act only at or near "
-        "rest, such as friction that falls at the slowest speeds, cannot be seen."
+        f"{balance.left_out} rows of {balance.record.name} at rest are left out, because at "
+        "rest dry friction may take any value up to its breakaway force. Effects that act "
+        "only at or near rest, such as friction that falls at the slowest speeds, cannot be seen."
         for balance in finding.data.spectra
         if balance.left_out
     ]
