@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import nnls
 
-from pymoo_hdte.checks import real_number
+from pymoo_hdte.checks import InvalidInput, real_number
 from pymoo_hdte.effects.portable import Formula, Lumped
 
 Values = NDArray[np.float64]
@@ -66,6 +66,19 @@ class PortState:
     load: Values | None = None
     temperature: Values | float = np.nan
     recurs: bool = False
+
+    def known_load(self, effect: str, place: str) -> Values:
+        """Return the load, N.m, for an effect that depends on it and may be at a place of a drive.
+
+        Raises
+        ------
+        InvalidInput
+            Where the solver does not know the load.
+        """
+        if self.load is None:
+            allowed = f"the {place} of a drive, or a port whose load is stated"
+            raise InvalidInput(f"port of {effect}", "of a mechanism", allowed)
+        return self.load
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from pymoo_hdte.checks import InvalidInput, real_number
+from pymoo_hdte.checks import real_number
 from pymoo_hdte.effects.effect import Effect, register
 from pymoo_hdte.effects.friction import SIGN, smoothed_sign
 from pymoo_hdte.effects.guess import Guess, Sizes
@@ -61,11 +61,8 @@ class LoadFriction(Aperiodic):
         InvalidInput
             Where the solver does not know the load.
         """
-        if state.load is None:
-            allowed = "the input of a drive, or a port whose load is stated"
-            raise InvalidInput("port of load_dependent_friction", "of a mechanism", allowed)
+        load = state.known_load("load_dependent_friction", "input")
         sign, slope = smoothed_sign(state.speed)
-        load = state.load
         if self.exponent != 1.0:
             size = np.abs(load) / self.reference
             load = self.reference * np.copysign(size**self.exponent, load)

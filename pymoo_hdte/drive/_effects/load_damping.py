@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from pymoo_hdte.checks import InvalidInput, real_number
+from pymoo_hdte.checks import real_number
 from pymoo_hdte.drive._effects.base import DriveSizes
 from pymoo_hdte.effects.effect import Effect, register
 from pymoo_hdte.effects.guess import Guess
@@ -48,10 +48,8 @@ class LoadDamping(Aperiodic):
         InvalidInput
             Where the solver does not know the load.
         """
-        if state.load is None:
-            allowed = "the mesh of a drive, or a port whose load is stated"
-            raise InvalidInput("port of load_dependent_damping", "of a mechanism", allowed)
-        damping = self.damping * np.abs(state.load) / self.reference
+        load = state.known_load("load_dependent_damping", "mesh")
+        damping = self.damping * np.abs(load) / self.reference
         return Response(damping * state.speed, damping=damping)
 
     def with_input_locked(self) -> Law | None:
