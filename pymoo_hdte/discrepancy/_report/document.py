@@ -81,11 +81,14 @@ def verdict_document(
         "next_experiment": proposal.as_dict(),
         "location": location.summary(),
         **finding.rows.as_dict(),
-        "versions": {
-            "python": platform.python_version(),
-            **{name: version(name) for name in ("pymoo-hdte", "numpy", "scipy", "numba")},
-        },
+        "versions": versions("numba"),
     }
+
+
+def versions(*others: str) -> dict[str, str]:
+    """Return the versions of Python, of what every verdict needs, and of other packages."""
+    packages = ("pymoo-hdte", "numpy", "scipy", *others)
+    return {"python": platform.python_version(), **{name: version(name) for name in packages}}
 
 
 def with_believed_effects(effects: Sequence[Mapping[str, Any]]) -> dict[str, Any]:

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import platform
 from collections.abc import Sequence
-from importlib.metadata import version
 from typing import Any
 
 import numpy as np
@@ -13,7 +11,12 @@ from pymoo_hdte._reports.html import number, percent
 from pymoo_hdte.discrepancy._answers.next_test_mechanism import NextTest
 from pymoo_hdte.discrepancy._answers.where.balances import locate_in_mechanism
 from pymoo_hdte.discrepancy._evidence.force_balances.candidates import turns_back
-from pymoo_hdte.discrepancy._report.document import SCHEMA_VERSION, sentence, with_believed_effects
+from pymoo_hdte.discrepancy._report.document import (
+    SCHEMA_VERSION,
+    sentence,
+    versions,
+    with_believed_effects,
+)
 from pymoo_hdte.discrepancy._report.mechanism_values import effects, quantities, ripples
 from pymoo_hdte.discrepancy._report.words import in_a_sentence
 from pymoo_hdte.discrepancy._selection.hypothesis import Hypothesis, label_of
@@ -68,10 +71,7 @@ def mechanism_verdict_document(
         "held_out": [error.as_dict() for error in errors]
         or {"reason": "no record was held out, so the correction is not validated"},
         "next_experiment": test.as_dict(),
-        "versions": {
-            "python": platform.python_version(),
-            **{name: version(name) for name in ("pymoo-hdte", "numpy", "scipy")},
-        },
+        "versions": versions(),
     }
 
 

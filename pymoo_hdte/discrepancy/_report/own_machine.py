@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import platform
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +17,7 @@ from pymoo_hdte.discrepancy._report.document import (
     believed_in_words,
     effects_of,
     sentence,
+    versions,
     with_believed_effects,
 )
 from pymoo_hdte.discrepancy._report.folder import FOLDER
@@ -81,10 +80,7 @@ def write_machine_report(
         "gap_sentence": error_sentence(finding, errors),
         "next_experiment": test.as_dict(),
         "revised_model": {"file": MODEL_FILE},
-        "versions": {
-            "python": platform.python_version(),
-            **{name: version(name) for name in ("pymoo-hdte", "numpy", "scipy")},
-        },
+        "versions": versions(),
     }
     nominal = {parameter.name: parameter.start for parameter in finding.data.base}
     html = page(
