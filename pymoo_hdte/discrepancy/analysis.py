@@ -440,7 +440,7 @@ class MachineAnalysis(Analysis):
 
     def validate(self) -> HeldOutErrors | None:
         """Return the errors on the held-out records; None without such records."""
-        return held_out_errors(self.finding)
+        return self._errors
 
     def next_experiment(self) -> Repetition:
         """Return the record whose repetition best separates what still competes."""
@@ -455,3 +455,7 @@ class MachineAnalysis(Analysis):
 
         answers = self.locate(), self.validate(), self.next_experiment()
         return write_machine_report(self.finding, *answers, out)
+
+    @cached_property
+    def _errors(self) -> HeldOutErrors | None:
+        return held_out_errors(self.finding)

@@ -113,10 +113,7 @@ def examine_mechanism(
     judges = light if verdict.accepted is not verdict.base else ()
     balances = held_out_balances(mechanism, records, data, fits, judges)
     verdict = mechanism_after_held_out_test(verdict, simulated, balances)
-    late = tuple(delays(data, tuple(verdict.accepted.effects)))
-    finding = MechanismFinding(
-        mechanism, records, cutoff, data, verdict, ripples, simulated, light, late
-    )
+    finding = MechanismFinding(mechanism, records, cutoff, data, verdict, ripples, simulated, light)
     if verdict.accepted is verdict.base:
         return finding
     return replace(

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pymoo_hdte.discrepancy._evidence.force_balances.beyond_band.ripple import NO_RIPPLES, Ripples
-from pymoo_hdte.discrepancy._evidence.force_balances.delay import Delay
+from pymoo_hdte.discrepancy._evidence.force_balances.delay import Delay, delays
 from pymoo_hdte.discrepancy._evidence.force_balances.evidence import MeasuredData
 from pymoo_hdte.discrepancy._evidence.force_balances.unexplained import (
     root_mean_square,
@@ -46,8 +47,6 @@ class MechanismFinding:
     judged_by_balance : frozenset of str
         Coordinates of which the force balance is validated, since their mass is too small for a
         simulation: see `without_mass`.
-    delays : tuple of Delay
-        Of inputs, in the records as given; with those that the mechanism states taken out.
     """
 
     mechanism: Mechanism
@@ -58,7 +57,11 @@ class MechanismFinding:
     ripples: Ripples = NO_RIPPLES
     simulated: tuple[SimulatedRecord, ...] = ()
     judged_by_balance: frozenset[str] = frozenset()
-    delays: tuple[Delay, ...] = ()
+
+    @cached_property
+    def delays(self) -> tuple[Delay, ...]:
+        """Delays of inputs in the records, with those that the mechanism states taken out."""
+        return tuple(delays(self.data, tuple(self.accepted.effects)))
 
     @property
     def accepted(self) -> Fit:
