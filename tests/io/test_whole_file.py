@@ -5,7 +5,7 @@ import secrets
 
 import pytest
 
-from pymoo_hdte._io.whole_file import write_whole
+from pymoo_hdte._io.whole_file import write_new, write_whole
 
 
 def test_a_link_in_the_place_of_the_temporary_file_is_not_followed(tmp_path, monkeypatch):
@@ -45,3 +45,19 @@ def test_a_link_in_the_place_of_the_file_itself_is_replaced(tmp_path):
     write_whole(tmp_path / "a.csv", b"1\n")
     assert target.read_text() == "years of work"
     assert not (tmp_path / "a.csv").is_symlink()
+
+
+@pytest.mark.parametrize("links", [True, False])
+def test_a_new_file_replaces_nothing(links, tmp_path, monkeypatch):
+    if not links:
+
+        def refused(*paths):
+            raise PermissionError
+
+        monkeypatch.setattr(os, "link", refused)
+    path = tmp_path / "file"
+    write_new(path, b"first")
+    with pytest.raises(FileExistsError):
+        write_new(path, b"second")
+    assert path.read_bytes() == b"first"
+    assert list(tmp_path.iterdir()) == [path]

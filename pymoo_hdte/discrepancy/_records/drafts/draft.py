@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import os
-import secrets
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from pymoo_hdte._io.whole_file import write_whole
+from pymoo_hdte._io.whole_file import write_new
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy._records.campaign_keys import CAMPAIGN_FILE
 from pymoo_hdte.discrepancy._records.drafts.campaign_draft import campaign_text, is_bench
@@ -125,20 +123,11 @@ def write_draft(folder: Path) -> Draft:
         _refuse(folder / file)
     draft = draft_of(folder)
     path = folder / draft.file
-    # A link fails where a file has appeared meanwhile; replacing would lose that file.
-    temporary = path.with_name(f".{path.name}.{secrets.token_hex(8)}.draft")
     try:
-        write_whole(temporary, draft.text.encode())
-        try:
-            os.link(temporary, path)
-        except FileExistsError:
-            _refuse(path)
-        except OSError:
-            # Some file systems have no links.
-            _refuse(path)
-            os.replace(temporary, path)
-    finally:
-        temporary.unlink(missing_ok=True)
+        write_new(path, draft.text.encode())
+    except FileExistsError:
+        _refuse(path)
+        raise
     return draft
 
 
