@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from functools import cached_property
 from itertools import product
+from typing import Any
 
 import numpy as np
 
@@ -55,6 +56,10 @@ class CommonSamples:
         self.ends = ends
         self._corners = self._some_corners(ends, np.random.default_rng(seed))
 
+    def __deepcopy__(self, memo: dict[int, Any]) -> CommonSamples:
+        """Return itself: nothing in it changes."""
+        return self
+
     @staticmethod
     def _some_corners(ends: Array, random_state: np.random.Generator) -> Array:
         moving = np.flatnonzero(ends[:, 0] < ends[:, 1])
@@ -65,6 +70,12 @@ class CommonSamples:
         corners = np.tile(ends[:, 0], (len(sides), 1))
         corners[:, moving] = ends[moving, sides]
         return corners
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what is pickled: not what can be computed anew."""
+        return {
+            name: value for name, value in vars(self).items() if name not in ("basis", "starts")
+        }
 
     @cached_property
     def basis(self) -> Array:

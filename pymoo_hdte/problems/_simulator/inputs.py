@@ -182,6 +182,10 @@ class Inputs:
             raise InvalidInput("names of the inputs", tuple(names), allowed)
         self.names = tuple(names)
 
+    def __deepcopy__(self, memo: dict[int, Any]) -> Inputs:
+        """Return itself: nothing in it changes."""
+        return self
+
     def _add_noise(self, group: Sequence[str], given: Any, start: int) -> None:
         if len(group) == 1:
             self.axes.append(noise_axis(group[0], _noise(group[0], given, self.tail)))
@@ -208,6 +212,20 @@ class Inputs:
                 np.asarray(joint.inv(scipy.special.ndtr(np.array(columns[place]))))
             )
         return np.column_stack(columns)
+
+    def cube(self, values: Array) -> Array:
+        """Return the points of -1..1 of inputs in their units, both shape (n, d).
+
+        Values beyond the reach are beyond -1..1, infinite or NaN.
+        """
+        columns = list(values.T)
+        for start, joint in self._joint:
+            place = slice(start, start + len(joint))
+            shares = np.asarray(joint.fwd(np.array(columns[place])))
+            columns[place] = list(scipy.special.ndtri(shares))
+        with np.errstate(invalid="ignore", divide="ignore"):
+            cubes = [axis.cube(v) for axis, v in zip(self.axes, columns, strict=True)]
+        return np.column_stack(cubes)
 
     def reach(self) -> dict[str, tuple[float, float]]:
         """Return smallest and largest value at which the simulator will be called, by name.

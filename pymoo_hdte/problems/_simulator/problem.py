@@ -12,6 +12,7 @@ from pymoo.core.problem import Problem
 
 from pymoo_hdte.checks import InvalidInput, finite_array
 from pymoo_hdte.problems._simulator.around import Around, CommonSamples
+from pymoo_hdte.problems._simulator.data import Runs
 from pymoo_hdte.problems._simulator.inputs import Inputs
 from pymoo_hdte.problems._simulator.requested import by_moments, place_of, requested_of
 from pymoo_hdte.problems._simulator.statistics import RobustConstraint, Statistic
@@ -50,6 +51,8 @@ class SimulatorProblem(Problem):
         Constraints to be met.
     n_runs : int
         Runs of the simulator that were made.
+    refusal : str, optional
+        Why the surrogate is not what was asked for.
 
     Attributes
     ----------
@@ -61,6 +64,12 @@ class SimulatorProblem(Problem):
     response_errors : dict of str to float
         Estimated error of each response as a share of its scatter, the larger one of mean and
         deviation; large perhaps for a response that no objective and no constraint names.
+    trusted : bool
+        Whether the surrogate is as accurate as was asked for; False only with ``accept="best"``.
+    refusal : str or None
+        Why it is not trusted.
+    runs : Runs or None
+        Inputs X and responses Y of all runs; None for a problem that was loaded.
     failed : ndarray, shape (k, d)
         Inputs in their units at which the simulator failed; the fit goes on without them.
     var_names, obj_names, input_names : tuple of str
@@ -87,8 +96,9 @@ class SimulatorProblem(Problem):
         objectives: Sequence[Statistic],
         constraints: Sequence[RobustConstraint],
         n_runs: int,
+        refusal: str | None = None,
     ) -> None:
-        self._inputs = inputs
+        self._inputs, self.refusal = inputs, refusal
         bounds = np.array([axis.design for axis in inputs.axes if axis.designed])
         self.design_box = Box(inputs.designed, *bounds.T)
         self.objectives, self.constraints = tuple(objectives), tuple(constraints)
@@ -110,6 +120,18 @@ class SimulatorProblem(Problem):
         self.response_errors = dict(zip(responses, errors, strict=True))
 
     @property
+    def trusted(self) -> bool:
+        """Whether the surrogate is as accurate as was asked for."""
+        return self.refusal is None
+
+    @property
+    def runs(self) -> Runs | None:
+        """Inputs and responses of all runs; None for a problem that was loaded."""
+        if not len(self._fit.points):
+            return None
+        return Runs(self._inputs.values(self._fit.points), self._fit.truth.copy())
+
+    @property
     def degrees(self) -> dict[str, int]:
         """Degree of the surrogate in each input, by name."""
         return dict(zip(self.input_names, self._fit.polynomial.degrees, strict=True))
@@ -124,7 +146,7 @@ class SimulatorProblem(Problem):
         OSError
             If the file cannot be written.
         """
-        parts = self.responses, self.objectives, self.constraints, self.n_runs
+        parts = self.responses, self.objectives, self.constraints, self.n_runs, self.refusal
         write_problem(path, self._inputs, self._fit, *parts)
 
     @classmethod
@@ -175,8 +197,7 @@ class SimulatorProblem(Problem):
         Parameters
         ----------
         values : array_like, shape (n, d)
-            All inputs in the order of ``input_names`` and in their units, within their reach; not
-            for noise that is dependent or in its normal coordinate.
+            All inputs in the order of ``input_names`` and in their units, within their reach.
 
         Raises
         ------
@@ -184,8 +205,7 @@ class SimulatorProblem(Problem):
             If ``values`` is no array of finite numbers of shape (n, d).
         """
         points = finite_array("values", values, (None, len(self.input_names)))
-        columns = [axis.cube(v) for axis, v in zip(self._inputs.axes, points.T, strict=True)]
-        return self._fit.polynomial(np.column_stack(columns))
+        return self._fit.polynomial(self._inputs.cube(points))
 
     def sobol_indices(self, design: ArrayLike, response: str | None = None) -> SobolIndices:
         """Return how the variance of a response around a design divides among its inputs.

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.problems._simulator.statistics import RobustConstraint, Statistic
 from pymoo_hdte.surrogate._sparse.moments import SparseMoments
-from pymoo_hdte.surrogate.threads import ENOUGH_FOR_THREADS
+from pymoo_hdte.surrogate.threads import ENOUGH_TO_COMPILE
 
 Requested = tuple[Statistic, float, float, int]
 """Statistic, factor, bound and place of the response."""
@@ -55,12 +55,12 @@ def requested_of(
 def by_moments(
     requested: Sequence[Requested], moments: SparseMoments, x: NDArray[np.float64]
 ) -> NDArray[np.float64] | None:
-    """Return the requested values at very many designs, shape (n, n_requested).
+    """Return the requested values at many designs, shape (n, n_requested).
 
     None if there are few designs, or if mean and deviation do not suffice.
     """
     weights = [weight for statistic, *_ in requested if (weight := statistic.weights) is not None]
-    if len(x) < ENOUGH_FOR_THREADS or len(weights) < len(requested):
+    if len(x) < ENOUGH_TO_COMPILE or len(weights) < len(requested):
         return None
     mean, std = moments(x)
     values = np.empty((len(x), len(requested)))

@@ -14,13 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from pymoo_hdte.checks import InvalidInput, real_number, whole_number
+from pymoo_hdte.checks import InvalidInput, one_of, real_number, whole_number
+from pymoo_hdte.problems._simulator.data import read_data
 from pymoo_hdte.problems._simulator.identity import identity
 from pymoo_hdte.problems._simulator.inputs import Design, Inputs
 from pymoo_hdte.problems._simulator.problem import SimulatorProblem
 from pymoo_hdte.problems._simulator.requested import place_of
 from pymoo_hdte.problems._simulator.run_file import RunFile
-from pymoo_hdte.problems._simulator.runs import Simulator
+from pymoo_hdte.problems._simulator.runs import Simulator, no_simulator
 from pymoo_hdte.problems._simulator.statistics import (
     Mean,
     RobustConstraint,
@@ -51,8 +52,11 @@ _NUMBERS_PER_TERM = 4096 + 2048
 """Values of a term at common samples, and in arrays for the designs of a block."""
 
 
+ACCEPTED = ("accurate", "best")
+
+
 def robust_problem(
-    simulator: Callable[..., Any],
+    simulator: Callable[..., Any] | None,
     designs: Mapping[str, Design],
     noise: Mapping[Any, Any] | None = None,
     objectives: Sequence[Statistic] = (Mean(), Std()),
@@ -68,6 +72,8 @@ def robust_problem(
     cache: str | os.PathLike[str] | None = None,
     seed: int = 1,
     progress: bool = True,
+    accept: str = "accurate",
+    data: tuple[Any, Any] | None = None,
 ) -> SimulatorProblem:
     """Return the robust design problem of a simulator.
 
@@ -89,9 +95,9 @@ def robust_problem(
 
     Parameters
     ----------
-    simulator : callable
+    simulator : callable or None
         Takes all designs and all noise by name; returns a number, a mapping of names to numbers, or
-        a sequence.
+        a sequence. None where ``data`` is all there is.
     designs : mapping of str to Design
         Design variables with their bounds and scatter.
     noise : mapping, optional
@@ -133,6 +139,15 @@ def robust_problem(
         Seed of the positions of the runs.
     progress : bool
         Whether to tell runs and memory on the error stream before the first run, and show a bar.
+    accept : {"accurate", "best"}
+        ``"best"`` returns the problem even where the surrogate is not as accurate as asked for, or
+        a positive response becomes negative; its ``trusted`` then is False, ``refusal`` says
+        why, and its band is as wide as its errors are.
+    data : tuple of array_like or of tables, optional
+        Runs in hand, which the budget does not count: inputs X, shape (n, d), in the order of
+        designs and noise, and responses Y, shape (n,) or (n, r), NaN where a run failed; or both as
+        mappings or data frames of columns by name. ``runs`` of a problem or of a refusal fits.
+        One of them is made again, to see whether they are this simulator's.
 
     Returns
     -------
@@ -145,7 +160,8 @@ def robust_problem(
         For an argument that is not allowed, or a simulator that is random.
     UntrustedSurrogate
         If the budget is spent and the error is still larger than asked for, a positive response
-        becomes negative, or more than a fifth of the runs fail; tells where.
+        becomes negative, or more than a fifth of the runs fail; tells where. It holds all ``runs``
+        and the ``problem`` on the surrogate that is refused.
     SimulatorFailed
         If every run so far failed.
 
@@ -153,7 +169,8 @@ def robust_problem(
     -----
     RuntimeWarning
         If runs failed; their inputs are in ``failed`` of the result. If the budget is spent before
-        an error that is small enough was confirmed.
+        an error that is small enough was confirmed. If ``accept="best"`` accepts what is refused
+        otherwise.
 
     Examples
     --------
@@ -167,11 +184,17 @@ def robust_problem(
     5.02
     """
     inputs = Inputs(designs, {} if noise is None else noise)
-    _check_signature(simulator, inputs.names)
     accuracy = _share("accuracy", accuracy)
+    one_of("accept", accept, ACCEPTED)
     least = least_runs(len(inputs.axes))
-    budget = whole_number("budget", budget, least)
     _check_statistics(objectives, constraints)
+    given = None if data is None else read_data(data, inputs)
+    least = max(0, least - (0 if given is None else len(given.points)))
+    if simulator is None and given is not None and not least:
+        simulator, vectorised, budget, cache = no_simulator, False, 0, None
+    else:
+        simulator = _checked_signature(simulator, inputs.names)
+        budget = whole_number("budget", budget, least)
     file = None if cache is None else RunFile(cache, inputs.names, identity(simulator))
     count, batch = whole_number("tries", tries, 1), whole_number("at_once", at_once, 1)
     random_state = np.random.default_rng(whole_number("seed", seed, 0))
@@ -180,6 +203,8 @@ def robust_problem(
     bar = _announce(inputs, least, budget) if progress else tqdm(disable=True)
     with bar, closing(Workers(executor, time_limit)) as workers:
         simulate = Simulator(simulator, inputs.names, vectorised, workers, count, file, bar)
+        if given is not None:
+            simulate.check_data(inputs.values(given.points), given.values, given.responses)
         statistics = [*objectives, *(limit.statistic for limit in constraints)]
 
         def requested_places() -> list[int]:
@@ -196,37 +221,43 @@ def robust_problem(
             ),
             batch,
             lambda fit: largest_error(fit, requested_places())[0],
+            None if given is None else (given.points, given.values),
         )
-        _refuse_untrusted(inputs, fit, accuracy, simulate, positive, requested_places())
+        refusal = _refusal(inputs, fit, accuracy, simulate, positive, requested_places())
+    responses = simulate.responses
+    parts = inputs, fit, responses, objectives, constraints, fit.n_runs
+    problem = SimulatorProblem(*parts, refusal=str(refusal) if refusal else None)
+    if refusal is not None and accept == "accurate":
+        refusal.problem, refusal.runs = problem, problem.runs
+        raise refusal
     if file:
         file.finish()
-    responses = simulate.responses
-    problem = SimulatorProblem(inputs, fit, responses, objectives, constraints, fit.n_runs)
     _warn_of_failures(problem)
-    if not fit.confirmed:
+    if refusal:
+        warnings.warn(f"accepted as the best there is: {refusal}", RuntimeWarning, stacklevel=2)
+    elif not fit.confirmed:
         _warn_of_budget(fit, responses, requested_places())
     return problem
 
 
-def _refuse_untrusted(
+def _refusal(
     inputs: Inputs,
     fit: AdaptiveFit,
     accuracy: float,
     simulate: Simulator,
     positive: Sequence[str] | bool,
     places: Sequence[int],
-) -> None:
+) -> UntrustedSurrogate | None:
+    """Return why the surrogate is not what was asked for, or None."""
     responses = simulate.responses
     unsure = inaccurate(inputs, fit, accuracy, responses, places)
-    if unsure and (cause := random(inputs, fit, accuracy, responses, simulate.again)):
-        raise cause
-    refusal = (
-        failing(inputs, fit)
+    reason = (
+        (unsure and random(inputs, fit, accuracy, responses, simulate.again))
+        or failing(inputs, fit)
         or unsure
         or negative_somewhere(inputs, fit, positive_places(positive, responses))
     )
-    if refusal:
-        raise UntrustedSurrogate(*refusal)
+    return UntrustedSurrogate(*reason) if reason else None
 
 
 def _warn_of_budget(fit: AdaptiveFit, responses: tuple[str, ...], places: Sequence[int]) -> None:
@@ -259,15 +290,18 @@ def _share(field: str, given: Any) -> float:
     return share
 
 
-def _check_signature(simulator: Callable[..., Any], names: Sequence[str]) -> None:
-    """Refuse a simulator that cannot be called with these inputs, as far as it tells."""
+def _checked_signature(
+    simulator: Callable[..., Any] | None, names: Sequence[str]
+) -> Callable[..., Any]:
+    """Return a simulator that can be called with these inputs, as far as it tells."""
     if not callable(simulator):
-        raise InvalidInput("simulator", simulator, "a function of the designs and the noise")
+        allowed = "a function of the designs and the noise, or None where data have runs enough"
+        raise InvalidInput("simulator", simulator, allowed)
     try:
         # What a decorator wraps is not what is called.
         signature = inspect.signature(simulator, follow_wrapped=False)
     except (TypeError, ValueError):
-        return
+        return simulator
     parameters = signature.parameters.values()
     named = [
         parameter
@@ -290,6 +324,7 @@ def _check_signature(simulator: Callable[..., Any], names: Sequence[str]) -> Non
         reasons += [f"it needs {', '.join(missing)}"] if missing else []
         allowed = f"those of designs and noise ({', '.join(names)}); {' and '.join(reasons)}"
         raise InvalidInput("arguments of the simulator", str(signature), allowed)
+    return simulator
 
 
 def _check_statistics(

@@ -12,7 +12,7 @@ from tqdm import tqdm
 
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.problems._simulator.children import TOO_LONG, Failure
-from pymoo_hdte.problems._simulator.run_file import RunFile
+from pymoo_hdte.problems._simulator.run_file import RunFile, check_again
 from pymoo_hdte.problems._simulator.workers import Workers
 
 Array = NDArray[np.float64]
@@ -37,6 +37,17 @@ class SimulatorFailed(RuntimeError):
     ...
     failed
     """
+
+
+def no_simulator(**inputs: Any) -> Any:
+    """Stand for the simulator where runs in hand are all there is.
+
+    Raises
+    ------
+    RuntimeError
+        Always.
+    """
+    raise RuntimeError("there is no simulator")
 
 
 class Simulator:
@@ -93,6 +104,40 @@ class Simulator:
             self._given_up |= set(file.failures)
         elif file:
             file.check(self.again)
+
+    def check_data(self, X: Array, Y: Array, responses: tuple[str, ...]) -> None:
+        """Take the names of the responses from runs in hand, and make one of them again.
+
+        Parameters
+        ----------
+        X : ndarray, shape (n, d)
+            Inputs in their units.
+        Y : ndarray, shape (n, r)
+            Responses, NaN where a run failed.
+        responses : tuple of str
+            Their names; empty if they are not known.
+
+        Raises
+        ------
+        InvalidInput
+            If the simulator gives something else, or the squares of responses would lose digits.
+        """
+        if self.responses and responses not in ((), self.responses):
+            raise InvalidInput("responses in data", responses, str(self.responses))
+        self.responses = self.responses or responses
+        whole = np.isfinite(Y).all(axis=1)
+        if self.function is not no_simulator:
+            rows = zip(map(tuple, X[whole].tolist()), Y[whole], strict=True)
+            check_again("data", rows, self.again, f"an array of shape {Y.shape}")
+        if not self.responses:
+            count = Y.shape[1]
+            one = ("response",)
+            self.responses = one if count == 1 else tuple(f"response_{k + 1}" for k in range(count))
+        if whole.any():
+            self._ran = True
+            self._check_sizes(Y)
+        elif self.function is no_simulator:
+            raise InvalidInput("runs of data that did not fail", 0, "one or more")
 
     def again(self, row: tuple[float, ...]) -> Any:
         """Return the result of a new run, whatever the file has; None if it fails."""
@@ -153,7 +198,8 @@ class Simulator:
     def _check_sizes(self, table: Array) -> None:
         """Refuse the first runs if squares of their responses would lose digits."""
         self._sized = True
-        for name, size in zip(self.responses, np.nanmax(np.abs(table), axis=0), strict=True):
+        whole = table[np.isfinite(table).all(axis=1)]
+        for name, size in zip(self.responses, np.max(np.abs(whole), axis=0), strict=True):
             if size and not (size > SMALLEST and size < LARGEST):
                 allowed = f"0 or {SMALLEST:g} to {LARGEST:g}: choose another unit"
                 raise InvalidInput(f"size of {name!r}", float(size), allowed)

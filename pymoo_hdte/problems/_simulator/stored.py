@@ -36,13 +36,17 @@ STATISTICS: dict[str, type[Statistic]] = {
 HIGHEST_DEGREE = 100
 """Largest degree that is read from a file; surrogates have 60 at most."""
 _OF_RESPONSES = ("mean_error", "std_error", "smallest_scatter")
-_OF_POINTS = ("failed", "held_out_points")
+_OF_POINTS = ("failed", "held_out_points", "points")
 
 FORMAT = FileFormat(
     "pymoo_hdte robust problem",
-    version=1,
-    fields=("designs", "noise", "responses", "objectives", "constraints", "n_runs", "tails"),
-    arrays=("indices", "coefficients", *_OF_RESPONSES, *_OF_POINTS, "held_out_error"),
+    version=2,
+    fields=(
+        *("designs", "noise", "responses", "objectives", "constraints", "n_runs", "tails"),
+        "refusal",
+    ),
+    arrays=("indices", "coefficients", *_OF_RESPONSES, *_OF_POINTS, "held_out_error", "truth"),
+    later={"refusal": (2, None), "points": (2, None), "truth": (2, None)},
 )
 
 
@@ -54,6 +58,7 @@ def write_problem(
     objectives: Sequence[Statistic],
     constraints: Sequence[RobustConstraint],
     n_runs: int,
+    refusal: str | None = None,
 ) -> None:
     """Write the parts of a `SimulatorProblem`, replacing the file in one step.
 
@@ -83,6 +88,7 @@ def write_problem(
         ],
         "n_runs": n_runs,
         "tails": _with_tails(fit),
+        "refusal": refusal,
     }
     arrays = {name: getattr(fit, name) for name in FORMAT.arrays[2:]}
     polynomial = {
@@ -94,7 +100,15 @@ def write_problem(
 
 def read_problem(
     path: str | os.PathLike[str],
-) -> tuple[Inputs, AdaptiveFit, tuple[str, ...], list[Statistic], list[RobustConstraint], int]:
+) -> tuple[
+    Inputs,
+    AdaptiveFit,
+    tuple[str, ...],
+    list[Statistic],
+    list[RobustConstraint],
+    int,
+    str | None,
+]:
     """Return the parts from a file that `write_problem` made.
 
     Raises
@@ -114,13 +128,19 @@ def read_problem(
             raise ValueError("objectives are missing")
         responses = _responses(header["responses"])
         n_runs = whole_number("n_runs", header["n_runs"], 0)
+        refusal = header["refusal"]
+        if not isinstance(refusal, str | None):
+            raise InvalidInput("refusal", refusal, "a text or nothing")
+        for name, columns in (("points", len(inputs.axes)), ("truth", len(responses))):
+            if arrays[name] is None:
+                arrays[name] = np.empty((0, columns))
         fit = _read_fit(inputs, len(responses), n_runs, header["tails"], arrays)
     except InvalidInput:
         raise
     except Exception as error:
         allowed = f"a file of format {FORMAT.name!r} ({type(error).__name__}: {error})"
         raise InvalidInput("path", str(path), allowed) from error
-    return inputs, fit, responses, objectives, constraints, n_runs
+    return inputs, fit, responses, objectives, constraints, n_runs, refusal
 
 
 def _design(name: str, design: Design) -> dict[str, Any]:
@@ -228,6 +248,7 @@ def _read_fit(
         **dict.fromkeys(_OF_RESPONSES, (responses,)),
         **dict.fromkeys(_OF_POINTS, (None, len(axes))),
         "held_out_error": (held_out, responses),
+        "truth": (len(arrays["points"]), responses),
     }
     for name, shape in shapes.items():
         actual_shape = arrays[name].shape

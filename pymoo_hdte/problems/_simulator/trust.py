@@ -74,8 +74,8 @@ def random(
     accuracy: float,
     responses: tuple[str, ...],
     again: Callable[[tuple[float, ...]], Sequence[float] | None],
-) -> InvalidInput | None:
-    """Return the error of a simulator that gives two values for the same inputs, or None.
+) -> Refusal | None:
+    """Return why a simulator that gives two values for the same inputs is refused, or None.
 
     Looked at where a surrogate is refused, by three runs at one point: what differs by less than a
     tenth of the accuracy asked for, as a share of what the surrogate spreads, is not the cause.
@@ -91,12 +91,12 @@ def random(
         responses, np.min(runs, axis=0), np.max(runs, axis=0), spread, strict=True
     ):
         if high - low > _OF_ACCURACY * accuracy * size:
-            return InvalidInput(
-                f"{name!r} of runs with the same inputs",
-                f"{low:.6g} to {high:.6g}",
-                "one value: the simulator must not be random; fix its seed, or return "
-                "the mean of enough runs",
+            field = f"difference between values of {name!r} with the same inputs"
+            allowed = (
+                f"0, not {low:.6g} and {high:.6g}: the simulator must not be random; fix its seed, "
+                "or return the mean of enough runs"
             )
+            return field, float(f"{high - low:.3g}"), allowed, {}
     return None
 
 

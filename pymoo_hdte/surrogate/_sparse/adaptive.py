@@ -4,8 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
+
+# Its spatial part loads when it is first used.
+import scipy
 from numpy.typing import NDArray
 
 from pymoo_hdte._one_thread import ONE_THREAD
@@ -58,6 +62,10 @@ SCATTER_OF_RANGE = 1e-4
 """The same, as a share of the response's deviation over all points."""
 
 
+_SAME_POINT = 1e-9
+"""Distance in -1..1 below which two points are the same, after rounding to units and back."""
+
+
 @dataclass(frozen=True)
 class AdaptiveFit:
     """The surrogate with which its building ended.
@@ -74,6 +82,10 @@ class AdaptiveFit:
         Calls of the function.
     smallest_scatter : ndarray, shape (r,)
         A smaller scatter is judged as this, in the responses' units.
+    points : ndarray, shape (n, d)
+        All runs, in -1..1.
+    truth : ndarray, shape (n, r)
+        The responses there in their units, NaN where the function failed.
     failed : ndarray, shape (k, d)
         Points in -1..1 at which the function failed.
     held_out_points : ndarray, shape (v, d)
@@ -90,10 +102,16 @@ class AdaptiveFit:
     std_error: Array
     n_runs: int
     smallest_scatter: Array
+    points: Array
+    truth: Array
     failed: Array
     held_out_points: Array
     held_out_error: Array
     confirmed: bool = True
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> AdaptiveFit:
+        """Return itself: nothing in it changes."""
+        return self
 
     @property
     def errors(self) -> Array:
@@ -115,8 +133,11 @@ class _SurrogateBuild:
         function: Callable[[Array], Array],
         accuracy: float,
         random_state: np.random.Generator,
+        given: tuple[Array, Array] | None = None,
     ) -> None:
         self.axes, self.function = axes, function
+        self._given = (np.empty((0, len(axes))), np.empty((0, 0))) if given is None else given
+        self._in_hand = None if given is None else scipy.spatial.KDTree(given[0])
         self.lost = LOST * min(accuracy, LARGEST_ACCURACY)
         self.spread = SpreadPoints(axes, random_state)
         self.designs = draw_designs(axes, JUDGED_DESIGNS, random_state)
@@ -130,12 +151,34 @@ class _SurrogateBuild:
         return len(self.points)
 
     def run(self, count: int) -> None:
-        """Run the function at the next points; where one response fails all count as failed."""
-        points = self.spread.next(count)
-        values = np.array(self.function(points), dtype=float)
+        """Add runs: those given, then the function at the next points.
+
+        Where one response fails all count as failed.
+        """
+        points, values = self._next(count)
         values[~np.isfinite(values).all(axis=1)] = np.nan
         self.points = np.concatenate([self.points, points])
         self.truth = np.concatenate([self.truth.reshape(-1, values.shape[1]), values])
+
+    def _next(self, count: int) -> tuple[Array, Array]:
+        points, values = (part[:count] for part in self._given)
+        self._given = self._given[0][count:], self._given[1][count:]
+        if count == len(points):
+            return points, values.copy()
+        others = self._new_points(count - len(points))
+        found = np.array(self.function(others), dtype=float)
+        values = values.reshape(-1, found.shape[1])
+        return np.concatenate([points, others]), np.concatenate([values, found])
+
+    def _new_points(self, count: int) -> Array:
+        """Return the next points of the sequence that are not among the runs in hand."""
+        points = np.empty((0, len(self.axes)))
+        while len(points) < count:
+            more = self.spread.next(count - len(points))
+            if self._in_hand is not None:
+                more = more[self._in_hand.query(more)[0] > _SAME_POINT]
+            points = np.concatenate([points, more])
+        return points
 
     # Not `run`, which calls the user's function: that keeps its threads.
     @ONE_THREAD
@@ -174,6 +217,8 @@ class _SurrogateBuild:
             of_std,
             self.n_runs,
             least,
+            self.points,
+            self.truth,
             self.points[~good],
             points,
             left_out / np.maximum(std, least),
@@ -213,6 +258,7 @@ def fit_adaptively(
     acceptable: Callable[[AdaptiveFit], bool] = lambda fit: True,
     at_once: int = 1,
     error_of: Callable[[AdaptiveFit], float] = lambda fit: fit.largest_error,
+    given: tuple[Array, Array] | None = None,
 ) -> AdaptiveFit:
     """Grow a surrogate until mean and standard deviation are accurate, or the budget is spent.
 
@@ -233,14 +279,23 @@ def fit_adaptively(
         Least number of runs to add together.
     error_of : callable
         Error of a fit that must be as small as requested; by default the largest of all responses.
+    given : tuple of ndarray, optional
+        Points and values of runs in hand, which do not count in the budget. They come first, in an
+        order by chance, and are judged like others: twice, without and with the last of them.
 
     Returns
     -------
     AdaptiveFit
         A surrogate of the requested accuracy unless the budget is spent.
     """
-    build = _SurrogateBuild(axes, function, accuracy, random_state)
-    build.run(min(first_runs(len(axes)), budget))
+    first = first_runs(len(axes))
+    if given is not None:
+        order = random_state.permutation(len(given[0]))
+        given = given[0][order], given[1][order]
+        budget += len(order)
+        first = max(first, int(np.ceil(len(order) / (1.0 + BATCH))))
+    build = _SurrogateBuild(axes, function, accuracy, random_state, given)
+    build.run(min(first, budget))
     passed, goal = 0, min(accuracy, LOOSEST)
     while True:
         fit = build.judge()
@@ -253,6 +308,8 @@ def fit_adaptively(
             return fit
         count = min(max(at_once, int(BATCH * build.n_runs)), budget - build.n_runs)
         if count <= 0:
+            if inside > accuracy:
+                fit = build.with_tails(fit, inside)
             return replace(fit, confirmed=False)
         build.run(count)
 

@@ -7,14 +7,12 @@ one of s, whose expectations are sums over a Gauss rule, exact to rounding.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 
 # Its statistics load when they are first used.
 import scipy
 from numpy.typing import NDArray
-from scipy.special import ndtr
+from scipy.special import ndtr, ndtri
 
 from pymoo_hdte.surrogate._sparse.measures import Distribution, Measure
 
@@ -101,8 +99,8 @@ class Axis:
     logarithmic : bool
         Whether the coordinate is the logarithm; only for a positive design that scatters
         relatively or not at all.
-    from_normal : callable, optional
-        Turns the standard normal coordinate of a noise variable into the variable.
+    from_normal : FromNormal, optional
+        Turns the standard normal coordinate of a noise variable into the variable, and back.
 
     Attributes
     ----------
@@ -117,7 +115,7 @@ class Axis:
         design: tuple[float, float] | None = None,
         relative: bool = False,
         logarithmic: bool = False,
-        from_normal: Callable[[Array], Array] | None = None,
+        from_normal: FromNormal | None = None,
     ) -> None:
         self.name = name
         self.scatter, self.design = scatter, design
@@ -149,7 +147,9 @@ class Axis:
         return tuple((np.log(ends) if self.logarithmic else ends).tolist())
 
     def cube(self, values: Array) -> Array:
-        """Return the coordinate of values of a designed variable, same shape."""
+        """Return the coordinate of values of the variable, same shape."""
+        if self._from_normal is not None:
+            values = self._from_normal.inverse(values)
         values = np.log(values) if self.logarithmic else values
         return (values - self.centre) / self.half_width
 
@@ -202,10 +202,10 @@ def noise_axis(name: str, scatter: Scatter) -> Axis:
     """Return the axis of a noise variable, in the normal coordinate if its tail is heavy."""
     if not scatter.is_heavy:
         return Axis(name, scatter)
-    return Axis(name, standard_normal(scatter.tail), from_normal=_FromNormal(scatter.distribution))
+    return Axis(name, standard_normal(scatter.tail), from_normal=FromNormal(scatter.distribution))
 
 
-class _FromNormal:
+class FromNormal:
     """The value of a variable at that of the standard normal one of the same probability."""
 
     def __init__(self, distribution: Distribution) -> None:
@@ -213,3 +213,7 @@ class _FromNormal:
 
     def __call__(self, w: Array) -> Array:
         return self._distribution.quantile(ndtr(w))
+
+    def inverse(self, values: Array) -> Array:
+        """Return the standard normal values of the same probability as these, same shape."""
+        return ndtri(self._distribution.share_below(values))
