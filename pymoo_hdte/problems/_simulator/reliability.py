@@ -20,11 +20,12 @@ from tqdm import tqdm
 from pymoo_hdte.checks import InvalidInput, real_number, whole_number
 from pymoo_hdte.problems._simulator.identity import identity
 from pymoo_hdte.problems._simulator.inputs import Inputs
-from pymoo_hdte.problems._simulator.normal_space import REACH, TAIL_OF_REACH, NormalSpace
+from pymoo_hdte.problems._simulator.normal_space import NormalSpace
 from pymoo_hdte.problems._simulator.requested import place_of
 from pymoo_hdte.problems._simulator.run_file import RunFile
 from pymoo_hdte.problems._simulator.runs import Simulator
 from pymoo_hdte.problems._simulator.statistics import Statistic
+from pymoo_hdte.problems._simulator.tails import REACH, TAIL_OF_REACH
 from pymoo_hdte.problems._simulator.workers import Workers
 from pymoo_hdte.surrogate._rare.events import Event
 from pymoo_hdte.surrogate._rare.limit_state import (
@@ -196,7 +197,7 @@ def _reliability(state: LimitState, event: Event, space: NormalSpace) -> Reliabi
         probability,
         interval,
         -float(scipy.special.ndtri(probability)),
-        -length if inside else length,
+        (-length if inside else length) if length else (-np.inf if inside else np.inf),
         dict(zip(names, values, strict=True)),
         dict(zip(names, shares.tolist(), strict=True)),
         state.n_runs,

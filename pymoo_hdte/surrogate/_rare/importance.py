@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -111,7 +112,7 @@ class Sample:
     weights: Array
     counts: NDArray[np.int_]
 
-    def mean(self, values: Array) -> tuple[float, float]:
+    def mean(self, values: NDArray[Any]) -> tuple[float, float]:
         """Return the normal expectation of values, shape (n,), and its standard error."""
         terms = self.weights * values
         parts = np.split(terms, np.cumsum(self.counts)[:-1])
@@ -200,7 +201,8 @@ def _clusters(points: Array, log_weights: Array) -> Clusters:
     weights = np.exp(log_weights - log_weights.max())
     total = float(weights.sum())
     directions = points / np.maximum(np.linalg.norm(points, axis=1), 1e-12)[:, None]
-    free, clusters = np.ones(len(points), dtype=bool), []
+    free = np.ones(len(points), dtype=bool)
+    clusters: Clusters = []
     while free.any() and len(clusters) < MOST_CLUSTERS and weights[free].sum() > LEFT_OUT * total:
         first = int(np.argmax(np.where(free, weights, -1.0)))
         near = free & (directions @ directions[first] > SAME_CLUSTER)

@@ -45,6 +45,8 @@ class Scatter:
     ----------
     lower, upper : float
         Interval: the support, or the quantiles of ``tail`` where that goes on for long.
+    box : tuple of float
+        The interval for `TAIL`: what counts as the worst case.
     cut : Measure
         The measure inside that interval, where there are runs.
     ended : Measure
@@ -55,14 +57,20 @@ class Scatter:
         self.distribution = distribution
         self.measure = measure
         self.tail = tail
-        p = np.array([1e-3, 0.5, 1.0 - 1e-3, tail, 1.0 - tail])
-        low, middle, high, tail_low, tail_high = distribution.quantile(p).tolist()
-        self.lower, self.upper = distribution.lower, distribution.upper
-        if middle - self.lower > 2.0 * (middle - low):
-            self.lower = tail_low
-        if self.upper - middle > 2.0 * (high - middle):
-            self.upper = tail_high
+        self.box = self._between(TAIL)
+        self.lower, self.upper = self._between(tail)
         self.cut, self.ended = measure.inside(self.lower, self.upper)
+
+    def _between(self, tail: float) -> tuple[float, float]:
+        """Return the ends of the support, or quantiles of ``tail`` where it goes on for long."""
+        p = np.array([1e-3, 0.5, 1.0 - 1e-3, tail, 1.0 - tail])
+        low, middle, high, tail_low, tail_high = self.distribution.quantile(p).tolist()
+        lower, upper = self.distribution.lower, self.distribution.upper
+        if middle - lower > 2.0 * (middle - low):
+            lower = tail_low
+        if upper - middle > 2.0 * (high - middle):
+            upper = tail_high
+        return lower, upper
 
     @property
     def is_heavy(self) -> bool:
@@ -194,7 +202,7 @@ class Axis:
         """Smallest and largest s of the box around a design."""
         if self.scatter is None:
             return 0.0, 0.0
-        ends = np.array([self.scatter.lower, self.scatter.upper])
+        ends = np.array(self.scatter.box)
         return tuple((np.log1p(ends) if self.logarithmic else ends).tolist())
 
 
