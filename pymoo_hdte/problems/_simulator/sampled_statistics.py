@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pymoo_hdte.checks import InvalidInput, real_number
-from pymoo_hdte.problems._simulator.around import PARTS, SAMPLES, Around
+from pymoo_hdte.problems._simulator.around import PARTS, Around
 from pymoo_hdte.problems._simulator.statistics import Statistic, reach_of
 from pymoo_hdte.problems._simulator.tails import SMALLEST, Tail, Z, near_quantile, quantile_above
 from pymoo_hdte.surrogate._rare.events import Event, Limit
@@ -24,16 +24,14 @@ from pymoo_hdte.surrogate.moments import divide_or_zero
 Array = NDArray[np.float64]
 
 FEWEST = 10
-"""Samples that have to lie beyond a quantile: ten have an error of a third."""
-RESOLVED = FEWEST / SAMPLES
-"""Smallest probability beyond a quantile for which the common samples serve."""
-OFTEN = 0.1
-"""Smallest probability of an event for which they serve: 410 of them have an error of 5 %."""
+"""Draws that have to lie beyond a quantile: ten have an error of a third."""
 STUDENT = 3.182
 """Standard errors of a mean of four parts within which it lies with 95 %: Student's t(3).
 
 The size of the standard error itself is taken from these four; 2 would cover some 86 %.
 """
+NONE_OF = 3.0
+"""Events of a probability p are none in n draws with 5 % where n p = -ln 0.05 = 3.0."""
 UNBOUNDED = 1e-6
 """Probability that is to be resolved where an event is an objective, or has no bound yet."""
 
@@ -57,14 +55,14 @@ class _TailStatistic(Statistic):
         return min(self.p, 1.0 - self.p)
 
     def _of(self, around: Around) -> tuple[Array, Array]:
-        if self._common_serve:
+        if self._common_serve(around):
             return self._of_common(around)
         tails = [self._of_tail(*self._tail(around, row)) for row in range(len(around.mean))]
         values, slopes, _ = zip(*tails, strict=True)
         return np.array(values), np.array(slopes)
 
     def _error(self, mean_error: Array, std_error: Array, around: Around) -> Array:
-        if self._common_serve:
+        if self._common_serve(around):
             value = self._of_common(around)[0]
             parts = np.array([self._of_common(part)[0] for part in around.quarters()])
             sampling = STUDENT * parts.std(axis=0, ddof=1) / np.sqrt(PARTS)
@@ -73,9 +71,8 @@ class _TailStatistic(Statistic):
             value, sampling = (np.array([tail[place] for tail in tails]) for place in (0, 2))
         return mean_error + reach_of(value, around) * std_error + sampling
 
-    @property
-    def _common_serve(self) -> bool:
-        return 1.0 - self.p >= RESOLVED
+    def _common_serve(self, around: Around) -> bool:
+        return 1.0 - self.p >= around.resolved
 
     @property
     def _side(self) -> float:
@@ -127,9 +124,8 @@ class Quantile(_TailStatistic):
     def __post_init__(self) -> None:
         object.__setattr__(self, "p", _probability("p", self.p, SMALLEST, 1.0 - SMALLEST))
 
-    @property
-    def _common_serve(self) -> bool:
-        return self.rarest() >= RESOLVED
+    def _common_serve(self, around: Around) -> bool:
+        return self.rarest() >= around.resolved
 
     @property
     def _side(self) -> float:
@@ -310,7 +306,9 @@ class FailureProbability(Statistic):
         margins = [self.failure.margin(values, part) for part in wide]
         shares = np.array([np.mean(margin > 0.0, axis=1) for margin in margins])
         errors = Z * np.sqrt(shares * (1.0 - shares) / len(around.samples[1]))
-        for row in np.flatnonzero((shares[0] < OFTEN) | (shares[0] > 1.0 - OFTEN)):
+        errors = np.maximum(errors, NONE_OF / len(around.samples[1]))
+        rare = np.minimum(shares[0], 1.0 - shares[0]) < around.often
+        for row in np.flatnonzero(rare):
             side = 1.0 if shares[0, row] < 0.5 else -1.0
             tail = around.tail(int(row), partial(self._signed, side))
             for place, part in enumerate(slacks):
