@@ -3,6 +3,7 @@
 from pymoo_hdte.problems._simulator.existing import Robust
 from pymoo_hdte.problems._simulator.inputs import Design
 from pymoo_hdte.problems._simulator.problem import SimulatorProblem
+from pymoo_hdte.problems._simulator.reliability import Reliability, failure_probability
 from pymoo_hdte.problems._simulator.robust_problem import robust_problem
 from pymoo_hdte.problems._simulator.runs import SimulatorFailed
 from pymoo_hdte.problems._simulator.sampled_statistics import CVaR, FailureProbability, Quantile
@@ -26,16 +27,20 @@ from pymoo_hdte.problems.robust_dte_direct import RobustDTEDirect
 from pymoo_hdte.problems.robust_dte_grades import RobustDTEGrades
 from pymoo_hdte.problems.robust_dte_tolerance import RobustDTETolerance
 from pymoo_hdte.problems.toy import RobustToy
+from pymoo_hdte.surrogate._rare.events import Event, Response
 from pymoo_hdte.surrogate.trust import UntrustedSurrogate
 
 __all__ = [
     "CVaR",
     "Design",
+    "Event",
     "FailureProbability",
     "Mean",
     "MeanPlusStd",
     "OperatingCondition",
     "Quantile",
+    "Reliability",
+    "Response",
     "Robust",
     "RobustConstraint",
     "RobustDTE",
@@ -49,6 +54,7 @@ __all__ = [
     "Std",
     "UntrustedSurrogate",
     "WorstCase",
+    "failure_probability",
     "hs_20_100_duty_cycle",
     "load_conditions",
     "robust_benchmarks",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from functools import cached_property
 from itertools import product
 from typing import Any
@@ -13,6 +13,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from pymoo_hdte.problems._simulator.tails import NormalScatter, Tail
 from pymoo_hdte.surrogate._sparse.moments import SparseMoments, deviation
 
 Array = NDArray[np.float64]
@@ -74,8 +75,15 @@ class CommonSamples:
     def __getstate__(self) -> dict[str, Any]:
         """Return what is pickled: not what can be computed anew."""
         return {
-            name: value for name, value in vars(self).items() if name not in ("basis", "starts")
+            name: value
+            for name, value in vars(self).items()
+            if name not in ("basis", "starts", "normal_scatter")
         }
+
+    @cached_property
+    def normal_scatter(self) -> NormalScatter:
+        """The scatter as a function of standard normal variables."""
+        return NormalScatter(self.moments.axes)
 
     @cached_property
     def basis(self) -> Array:
@@ -100,11 +108,31 @@ class Around:
         Expansion of the response, from `SparseMoments.expansion`.
     part : slice
         The samples to use.
+
+    Attributes
+    ----------
+    beside : dict of str to Around
+        All responses around these designs by name, itself among them; None stands for the only one.
+    mean_error, std_error : ndarray, shape (n,)
+        Errors of mean and standard deviation in the response's unit.
     """
 
     def __init__(self, common: CommonSamples, expansion: Array, part: slice = slice(None)) -> None:
         self._common, self.expansion, self._part = common, expansion, part
         self.mean, self.std = expansion[:, 0], deviation(expansion)
+        self.beside: dict[str | None, Around] = {None: self}
+        self.mean_error = self.std_error = np.zeros(len(expansion))
+
+    def tail(
+        self,
+        row: int,
+        margin: Callable[[Mapping[str | None, Array]], Array],
+        target: Callable[[Array, Array], float] = lambda values, weights: 0.0,
+    ) -> Tail:
+        """Return samples around one design where a margin of the responses is above a level."""
+        expansions = {name: around.expansion[row] for name, around in self.beside.items()}
+        moments = self._common.moments
+        return Tail(self._common.normal_scatter, moments.basis, expansions, margin, target)
 
     @property
     def size(self) -> int:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -115,7 +116,6 @@ class SimulatorProblem(Problem):
         self.obj_names = tuple(statistic.name for statistic in objectives)
         self._common = CommonSamples(fit.moments, seed=1)
         self.failed = inputs.values(fit.failed) if len(fit.failed) else fit.failed
-        self.accuracy = self._accuracy()
         errors = fit.errors.max(axis=0).tolist()
         self.response_errors = dict(zip(responses, errors, strict=True))
 
@@ -243,17 +243,27 @@ class SimulatorProblem(Problem):
     def _around(self, X: Array) -> list[Around]:
         """Return the expansion of each response around the designs."""
         expansion = self._fit.moments.expansion(X)
-        return [Around(self._common, expansion[:, k]) for k in range(len(self.responses))]
+        around = [Around(self._common, expansion[:, k]) for k in range(len(self.responses))]
+        beside: dict[str | None, Around] = dict(zip(self.responses, around, strict=True))
+        if len(around) == 1:
+            beside[None] = around[0]
+        for place, response in enumerate(around):
+            scatter = np.maximum(response.std, self._fit.smallest_scatter[place])
+            response.mean_error = self._fit.mean_error[place] * scatter
+            response.std_error = self._fit.std_error[place] * scatter
+            response.beside = beside
+        return around
 
     def _band(self, around: list[Around]) -> Array:
         columns = []
         for statistic, _, _, place in self._requested[: self.n_obj]:
-            scatter = np.maximum(around[place].std, self._fit.smallest_scatter[place])
-            errors = self._fit.mean_error[place] * scatter, self._fit.std_error[place] * scatter
-            columns.append(statistic.half_width(*errors, around[place]))
+            response = around[place]
+            columns.append(statistic.half_width(response.mean_error, response.std_error, response))
         return np.column_stack(columns)
 
-    def _accuracy(self) -> Array:
+    @cached_property
+    def accuracy(self) -> Array:
+        """Estimated error of each objective, as the class says, shape (n_obj,)."""
         designs = draw_designs(self._inputs.axes, _JUDGED, np.random.default_rng(1))
         around = self._around(designs)
         shares = self._band(around)

@@ -19,7 +19,7 @@ from pymoo_hdte.problems._simulator.data import read_data
 from pymoo_hdte.problems._simulator.identity import identity
 from pymoo_hdte.problems._simulator.inputs import Design, Inputs
 from pymoo_hdte.problems._simulator.problem import SimulatorProblem
-from pymoo_hdte.problems._simulator.requested import place_of
+from pymoo_hdte.problems._simulator.requested import least_tail, places_of
 from pymoo_hdte.problems._simulator.run_file import RunFile
 from pymoo_hdte.problems._simulator.runs import Simulator, no_simulator
 from pymoo_hdte.problems._simulator.statistics import (
@@ -183,11 +183,11 @@ def robust_problem(
     >>> print(f"{problem.evaluate(np.array([[1.0]]))[0, 0]:.2f}")
     5.02
     """
-    inputs = Inputs(designs, {} if noise is None else noise)
+    _check_statistics(objectives, constraints)
+    inputs = Inputs(designs, {} if noise is None else noise, least_tail(objectives, constraints))
     accuracy = _share("accuracy", accuracy)
     one_of("accept", accept, ACCEPTED)
     least = least_runs(len(inputs.axes))
-    _check_statistics(objectives, constraints)
     given = None if data is None else read_data(data, inputs)
     least = max(0, least - (0 if given is None else len(given.points)))
     if simulator is None and given is not None and not least:
@@ -208,7 +208,8 @@ def robust_problem(
         statistics = [*objectives, *(limit.statistic for limit in constraints)]
 
         def requested_places() -> list[int]:
-            return sorted({place_of(statistic, simulate.responses) for statistic in statistics})
+            places = (places_of(statistic, simulate.responses) for statistic in statistics)
+            return sorted({place for own in places for place in own})
 
         fit = fit_adaptively(
             inputs.axes,

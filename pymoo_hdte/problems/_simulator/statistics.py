@@ -47,6 +47,15 @@ class Statistic:
         return real_number("bound", bound)
 
     @property
+    def responses(self) -> tuple[str | None, ...]:
+        """Names of the responses it belongs to; None for the only one."""
+        return (self.response,)
+
+    def rarest(self, bound: float | None = None) -> float:
+        """Return the least probability that it asks for, with a bound or without, dimensionless."""
+        return 0.5
+
+    @property
     def name(self) -> str:
         """Name of the statistic as an objective."""
         words = [type(self).__name__.lower(), *([self.response] if self.response else [])]
@@ -125,6 +134,11 @@ class RobustConstraint:
     statistic: Statistic
     bound: float
     side: float
+
+    @property
+    def rarest(self) -> float:
+        """The least probability that it asks for, dimensionless."""
+        return self.statistic.rarest(self.bound)
 
 
 @dataclass(frozen=True)

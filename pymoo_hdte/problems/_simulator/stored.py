@@ -14,6 +14,7 @@ from pymoo_hdte._io.archive import FileFormat
 from pymoo_hdte.checks import InvalidInput, whole_number
 from pymoo_hdte.problems._simulator.distributions import described, rebuilt
 from pymoo_hdte.problems._simulator.inputs import Design, Inputs
+from pymoo_hdte.problems._simulator.requested import least_tail
 from pymoo_hdte.problems._simulator.sampled_statistics import CVaR, FailureProbability, Quantile
 from pymoo_hdte.problems._simulator.statistics import (
     Mean,
@@ -23,6 +24,7 @@ from pymoo_hdte.problems._simulator.statistics import (
     Std,
     WorstCase,
 )
+from pymoo_hdte.surrogate._rare.events import Event, event_from
 from pymoo_hdte.surrogate._sparse.adaptive import AdaptiveFit
 from pymoo_hdte.surrogate._sparse.moments import SparseMoments
 from pymoo_hdte.surrogate._sparse.polynomial import SparsePolynomial
@@ -121,9 +123,10 @@ def read_problem(
     header, arrays = FORMAT.read(path)
     # The parts check themselves; whatever else is wrong with a part is said as it comes.
     try:
-        inputs = Inputs(_designs(header["designs"]), _noise(header["noise"]))
         objectives = [_read_statistic(entry) for entry in header["objectives"]]
         constraints = [_read_constraint(entry) for entry in header["constraints"]]
+        tail = least_tail(objectives, constraints)
+        inputs = Inputs(_designs(header["designs"]), _noise(header["noise"]), tail)
         if not objectives:
             raise ValueError("objectives are missing")
         responses = _responses(header["responses"])
@@ -189,9 +192,10 @@ def _statistic(statistic: Statistic) -> dict[str, Any]:
     kind = type(statistic).__name__
     if STATISTICS.get(kind) is not type(statistic):
         raise InvalidInput("statistic", statistic, f"one of {', '.join(STATISTICS)}")
-    return {"kind": kind} | {
-        field.name: getattr(statistic, field.name) for field in fields(statistic)
-    }
+    table = {field.name: getattr(statistic, field.name) for field in fields(statistic)}
+    if isinstance(table.get("event"), Event):
+        table["event"] = table["event"].table()
+    return {"kind": kind} | table
 
 
 def _read_statistic(table: Mapping[str, Any]) -> Statistic:
@@ -199,6 +203,10 @@ def _read_statistic(table: Mapping[str, Any]) -> Statistic:
     kind = given.pop("kind", None)
     if kind not in STATISTICS:
         raise InvalidInput("statistic of the file", kind, f"one of {', '.join(STATISTICS)}")
+    if kind == FailureProbability.__name__:
+        # Files of the first version have no joint events.
+        event = given.setdefault("event", None)
+        given["event"] = event if event is None else event_from(event)
     _check_fields(kind, given, STATISTICS[kind])
     _check_sign("sign of a statistic", given["sign"])
     return STATISTICS[kind](**given)

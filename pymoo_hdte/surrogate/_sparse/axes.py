@@ -38,28 +38,39 @@ class Scatter:
         Distribution of the variable.
     measure : Measure
         The same as weighted nodes.
+    tail : float
+        Share of the probability beyond the interval of an unbounded variable on either side.
 
     Attributes
     ----------
     lower, upper : float
-        Interval: the support, or the quantiles of `TAIL` where that goes on for long.
+        Interval: the support, or the quantiles of ``tail`` where that goes on for long.
+    box : tuple of float
+        The interval for `TAIL`: what counts as the worst case.
     cut : Measure
         The measure inside that interval, where there are runs.
     ended : Measure
         The measure with all that lies beyond the interval moved to its ends.
     """
 
-    def __init__(self, distribution: Distribution, measure: Measure) -> None:
+    def __init__(self, distribution: Distribution, measure: Measure, tail: float = TAIL) -> None:
         self.distribution = distribution
         self.measure = measure
-        p = np.array([1e-3, 0.5, 1.0 - 1e-3, TAIL, 1.0 - TAIL])
-        low, middle, high, tail_low, tail_high = distribution.quantile(p).tolist()
-        self.lower, self.upper = distribution.lower, distribution.upper
-        if middle - self.lower > 2.0 * (middle - low):
-            self.lower = tail_low
-        if self.upper - middle > 2.0 * (high - middle):
-            self.upper = tail_high
+        self.tail = tail
+        self.box = self._between(TAIL)
+        self.lower, self.upper = self._between(tail)
         self.cut, self.ended = measure.inside(self.lower, self.upper)
+
+    def _between(self, tail: float) -> tuple[float, float]:
+        """Return the ends of the support, or quantiles of ``tail`` where it goes on for long."""
+        p = np.array([1e-3, 0.5, 1.0 - 1e-3, tail, 1.0 - tail])
+        low, middle, high, tail_low, tail_high = self.distribution.quantile(p).tolist()
+        lower, upper = self.distribution.lower, self.distribution.upper
+        if middle - lower > 2.0 * (middle - low):
+            lower = tail_low
+        if upper - middle > 2.0 * (high - middle):
+            upper = tail_high
+        return lower, upper
 
     @property
     def is_heavy(self) -> bool:
@@ -74,10 +85,10 @@ class Scatter:
         )
 
 
-def standard_normal() -> Scatter:
+def standard_normal(tail: float = TAIL) -> Scatter:
     """Return the scatter of a normal variable of mean 0 and deviation 1."""
     distribution = Distribution("standard normal", scipy.stats.norm())
-    return Scatter(distribution, Measure.of("standard normal", distribution))
+    return Scatter(distribution, Measure.of("standard normal", distribution), tail)
 
 
 class Axis:
@@ -191,7 +202,7 @@ class Axis:
         """Smallest and largest s of the box around a design."""
         if self.scatter is None:
             return 0.0, 0.0
-        ends = np.array([self.scatter.lower, self.scatter.upper])
+        ends = np.array(self.scatter.box)
         return tuple((np.log1p(ends) if self.logarithmic else ends).tolist())
 
 
@@ -199,7 +210,7 @@ def noise_axis(name: str, scatter: Scatter) -> Axis:
     """Return the axis of a noise variable, in the normal coordinate if its tail is heavy."""
     if not scatter.is_heavy:
         return Axis(name, scatter)
-    return Axis(name, standard_normal(), from_normal=FromNormal(scatter.distribution))
+    return Axis(name, standard_normal(scatter.tail), from_normal=FromNormal(scatter.distribution))
 
 
 class FromNormal:

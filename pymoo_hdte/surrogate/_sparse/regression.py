@@ -88,6 +88,13 @@ class Regression:
         across = covariance(features, self._features, self.variance)
         return self.centre + self.unit * (across @ self.weights)
 
+    def whitened(self, across: Array) -> Array:
+        """Return what the runs tell, shape (n, m), from their covariances with m points, (n, m).
+
+        Its squares, summed over the runs, are what the prior variance shrinks by.
+        """
+        return np.asarray(solve_triangular(self._lower, across, lower=True))
+
     def spread(self, features: list[Array], functionals: Array) -> Array:
         """Return the standard deviation of sums over points, shape (f,), in the response's unit.
 
@@ -101,7 +108,7 @@ class Regression:
         inside = covariance(features, features, self.variance)
         across = covariance(self._features, features, self.variance)
         prior = np.einsum("fm,mn,fn->f", functionals, inside, functionals, optimize=True)
-        known = solve_triangular(self._lower, across @ functionals.T, lower=True)
+        known = self.whitened(across @ functionals.T)
         variance = np.maximum(prior - np.sum(known**2, axis=0), 0.0)
         return self.unit * np.sqrt(self.size * variance)
 
