@@ -24,7 +24,6 @@ from pymoo_hdte.surrogate._sparse.kernel import (
     EXPECTED,
     START,
     EvenPolynomials,
-    covariance,
     factors,
     variances,
 )
@@ -43,8 +42,10 @@ _LOST = 0.02
 _STEPS = 30
 """Newton steps to the most probable latent values; they converge in some ten."""
 _ITERATIONS = 40
-_DRAWN = 16
+DRAWN = 16
 """Polynomials that are drawn from the posterior: a deviation of sixteen is known to 18 %."""
+STUDENT_OF_DRAWS = 2.12
+"""Deviations of these draws within which 95 % lie: Student's t(16)."""
 _BURN_IN, _THINNED = 200, 40
 """Steps of the sampler before the first draw, and from one draw to the next; by hand."""
 _MOST_DRAWN = 400
@@ -114,7 +115,7 @@ def fit_success(
 
     coefficients_of_mode = prior * (mode.slope @ at_runs)
     essential = closed(drawn[largest(coefficients_of_mode, _LOST)])
-    stays = np.isin(_rows(drawn), _rows(essential))
+    stays = np.isin(rows_of(drawn), rows_of(essential))
     indices, coefficients = drawn[stays], coefficients_of_mode[stays]
     draws = _posterior_draws(coefficients_of_mode, prior, sign[:, None] * at_runs)
     return Success(polynomial(indices, coefficients[None]), polynomial(drawn, draws), parameters)
@@ -139,7 +140,7 @@ def _posterior_draws(start: Array, prior: Array, signed_terms: Array) -> Array:
     deviation, draws, now = np.sqrt(prior), [], start
     along = signed_terms @ now
     likelihood = float(log_ndtr(along).sum())
-    for step in range(1, _BURN_IN + _DRAWN * _THINNED + 1):
+    for step in range(1, _BURN_IN + DRAWN * _THINNED + 1):
         other = deviation * rng.standard_normal(len(start))
         across = signed_terms @ other
         level = likelihood + np.log(rng.random())
@@ -166,7 +167,7 @@ def _prior(variance: Array, indices: Indices) -> Array:
     return prior
 
 
-def _rows(indices: Indices) -> Any:
+def rows_of(indices: Indices) -> Any:
     """Return the rows as entries that can be compared, shape (p,)."""
     return np.ascontiguousarray(indices).view([("", indices.dtype)] * indices.shape[1])[:, 0]
 
