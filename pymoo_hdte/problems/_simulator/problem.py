@@ -12,12 +12,11 @@ from numpy.typing import ArrayLike, NDArray
 from pymoo.core.problem import Problem
 
 from pymoo_hdte.checks import InvalidInput, finite_array
-from pymoo_hdte.problems._simulator.around import Around, CommonSamples
+from pymoo_hdte.problems._simulator.around import RESOLVED, Around, CommonSamples
 from pymoo_hdte.problems._simulator.crashes import CrashProbability, SuccessMoments
 from pymoo_hdte.problems._simulator.data import Runs
 from pymoo_hdte.problems._simulator.inputs import Inputs
 from pymoo_hdte.problems._simulator.requested import by_moments, place_of, requested_of
-from pymoo_hdte.problems._simulator.sampled_statistics import RESOLVED
 from pymoo_hdte.problems._simulator.statistics import RobustConstraint, Statistic
 from pymoo_hdte.problems._simulator.stored import read_problem, write_problem
 from pymoo_hdte.surrogate._sparse.adaptive import AdaptiveFit
@@ -224,8 +223,7 @@ class SimulatorProblem(Problem):
         parts = []
         for start in range(0, len(X), _AT_ONCE):
             around = self._around(X[start : start + _AT_ONCE])[0]
-            zero = np.zeros(len(around.expansion))
-            parts.append([statistic.value(around)[0], statistic.half_width(zero, zero, around)])
+            parts.append([statistic.value(around)[0], _half_width(statistic, around)])
         probability, half_width = np.concatenate(parts, axis=1) if parts else np.empty((2, 0))
         return probability, half_width
 
@@ -300,7 +298,7 @@ class SimulatorProblem(Problem):
         columns = []
         for statistic, _, _, place in self._requested[: self.n_obj]:
             response = around[place]
-            columns.append(statistic.half_width(response.mean_error, response.std_error, response))
+            columns.append(_half_width(statistic, response))
         return np.column_stack(columns)
 
     @cached_property
@@ -365,6 +363,12 @@ class SimulatorProblem(Problem):
         weights = np.zeros((len(x), len(self.responses), slope.shape[1]))
         weights[:, place] = slope
         return self._fit.moments.pulled_back(x, weights)[:, place]
+
+
+def _half_width(statistic: Statistic, around: Around) -> Array:
+    """Return the half-width of a statistic's band, what is not known of failures included."""
+    uncertain = around.error_of_success(lambda other: statistic.value(other)[0])
+    return statistic.half_width(around.mean_error, around.std_error, around) + uncertain
 
 
 def _check_resolved(

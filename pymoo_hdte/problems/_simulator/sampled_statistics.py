@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pymoo_hdte.checks import InvalidInput, real_number
-from pymoo_hdte.problems._simulator.around import PARTS, SAMPLES, STUDENT, Around
+from pymoo_hdte.problems._simulator.around import PARTS, STUDENT, Around
 from pymoo_hdte.problems._simulator.crashes import NONE_OF
 from pymoo_hdte.problems._simulator.statistics import Statistic, reach_of
 from pymoo_hdte.problems._simulator.tails import SMALLEST, Tail, Z, near_quantile, quantile_above
@@ -25,11 +25,7 @@ from pymoo_hdte.surrogate.moments import divide_or_zero
 Array = NDArray[np.float64]
 
 FEWEST = 10
-"""Samples that have to lie beyond a quantile: ten have an error of a third."""
-RESOLVED = FEWEST / SAMPLES
-"""Smallest probability beyond a quantile for which the common samples serve."""
-OFTEN = 0.1
-"""Smallest probability of an event for which they serve: 410 of them have an error of 5 %."""
+"""Draws that have to lie beyond a quantile: ten have an error of a third."""
 UNBOUNDED = 1e-6
 """Probability that is to be resolved where an event is an objective, or has no bound yet."""
 
@@ -61,7 +57,7 @@ class _TailStatistic(Statistic):
     def _of(self, around: Around) -> tuple[Array, Array]:
         if around.weights is not None:
             return self._of_weighted(*around.samples, around.weights / len(around.samples[1]))
-        if self._common_serve:
+        if self._common_serve(around):
             return self._of_common(around)
         tails = [self._of_tail(*self._tail(around, row)) for row in range(len(around.mean))]
         values, slopes, _ = zip(*tails, strict=True)
@@ -71,7 +67,7 @@ class _TailStatistic(Statistic):
         if around.weights is not None:
             # `half_width` adds the error of sampling.
             value, sampling = self._of(around)[0], np.zeros_like(mean_error)
-        elif self._common_serve:
+        elif self._common_serve(around):
             value = self._of_common(around)[0]
             parts = np.array([self._of_common(part)[0] for part in around.quarters()])
             sampling = STUDENT * parts.std(axis=0, ddof=1) / np.sqrt(PARTS)
@@ -80,9 +76,8 @@ class _TailStatistic(Statistic):
             value, sampling = (np.array([tail[place] for tail in tails]) for place in (0, 2))
         return mean_error + reach_of(value, around) * std_error + sampling
 
-    @property
-    def _common_serve(self) -> bool:
-        return 1.0 - self.p >= RESOLVED
+    def _common_serve(self, around: Around) -> bool:
+        return 1.0 - self.p >= around.resolved
 
     @property
     def _side(self) -> float:
@@ -138,9 +133,8 @@ class Quantile(_TailStatistic):
     def __post_init__(self) -> None:
         object.__setattr__(self, "p", _probability("p", self.p, SMALLEST, 1.0 - SMALLEST))
 
-    @property
-    def _common_serve(self) -> bool:
-        return self.rarest() >= RESOLVED
+    def _common_serve(self, around: Around) -> bool:
+        return self.rarest() >= around.resolved
 
     @property
     def _side(self) -> float:
@@ -346,11 +340,10 @@ class FailureProbability(Statistic):
         margins = [self.failure.margin(values, part) for part in wide]
         shares = np.array([np.mean(weights * (margin > 0.0), axis=1) for margin in margins])
         errors = Z * np.sqrt(np.maximum(shares * (1.0 - shares), 0.0) / len(around.samples[1]))
-        if around.weights is not None:
-            none = np.full_like(errors, NONE_OF / len(around.samples[1]))
-            errors = np.maximum(errors, none)
-            return (shares[0], errors[0]) if slack is None else (shares, errors)
-        for row in np.flatnonzero((shares[0] < OFTEN) | (shares[0] > 1.0 - OFTEN)):
+        errors = np.maximum(errors, NONE_OF / len(around.samples[1]))
+        rare = np.minimum(shares[0], 1.0 - shares[0]) < around.often
+        # Samples by importance know nothing of runs that fail.
+        for row in np.flatnonzero(rare) if around.weights is None else ():
             side = 1.0 if shares[0, row] < 0.5 else -1.0
             tail = around.tail(int(row), partial(self._signed, side))
             for place, part in enumerate(slacks):

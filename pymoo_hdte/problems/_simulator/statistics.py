@@ -100,8 +100,7 @@ class Statistic:
         around : Around
             The response around n designs.
         """
-        uncertain = around.error_of_success(lambda other: self._of(other)[0])
-        return self._error(mean_error, std_error, around) + uncertain
+        return self._error(mean_error, std_error, around)
 
     @property
     def weights(self) -> tuple[float, float] | None:

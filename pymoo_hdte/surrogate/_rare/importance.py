@@ -218,6 +218,11 @@ def _clusters(points: Array, log_weights: Array) -> Clusters:
             worth + d + 1
         )
         clusters.append((centre, np.linalg.cholesky(WIDER * covariance), mass / total))
+    left = float(weights[free].sum()) / total
+    if left > LEFT_OUT:
+        # All around, as outside a sphere: one component about the origin.
+        spread = (weights * points.T) @ points / total
+        clusters.append((np.zeros(d), np.linalg.cholesky(spread + 0.1 * np.eye(d)), left))
     return clusters
 
 
