@@ -1,5 +1,6 @@
 """Robust design problems for pymoo."""
 
+from pymoo_hdte.problems._simulator.crashes import CrashProbability
 from pymoo_hdte.problems._simulator.existing import Robust
 from pymoo_hdte.problems._simulator.inputs import Design
 from pymoo_hdte.problems._simulator.problem import SimulatorProblem
@@ -32,6 +33,7 @@ from pymoo_hdte.surrogate.trust import UntrustedSurrogate
 
 __all__ = [
     "CVaR",
+    "CrashProbability",
     "Design",
     "Event",
     "FailureProbability",

@@ -15,10 +15,10 @@ from pymoo.core.problem import Problem
 from pymoo.core.variable import Real
 
 from pymoo_hdte.checks import InvalidInput, real_number
-from pymoo_hdte.problems._simulator.around import PARTS
+from pymoo_hdte.problems._simulator.around import PARTS, STUDENT
 from pymoo_hdte.problems._simulator.requested import requested_of
 from pymoo_hdte.problems._simulator.runs import SimulatorFailed
-from pymoo_hdte.problems._simulator.sampled_statistics import FEWEST, STUDENT, FailureProbability
+from pymoo_hdte.problems._simulator.sampled_statistics import FEWEST, FailureProbability
 from pymoo_hdte.problems._simulator.statistics import RobustConstraint, Statistic
 from pymoo_hdte.surrogate._sparse.measures import Distribution
 
@@ -45,6 +45,7 @@ class Drawn:
     """
 
     resolved = often = 0.0
+    weights = success = None
 
     def __init__(self, values: Array) -> None:
         self._values = values
@@ -85,6 +86,16 @@ class Drawn:
     def std_error(self) -> Array:
         """95 % half-width of the error of the standard deviation, shape (n,)."""
         return self._error(np.array([part.std for part in self.quarters()]))
+
+    @property
+    def success_share(self) -> Array:
+        """The probability that a run succeeds, shape (n,): a failing one is refused."""
+        return np.ones(len(self._values))
+
+    @property
+    def n_runs(self) -> int:
+        """Runs behind it, at every design."""
+        return self._values.shape[1]
 
     @staticmethod
     def _error(parts: Array) -> Array:

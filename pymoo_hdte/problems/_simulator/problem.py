@@ -12,7 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 from pymoo.core.problem import Problem
 
 from pymoo_hdte.checks import InvalidInput, finite_array
-from pymoo_hdte.problems._simulator.around import Around, CommonSamples
+from pymoo_hdte.problems._simulator.around import RESOLVED, Around, CommonSamples
+from pymoo_hdte.problems._simulator.crashes import CrashProbability, SuccessMoments
 from pymoo_hdte.problems._simulator.data import Runs
 from pymoo_hdte.problems._simulator.inputs import Inputs
 from pymoo_hdte.problems._simulator.requested import by_moments, place_of, requested_of
@@ -36,7 +37,9 @@ class SimulatorProblem(Problem):
 
     An ordinary vectorised `Problem` of pymoo. Ask for ``dF`` and ``dG`` in ``return_values_of`` to
     get gradients, shape (n, n_obj, n_var), exact for the surrogate, and for ``F_band`` to get the
-    estimated half-width of the error of F, NaN for a `WorstCase`.
+    estimated half-width of the error of F, NaN for a `WorstCase`. Where runs fail, statistics are
+    those of the runs that succeed, there are no gradients, and a `CrashProbability` tells how often
+    they fail.
 
     Parameters
     ----------
@@ -72,7 +75,7 @@ class SimulatorProblem(Problem):
     runs : Runs or None
         Inputs X and responses Y of all runs; None for a problem that was loaded.
     failed : ndarray, shape (k, d)
-        Inputs in their units at which the simulator failed; the fit goes on without them.
+        Inputs in their units at which the simulator failed.
     var_names, obj_names, input_names : tuple of str
         In the order of X, in that of F, and of all inputs of the simulator, the designs first.
     design_box : Box
@@ -105,6 +108,8 @@ class SimulatorProblem(Problem):
         self.objectives, self.constraints = tuple(objectives), tuple(constraints)
         self.responses, self.n_runs, self._fit = responses, n_runs, fit
         self._requested = requested_of(objectives, constraints, responses)
+        if fit.success is not None:
+            _check_resolved(objectives, constraints)
         super().__init__(
             n_var=len(bounds),
             n_obj=len(objectives),
@@ -115,6 +120,9 @@ class SimulatorProblem(Problem):
         self.var_names, self.input_names = inputs.designed, inputs.names
         self.obj_names = tuple(statistic.name for statistic in objectives)
         self._common = CommonSamples(fit.moments, seed=1)
+        self._success = None
+        if fit.success is not None:
+            self._success = SuccessMoments(fit.success, inputs.axes, self._common.scatter)
         self.failed = inputs.values(fit.failed) if len(fit.failed) else fit.failed
         errors = fit.errors.max(axis=0).tolist()
         self.response_errors = dict(zip(responses, errors, strict=True))
@@ -191,6 +199,34 @@ class SimulatorProblem(Problem):
         parts = [self._band(self._around(X[start : start + _AT_ONCE])) for start in blocks]
         return np.concatenate(parts) if parts else np.empty((0, self.n_obj))
 
+    def crash_probability(self, designs: ArrayLike) -> tuple[Array, Array]:
+        """Return how likely a run around each design fails, and the half-width of its error.
+
+        Parameters
+        ----------
+        designs : array_like, shape (n, n_var)
+            In the variables' units.
+
+        Returns
+        -------
+        probability, half_width : ndarray, shape (n,)
+            Dimensionless; the band is of 95 %.
+
+        Raises
+        ------
+        ExtrapolationError
+            If a design lies outside the box.
+        InvalidInput
+            If ``designs`` is no array of numbers of shape (n, n_var).
+        """
+        X, statistic = self.design_box.settle(designs), CrashProbability()
+        parts = []
+        for start in range(0, len(X), _AT_ONCE):
+            around = self._around(X[start : start + _AT_ONCE])[0]
+            parts.append([statistic.value(around)[0], _half_width(statistic, around)])
+        probability, half_width = np.concatenate(parts, axis=1) if parts else np.empty((2, 0))
+        return probability, half_width
+
     def predict(self, values: ArrayLike) -> Array:
         """Return the surrogate of all responses, shape (n, r), in their units.
 
@@ -243,7 +279,11 @@ class SimulatorProblem(Problem):
     def _around(self, X: Array) -> list[Around]:
         """Return the expansion of each response around the designs."""
         expansion = self._fit.moments.expansion(X)
-        around = [Around(self._common, expansion[:, k]) for k in range(len(self.responses))]
+        success = None if self._success is None else self._success.around(X)
+        around = [
+            Around(self._common, expansion[:, k], success=success)
+            for k in range(len(self.responses))
+        ]
         beside: dict[str | None, Around] = dict(zip(self.responses, around, strict=True))
         if len(around) == 1:
             beside[None] = around[0]
@@ -251,14 +291,14 @@ class SimulatorProblem(Problem):
             scatter = np.maximum(response.std, self._fit.smallest_scatter[place])
             response.mean_error = self._fit.mean_error[place] * scatter
             response.std_error = self._fit.std_error[place] * scatter
-            response.beside = beside
+            response.beside, response.n_runs = beside, self.n_runs
         return around
 
     def _band(self, around: list[Around]) -> Array:
         columns = []
         for statistic, _, _, place in self._requested[: self.n_obj]:
             response = around[place]
-            columns.append(statistic.half_width(response.mean_error, response.std_error, response))
+            columns.append(_half_width(statistic, response))
         return np.column_stack(columns)
 
     @cached_property
@@ -286,7 +326,9 @@ class SimulatorProblem(Problem):
         x = self.design_box.settle(x)
         slopes: list[str] = [key for key in ("dF", "dG") if key in out]
         blocks = range(0, len(x), _AT_ONCE)
-        quick = None if slopes else by_moments(self._requested, self._fit.moments, x)
+        quick = None
+        if not slopes and self._success is None:
+            quick = by_moments(self._requested, self._fit.moments, x)
         if quick is not None:
             parts = [{"F": quick[:, : self.n_obj], "G": quick[:, self.n_obj :]}]
         else:
@@ -315,6 +357,29 @@ class SimulatorProblem(Problem):
     def _gradient(self, x: Array, statistic: Statistic, slope: Array, place: int) -> Array:
         if not statistic.has_gradient:
             raise InvalidInput("dF or dG", statistic, "statistics that have a gradient")
+        if self._success is not None:
+            allowed = "no gradient: runs fail, and what their share changes by is not computed"
+            raise InvalidInput("dF or dG", statistic, allowed)
         weights = np.zeros((len(x), len(self.responses), slope.shape[1]))
         weights[:, place] = slope
         return self._fit.moments.pulled_back(x, weights)[:, place]
+
+
+def _half_width(statistic: Statistic, around: Around) -> Array:
+    """Return the half-width of a statistic's band, what is not known of failures included."""
+    uncertain = around.error_of_success(lambda other: statistic.value(other)[0])
+    return statistic.half_width(around.mean_error, around.std_error, around) + uncertain
+
+
+def _check_resolved(
+    objectives: Sequence[Statistic], constraints: Sequence[RobustConstraint]
+) -> None:
+    """Refuse probabilities that common samples do not resolve: others do not know of failures.
+
+    Those of an event as an objective are never below what can be told, and stay.
+    """
+    rarest = [statistic.rarest() for statistic in objectives if statistic.relative_to_scatter]
+    least = min([*rarest, *(constraint.rarest for constraint in constraints)], default=0.5)
+    if least < RESOLVED:
+        allowed = f"at least {RESOLVED:.4g} from 0 and from 1 for a simulator that fails"
+        raise InvalidInput("probability of a statistic", least, allowed)

@@ -18,14 +18,14 @@ Requested = tuple[Statistic, float, float, int]
 
 
 def place_of(statistic: Statistic, responses: tuple[str, ...]) -> int:
-    """Return the position of the statistic's response, of several the first.
+    """Return the position of the statistic's response, of several the first, of none 0.
 
     Raises
     ------
     InvalidInput
         As `places_of`.
     """
-    return places_of(statistic, responses)[0]
+    return (places_of(statistic, responses) or [0])[0]
 
 
 def places_of(statistic: Statistic, responses: tuple[str, ...]) -> list[int]:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from pymoo_hdte.checks import InvalidInput, one_of, real_number, whole_number
+from pymoo_hdte.problems._simulator.crashes import CrashProbability
 from pymoo_hdte.problems._simulator.data import read_data
 from pymoo_hdte.problems._simulator.identity import identity
 from pymoo_hdte.problems._simulator.inputs import Design, Inputs
@@ -39,7 +40,6 @@ from pymoo_hdte.problems._simulator.trust import (
 from pymoo_hdte.problems._simulator.workers import Workers
 from pymoo_hdte.surrogate._sparse.adaptive import (
     IN_A_ROW,
-    LOOSEST,
     AdaptiveFit,
     fit_adaptively,
     least_runs,
@@ -123,11 +123,11 @@ def robust_problem(
     at_once : int
         Least number of runs that are chosen together; the number of workers of the executor.
     tries : int
-        How often a run is made that raises or gives NaN, before it is left out. What a vectorised
-        simulator raises is passed on.
+        How often a run is made that raises or gives NaN, before it counts as failed. Where a
+        vectorised simulator raises, its runs are made one by one.
     time_limit : float, optional
-        Seconds after which a run is ended and left out, imports not counted; it then has a process
-        of its own beside the worker, and may crash there.
+        Seconds after which a run is ended and has failed, imports not counted; it then has a
+        process of its own beside the worker, and may crash there.
     cache : path, optional
         File of finished and of failed runs: with it, none is made twice, though the process be
         killed. The
@@ -160,7 +160,8 @@ def robust_problem(
         For an argument that is not allowed, or a simulator that is random.
     UntrustedSurrogate
         If the budget is spent and the error is still larger than asked for, a positive response
-        becomes negative, or more than a fifth of the runs fail; tells where. It holds all ``runs``
+        becomes negative, or runs around some design are likelier to fail than to succeed and no
+        `CrashProbability` is asked for; tells where. It holds all ``runs``
         and the ``problem`` on the surrogate that is refused.
     SimulatorFailed
         If every run so far failed.
@@ -168,7 +169,8 @@ def robust_problem(
     Warns
     -----
     RuntimeWarning
-        If runs failed; their inputs are in ``failed`` of the result. If the budget is spent before
+        If runs failed; their inputs are in ``failed`` of the result, whose statistics are those of
+        the runs that succeed. If the budget is spent before
         an error that is small enough was confirmed. If ``accept="best"`` accepts what is refused
         otherwise.
 
@@ -208,8 +210,7 @@ def robust_problem(
         statistics = [*objectives, *(limit.statistic for limit in constraints)]
 
         def requested_places() -> list[int]:
-            places = (places_of(statistic, simulate.responses) for statistic in statistics)
-            return sorted({place for own in places for place in own})
+            return _places(statistics, simulate.responses)
 
         fit = fit_adaptively(
             inputs.axes,
@@ -224,7 +225,7 @@ def robust_problem(
             lambda fit: largest_error(fit, requested_places())[0],
             None if given is None else (given.points, given.values),
         )
-        refusal = _refusal(inputs, fit, accuracy, simulate, positive, requested_places())
+        refusal = _refusal(inputs, fit, accuracy, simulate, positive, statistics)
     responses = simulate.responses
     parts = inputs, fit, responses, objectives, constraints, fit.n_runs
     problem = SimulatorProblem(*parts, refusal=str(refusal) if refusal else None)
@@ -241,20 +242,28 @@ def robust_problem(
     return problem
 
 
+def _places(statistics: Sequence[Statistic], responses: tuple[str, ...]) -> list[int]:
+    """Return the positions of the responses that statistics belong to; all if they name none."""
+    named = {place for statistic in statistics for place in places_of(statistic, responses)}
+    return sorted(named) or list(range(len(responses)))
+
+
 def _refusal(
     inputs: Inputs,
     fit: AdaptiveFit,
     accuracy: float,
     simulate: Simulator,
     positive: Sequence[str] | bool,
-    places: Sequence[int],
+    statistics: Sequence[Statistic],
 ) -> UntrustedSurrogate | None:
     """Return why the surrogate is not what was asked for, or None."""
     responses = simulate.responses
+    places = _places(statistics, responses)
+    limited = any(isinstance(statistic, CrashProbability) for statistic in statistics)
     unsure = inaccurate(inputs, fit, accuracy, responses, places)
     reason = (
         (unsure and random(inputs, fit, accuracy, responses, simulate.again))
-        or failing(inputs, fit)
+        or (None if limited else failing(inputs, fit))
         or unsure
         or negative_somewhere(inputs, fit, positive_places(positive, responses))
     )
@@ -265,8 +274,8 @@ def _warn_of_budget(fit: AdaptiveFit, responses: tuple[str, ...], places: Sequen
     error, _, place = largest_error(fit, places)
     message = (
         f"the budget of {fit.n_runs} runs is used up: the error of {responses[place]!r} is "
-        f"{error:.2g} of its scatter, no more than asked for, but not confirmed: {IN_A_ROW} checks "
-        f"in a row have to find that, and at most {LOOSEST:g}"
+        f"{error:.2g} of its scatter, no more than asked for, but that is not confirmed by "
+        f"{IN_A_ROW} checks in a row"
     )
     warnings.warn(message, RuntimeWarning, stacklevel=3)
 
@@ -365,5 +374,8 @@ def _warn_of_failures(problem: SimulatorProblem) -> None:
         for row in problem.failed[:5]
     ]
     ending = "" if len(problem.failed) <= len(rows) else ", .."
-    message = f"{len(problem.failed)} runs failed and are left out: {'; '.join(rows)}{ending}"
+    message = (
+        f"{len(problem.failed)} of {problem.n_runs} runs failed: {'; '.join(rows)}{ending}. "
+        "Statistics are those of the runs that succeed; CrashProbability tells how often they fail"
+    )
     warnings.warn(message, RuntimeWarning, stacklevel=3)

@@ -13,7 +13,7 @@ from tqdm import tqdm
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.problems._simulator.children import TOO_LONG, Failure
 from pymoo_hdte.problems._simulator.run_file import RunFile, check_again
-from pymoo_hdte.problems._simulator.workers import Workers
+from pymoo_hdte.problems._simulator.workers import Workers, failure_of
 
 Array = NDArray[np.float64]
 
@@ -211,11 +211,23 @@ class Simulator:
 
     def _run(self, rows: Sequence[tuple[float, ...]]) -> Iterable[tuple[tuple[float, ...], Any]]:
         if self.vectorised:
-            columns = dict(zip(self.names, np.array(rows).T, strict=True))
-            table = self._table(self.function(**columns), len(rows))
-            yield from zip(rows, table.tolist(), strict=True)
+            yield from self._together(rows)
         else:
             yield from self._on_workers(rows)
+
+    def _together(
+        self, rows: Sequence[tuple[float, ...]]
+    ) -> list[tuple[tuple[float, ...], list[float] | None]]:
+        """Make runs of a vectorised simulator; one by one where it raises."""
+        columns = dict(zip(self.names, np.array(rows).T, strict=True))
+        try:
+            gave = self.function(**columns)
+        except Exception as error:  # A user's simulator may raise anything.
+            self._last_failure = failure_of(error)
+            if len(rows) == 1:
+                return [(rows[0], None)]
+            return [run for row in rows for run in self._together([row])]
+        return list(zip(rows, self._table(gave, len(rows)).tolist(), strict=True))
 
     def _on_workers(
         self, rows: Sequence[tuple[float, ...]]

@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pymoo_hdte.checks import InvalidInput, real_number
-from pymoo_hdte.problems._simulator.around import PARTS, Around
+from pymoo_hdte.problems._simulator.around import PARTS, STUDENT, Around
+from pymoo_hdte.problems._simulator.crashes import NONE_OF
 from pymoo_hdte.problems._simulator.statistics import Statistic, reach_of
 from pymoo_hdte.problems._simulator.tails import SMALLEST, Tail, Z, near_quantile, quantile_above
 from pymoo_hdte.surrogate._rare.events import Event, Limit
@@ -25,13 +26,6 @@ Array = NDArray[np.float64]
 
 FEWEST = 10
 """Draws that have to lie beyond a quantile: ten have an error of a third."""
-STUDENT = 3.182
-"""Standard errors of a mean of four parts within which it lies with 95 %: Student's t(3).
-
-The size of the standard error itself is taken from these four; 2 would cover some 86 %.
-"""
-NONE_OF = 3.0
-"""Events of a probability p are none in n draws with 5 % where n p = -ln 0.05 = 3.0."""
 UNBOUNDED = 1e-6
 """Probability that is to be resolved where an event is an objective, or has no bound yet."""
 
@@ -42,6 +36,12 @@ def _probability(field: str, given: float, lowest: float, highest: float) -> flo
         allowed = f"{lowest:g} to {f'1 - {SMALLEST:g}' if highest < 1.0 else '1'}"
         raise InvalidInput(field, share, allowed)
     return share
+
+
+def _ordered(values: Array, weights: Array, order: Any) -> tuple[Array, Array]:
+    """Return values in an order, and the sum of their weights up to each, shape (n, k) each."""
+    summed = np.cumsum(np.take_along_axis(weights, order, axis=1), axis=1)
+    return np.take_along_axis(values, order, axis=1), summed
 
 
 @dataclass(frozen=True)
@@ -55,6 +55,8 @@ class _TailStatistic(Statistic):
         return min(self.p, 1.0 - self.p)
 
     def _of(self, around: Around) -> tuple[Array, Array]:
+        if around.weights is not None:
+            return self._of_weighted(*around.samples, around.weights / len(around.samples[1]))
         if self._common_serve(around):
             return self._of_common(around)
         tails = [self._of_tail(*self._tail(around, row)) for row in range(len(around.mean))]
@@ -62,7 +64,10 @@ class _TailStatistic(Statistic):
         return np.array(values), np.array(slopes)
 
     def _error(self, mean_error: Array, std_error: Array, around: Around) -> Array:
-        if self._common_serve(around):
+        if around.weights is not None:
+            # `half_width` adds the error of sampling.
+            value, sampling = self._of(around)[0], np.zeros_like(mean_error)
+        elif self._common_serve(around):
             value = self._of_common(around)[0]
             parts = np.array([self._of_common(part)[0] for part in around.quarters()])
             sampling = STUDENT * parts.std(axis=0, ddof=1) / np.sqrt(PARTS)
@@ -90,6 +95,10 @@ class _TailStatistic(Statistic):
         return tail, side * tail.values[name], share
 
     def _of_common(self, around: Around) -> tuple[Array, Array]:
+        raise NotImplementedError
+
+    def _of_weighted(self, values: Array, basis: Array, weights: Array) -> tuple[Array, Array]:
+        """Return value and slope from samples of weights that sum to 1, shape (n, k)."""
         raise NotImplementedError
 
     def _of_tail(self, tail: Tail, values: Array, share: float) -> tuple[float, Array, float]:
@@ -141,6 +150,21 @@ class Quantile(_TailStatistic):
         ]
         slope = near_quantile(values, weights, value, share) @ tail.polynomials
         return self._side * value, slope, 0.5 * abs(ends[0] - ends[1])
+
+    def _of_weighted(self, values: Array, basis: Array, weights: Array) -> tuple[Array, Array]:
+        order = np.argsort(values, axis=1)
+        ordered, below = _ordered(values, weights, order)
+        # Between the middles of two samples, as without weights.
+        middles = below - 0.5 * np.take_along_axis(weights, order, axis=1)
+        high = np.clip(np.sum(middles < self.p, axis=1), 1, values.shape[1] - 1)[:, None]
+        ends = [np.take_along_axis(middles, high - step, axis=1) for step in (1, 0)]
+        share = np.clip((self.p - ends[0]) / (ends[1] - ends[0]), 0.0, 1.0)
+        low_value, high_value = (
+            np.take_along_axis(ordered, high - step, axis=1) for step in (1, 0)
+        )
+        slope = [basis[np.take_along_axis(order, high - step, axis=1)[:, 0]] for step in (1, 0)]
+        value = (1.0 - share) * low_value + share * high_value
+        return value[:, 0], (1.0 - share) * slope[0] + share * slope[1]
 
     def _of_common(self, around: Around) -> tuple[Array, Array]:
         values, basis = around.samples
@@ -196,6 +220,15 @@ class CVaR(_TailStatistic):
         mean = value + float(beyond @ (values - value))
         slope = beyond @ tail.polynomials / max(float(beyond.sum()), np.finfo(float).tiny)
         return mean, slope, Z * error / share
+
+    def _of_weighted(self, values: Array, basis: Array, weights: Array) -> tuple[Array, Array]:
+        order = np.argsort(-values, axis=1)
+        largest, above = _ordered(values, weights, order)
+        own = np.take_along_axis(weights, order, axis=1)
+        counts = np.clip(1.0 - self.p - (above - own), 0.0, own) / (1.0 - self.p)
+        share = np.zeros_like(values)
+        np.put_along_axis(share, order, counts, axis=1)
+        return np.sum(largest * counts, axis=1), share @ basis
 
     def _of_common(self, around: Around) -> tuple[Array, Array]:
         values, basis = around.samples
@@ -299,16 +332,18 @@ class FailureProbability(Statistic):
         Both have shape (k, n); of k slacks, or shape (n,) without any.
         """
         slacks = [None] if slack is None else slack
+        weights = 1.0 if around.weights is None else around.weights
         values = {name: around.beside[name].samples[0] for name in self.responses}
         wide = [
             part and {name: of_name[:, None] for name, of_name in part.items()} for part in slacks
         ]
         margins = [self.failure.margin(values, part) for part in wide]
-        shares = np.array([np.mean(margin > 0.0, axis=1) for margin in margins])
-        errors = Z * np.sqrt(shares * (1.0 - shares) / len(around.samples[1]))
+        shares = np.array([np.mean(weights * (margin > 0.0), axis=1) for margin in margins])
+        errors = Z * np.sqrt(np.maximum(shares * (1.0 - shares), 0.0) / len(around.samples[1]))
         errors = np.maximum(errors, NONE_OF / len(around.samples[1]))
         rare = np.minimum(shares[0], 1.0 - shares[0]) < around.often
-        for row in np.flatnonzero(rare):
+        # Samples by importance know nothing of runs that fail.
+        for row in np.flatnonzero(rare) if around.weights is None else ():
             side = 1.0 if shares[0, row] < 0.5 else -1.0
             tail = around.tail(int(row), partial(self._signed, side))
             for place, part in enumerate(slacks):

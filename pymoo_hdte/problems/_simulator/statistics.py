@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pymoo_hdte.checks import one_of, real_number
-from pymoo_hdte.problems._simulator.around import Around
 from pymoo_hdte.surrogate.moments import divide_or_zero
+
+if TYPE_CHECKING:
+    from pymoo_hdte.problems._simulator.around import Around
 
 Array = NDArray[np.float64]
 S = TypeVar("S", bound="Statistic")

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from pymoo_hdte._io.archive import FileFormat
 from pymoo_hdte.checks import InvalidInput, whole_number
+from pymoo_hdte.problems._simulator.crashes import CrashProbability
 from pymoo_hdte.problems._simulator.distributions import described, rebuilt
 from pymoo_hdte.problems._simulator.inputs import Design, Inputs
 from pymoo_hdte.problems._simulator.requested import least_tail
@@ -28,16 +29,22 @@ from pymoo_hdte.surrogate._rare.events import Event, event_from
 from pymoo_hdte.surrogate._sparse.adaptive import AdaptiveFit
 from pymoo_hdte.surrogate._sparse.moments import SparseMoments
 from pymoo_hdte.surrogate._sparse.polynomial import SparsePolynomial
+from pymoo_hdte.surrogate._sparse.success import DRAWN, Success, rows_of
+from pymoo_hdte.surrogate._sparse.terms import closed
 
 Array = NDArray[np.float64]
 
 STATISTICS: dict[str, type[Statistic]] = {
     kind.__name__: kind
-    for kind in (Mean, Std, MeanPlusStd, WorstCase, Quantile, CVaR, FailureProbability)
+    for kind in (
+        *(Mean, Std, MeanPlusStd, WorstCase),
+        *(Quantile, CVaR, FailureProbability, CrashProbability),
+    )
 }
 HIGHEST_DEGREE = 100
 """Largest degree that is read from a file; surrogates have 60 at most."""
 _OF_RESPONSES = ("mean_error", "std_error", "smallest_scatter")
+_OF_SUCCESS = ("success_indices", "success_coefficients", "success_draws")
 _OF_POINTS = ("failed", "held_out_points", "points")
 
 FORMAT = FileFormat(
@@ -47,9 +54,45 @@ FORMAT = FileFormat(
         *("designs", "noise", "responses", "objectives", "constraints", "n_runs", "tails"),
         "refusal",
     ),
-    arrays=("indices", "coefficients", *_OF_RESPONSES, *_OF_POINTS, "held_out_error", "truth"),
-    later={"refusal": (2, None), "points": (2, None), "truth": (2, None)},
+    arrays=(
+        *("indices", "coefficients", *_OF_RESPONSES, *_OF_POINTS, "held_out_error", "truth"),
+        *_OF_SUCCESS,
+    ),
+    later=dict.fromkeys(("refusal", "points", "truth", *_OF_SUCCESS), (2, None)),
 )
+
+
+_OF_FIT = (*_OF_RESPONSES, *_OF_POINTS, "held_out_error", "truth")
+
+
+def _of_success(fit: AdaptiveFit) -> dict[str, Array]:
+    """Return the latent polynomial and its draws on the terms of the latter; nothing for None."""
+    if fit.success is None:
+        none = np.empty((0, 0))
+        return {name: none for name in _OF_SUCCESS}
+    draws, mode = fit.success.draws, fit.success.polynomial
+    places = {tuple(row): place for place, row in enumerate(draws.indices.tolist())}
+    coefficients = np.zeros((1, len(draws.indices)))
+    coefficients[0, [places[tuple(row)] for row in mode.indices.tolist()]] = mode.coefficients[0]
+    parts = draws.indices.astype(float), coefficients, draws.coefficients
+    return dict(zip(_OF_SUCCESS, parts, strict=True))
+
+
+def _read_success(arrays: dict[str, Array], inputs: int) -> Success | None:
+    indices, mode, draws = (arrays[name] for name in _OF_SUCCESS)
+    if indices is None or not len(indices):
+        return None
+    shapes = (len(indices), inputs), (1, len(indices)), (DRAWN, len(indices))
+    for name, shape in zip(_OF_SUCCESS, shapes, strict=True):
+        if arrays[name].shape != shape:
+            raise InvalidInput(f"shape of {name}", arrays[name].shape, str(shape))
+        if not np.all(np.isfinite(arrays[name])):
+            raise InvalidInput(f"{name} of the file", arrays[name].tolist(), "finite")
+    _check_indices(indices)
+    whole = indices.astype(int)
+    stays = np.isin(rows_of(whole), rows_of(closed(whole[mode[0] != 0.0])))
+    polynomial = SparsePolynomial(whole[stays], mode[:, stays])
+    return Success(polynomial, SparsePolynomial(whole, draws), np.empty(0))
 
 
 def write_problem(
@@ -92,7 +135,7 @@ def write_problem(
         "tails": _with_tails(fit),
         "refusal": refusal,
     }
-    arrays = {name: getattr(fit, name) for name in FORMAT.arrays[2:]}
+    arrays = {name: getattr(fit, name) for name in _OF_FIT} | _of_success(fit)
     polynomial = {
         "indices": fit.polynomial.indices.astype(float),
         "coefficients": fit.polynomial.coefficients,
@@ -276,6 +319,7 @@ def _read_fit(
     polynomial = SparsePolynomial(indices.astype(int), coefficients)
     pairs = zip(axes, tails, strict=True)
     measures = [axis.measure if has_tail else axis.cut for axis, has_tail in pairs]
-    others: dict[str, Any] = {name: np.array(arrays[name]) for name in FORMAT.arrays[2:]}
+    others: dict[str, Any] = {name: np.array(arrays[name]) for name in _OF_FIT}
+    others["success"] = _read_success(arrays, len(axes))
     moments = SparseMoments(polynomial, axes, measures)
     return AdaptiveFit(polynomial=polynomial, moments=moments, n_runs=n_runs, **others)

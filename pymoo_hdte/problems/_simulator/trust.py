@@ -15,8 +15,8 @@ from pymoo_hdte.surrogate.trust import region_of
 
 Array = NDArray[np.float64]
 
-MOST_FAILED = 0.2
-"""Largest share of failed runs that are left out: what they would have given is extrapolated."""
+MOST_FAILED = 0.5
+"""Largest probability of failing at a design where it is not limited: more fail than succeed."""
 _LIKE_THE_WORST = 0.3
 """Share of the largest error above which a point belongs to the region of the error."""
 _OF_ACCURACY = 0.1
@@ -30,12 +30,23 @@ Refusal = tuple[str, float, str, dict[str, tuple[float, float]]]
 
 
 def failing(inputs: Inputs, fit: AdaptiveFit) -> Refusal | None:
-    """Return where the simulator fails, if it does so too often to leave the runs out, or None."""
-    share = len(fit.failed) / fit.n_runs
-    if share <= MOST_FAILED:
+    """Return where runs around a design are likelier to fail than to succeed, or None.
+
+    Its mean and deviation, of the runs that succeed, would look like those of any other design.
+    """
+    if fit.success is None:
         return None
-    region = region_of(inputs.names, inputs.values(fit.failed), reach(inputs))
-    return "share of runs that failed", share, f"at most {MOST_FAILED:g}", region
+    random_state = np.random.default_rng(0)
+    designs = draw_designs(inputs.axes, _LOOKED_AT // 4, random_state)
+    points, weights = draw_around(inputs.axes, designs, 64, random_state)
+    likely = fit.success.probability(points.reshape(-1, len(inputs.axes))).reshape(weights.shape)
+    share = 1.0 - np.sum(weights * likely, axis=1)
+    if not (bad := share > MOST_FAILED).any():
+        return None
+    bounds = np.array([axis.design for axis in inputs.axes if axis.designed]).T
+    region = region_of(inputs.designed, designs[bad], bounds)
+    allowed = f"at most {MOST_FAILED:g} at every design, or CrashProbability() limited or minimised"
+    return "probability of failing runs", float(f"{share.max():.3g}"), allowed, region
 
 
 def largest_error(fit: AdaptiveFit, places: Sequence[int]) -> tuple[float, int, int]:
