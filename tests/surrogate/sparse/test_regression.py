@@ -83,8 +83,8 @@ def test_runs_that_scatter_by_themselves_are_told_from_those_that_do_not(seed):
     fitted = Regression(features, noisy, np.ones(120))
     # Of some hundred values, the deviation is known to 7 %.
     assert fitted.noise_std == pytest.approx(0.01, rel=0.25)
-    # What is left is less than the noise: of 120 runs, some 20 coefficients have to be told.
-    assert np.std(fitted.predict(features) - values) < 0.006
+    # What is left is less than the noise: of 120 runs, some 60 coefficients have to be told.
+    assert np.std(fitted.predict(features) - values) < 0.008
 
 
 def test_the_mean_of_replicates_scatters_less():
