@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from pymoo_hdte._one_thread import ONE_THREAD
 from pymoo_hdte.surrogate._sparse.axes import Axis
+from pymoo_hdte.surrogate._sparse.components import PartOfField, fitted_together
 from pymoo_hdte.surrogate._sparse.draws import (
     SpreadPoints,
     draw_around,
@@ -24,7 +25,7 @@ from pymoo_hdte.surrogate._sparse.draws import (
 from pymoo_hdte.surrogate._sparse.kernel import EvenPolynomials
 from pymoo_hdte.surrogate._sparse.moments import SparseMoments
 from pymoo_hdte.surrogate._sparse.polynomial import SparsePolynomial
-from pymoo_hdte.surrogate._sparse.response import LOST, Judged, ResponseFit, fitted
+from pymoo_hdte.surrogate._sparse.response import LOST, Judged, ResponseFit
 from pymoo_hdte.surrogate._sparse.success import STUDENT_OF_DRAWS, Success, fit_success
 from pymoo_hdte.surrogate._sparse.tails import beyond_all_runs
 from pymoo_hdte.surrogate._sparse.terms import closed
@@ -190,12 +191,9 @@ class _SurrogateBuild:
         features = polynomials(points)
         judged = Judged.at(self.draws[0], weights_of_draws, polynomials)
         weights = relevance(self.axes, points)
-        starts: list[Array | None] = [*self.parameters] or [None] * truth.shape[1]
-        fits = [
-            fitted(features, values, weights, judged, self.lost, start)
-            for values, start in zip(truth.T, starts, strict=True)
-        ]
-        self.parameters = [fit.regression.parameters for fit in fits]
+        fits, self.parameters = fitted_together(
+            features, truth, weights, judged, self.lost, self.parameters
+        )
         polynomial = _joined(fits, polynomials)
         # Where there are no runs the polynomial runs away: its error would hide behind a scatter
         # that is not there.
@@ -287,7 +285,9 @@ def _weighted_moments(values: Array, weights: Array) -> Array:
     return np.array([mean, np.sqrt(squares)])
 
 
-def _joined(fits: list[ResponseFit], polynomials: EvenPolynomials) -> SparsePolynomial:
+def _joined(
+    fits: Sequence[ResponseFit | PartOfField], polynomials: EvenPolynomials
+) -> SparsePolynomial:
     """Return all responses on the union of their terms."""
     indices = closed(np.concatenate([fit.indices for fit in fits]))
     places = {tuple(row): place for place, row in enumerate(indices.tolist())}
