@@ -131,6 +131,8 @@ class DirectProblem(Problem):
     ----------
     n_runs : int
         Runs of the problem so far.
+    original : pymoo.core.problem.Problem
+        The problem that is run.
     draws, clip, objectives, constraints
         As given.
     responses, var_names, obj_names : tuple of str

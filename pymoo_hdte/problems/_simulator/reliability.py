@@ -48,16 +48,17 @@ class Reliability:
     probability : float
         Of the event, dimensionless.
     interval : tuple of float
-        Ends of its 95 % band: what the surrogate leaves open, and sampling on it.
+        Ends of its 95 % band, dimensionless: what the surrogate leaves open, and sampling on it.
     beta : float
         Generalised reliability index, the standard normal quantile of ``1 - probability``.
     form_beta : float
-        Distance of the most probable point of failure from the origin of standard normal space
-        (first-order reliability method); negative where the median inputs fail.
+        Distance of the most probable point of failure from the origin of standard normal space,
+        dimensionless (first-order reliability method); negative where the median inputs fail.
     most_probable_point : dict of str to float
         The inputs there, by name and in their units.
     importance : dict of str to float
-        Squared direction cosines of that point: shares of each input, which sum to 1. Of dependent
+        Squared direction cosines of that point, dimensionless: shares of each input, which sum to
+        1. Of dependent
         inputs they belong to the normal variables that make them, in the order of their names.
     n_runs : int
         Runs of the simulator.

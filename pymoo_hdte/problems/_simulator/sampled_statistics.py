@@ -51,7 +51,13 @@ class _TailStatistic(Statistic):
     p: float
 
     def rarest(self, bound: float | None = None) -> float:
-        """Return the least probability that it asks for, dimensionless."""
+        """Return the least probability that it asks for, dimensionless.
+
+        Parameters
+        ----------
+        bound : float, optional
+            As which constraint it is met, in its unit.
+        """
         return min(self.p, 1.0 - self.p)
 
     def _of(self, around: Around) -> tuple[Array, Array]:
@@ -208,7 +214,13 @@ class CVaR(_TailStatistic):
         object.__setattr__(self, "p", _probability("p", self.p, 0.0, 1.0 - SMALLEST))
 
     def rarest(self, bound: float | None = None) -> float:
-        """Return the least probability that it asks for, dimensionless."""
+        """Return the least probability that it asks for, dimensionless.
+
+        Parameters
+        ----------
+        bound : float, optional
+            As which constraint it is met, in its unit.
+        """
         return 1.0 - self.p
 
     def _of_tail(self, tail: Tail, values: Array, share: float) -> tuple[float, Array, float]:
@@ -307,7 +319,13 @@ class FailureProbability(Statistic):
         return self.failure.responses
 
     def rarest(self, bound: float | None = None) -> float:
-        """Return the least probability that it asks for, dimensionless."""
+        """Return the least probability that it asks for, dimensionless.
+
+        Parameters
+        ----------
+        bound : float, optional
+            As which constraint it is met, in its unit.
+        """
         return UNBOUNDED if bound is None else min(bound, 1.0 - bound)
 
     def _of(self, around: Around) -> tuple[Array, Array]:

@@ -54,7 +54,13 @@ class Statistic:
         return (self.response,)
 
     def rarest(self, bound: float | None = None) -> float:
-        """Return the least probability that it asks for, with a bound or without, dimensionless."""
+        """Return the least probability that it asks for, dimensionless.
+
+        Parameters
+        ----------
+        bound : float, optional
+            As which constraint it is met, in its unit.
+        """
         return 0.5
 
     @property

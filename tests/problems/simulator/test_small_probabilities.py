@@ -235,9 +235,9 @@ def test_one_surrogate_serves_all_designs_of_youn_and_choi():
         vectorised=True,
         progress=False,
     )
-    X = np.array([[3.4391, 3.2866], [3.7, 3.8], [4.0, 4.4]])
+    X = np.array([[3.4391, 3.2866], [3.6, 3.5], [3.7, 3.8]])
     P, band = problem.evaluate(X, return_values_of=["F", "F_band"])
     truth = np.array([on_a_grid(x) for x in X])
-    assert truth[2] < 2e-6
+    assert truth[2] < 2e-5
     assert np.all(np.abs(P[:, 0] - truth) <= 1.5 * band[:, 0])
     assert np.all(band[:, 0] < 0.5 * truth)
