@@ -104,8 +104,8 @@ def random(
         if high - low > _OF_ACCURACY * accuracy * size:
             field = f"difference between values of {name!r} with the same inputs"
             allowed = (
-                f"0, not {low:.6g} and {high:.6g}: the simulator must not be random; fix its seed, "
-                "or return the mean of enough runs"
+                f"0, not {low:.6g} and {high:.6g}: the simulator is random; fix its seed, or say "
+                "replicates=2, which makes its own scatter part of mean, deviation and quantiles"
             )
             return field, float(f"{high - low:.3g}"), allowed, {}
     return None
