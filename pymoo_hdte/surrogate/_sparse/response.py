@@ -104,6 +104,8 @@ class ResponseFit:
             expected = self.regression.spread(features, functionals)
             expected = expected * max(self.regression.surprise, LEAST_SURPRISE)
             cut = np.array([abs(float(weights @ off)), _std(off, weights)])
+            # What runs scatter by themselves may as well be a part of the response.
+            cut[1] += np.hypot(scatter, self.regression.noise_std) - scatter
             errors.append(tuple((COVERAGE * expected + cut) / scatter))
         mean, std = np.array(errors).T
         return mean, std
