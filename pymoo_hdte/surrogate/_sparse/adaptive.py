@@ -222,7 +222,10 @@ class _SurrogateBuild:
         )
         least = np.where(least > 0.0, least, np.finfo(float).tiny ** 0.25)
         self.scale = np.maximum(judged_std, least)
-        errors = [fit.errors(judged, size) for fit, size in zip(fits, least.tolist(), strict=True)]
+        errors = [
+            fit.errors(judged, size, self.is_random)
+            for fit, size in zip(fits, least.tolist(), strict=True)
+        ]
         if own is not None:
             errors = self._with_own(
                 errors, own_fits, judged, (least, by_inputs, own_std, own_truth)
@@ -282,7 +285,7 @@ class _SurrogateBuild:
             scale = self.scale[:, place]
             part = np.maximum(by_inputs[:, place], least[place]) / scale
             floor = max(SCATTER_OF_RANGE * float(np.std(own_truth[:, place])), 1e-300)
-            of_own, _ = own_fits[place].errors(judged, floor)
+            of_own, _ = own_fits[place].errors(judged, floor, counted=True)
             # The variance is the sum of both; half its error, over the scatter twice, is the std's.
             of_own = 0.5 * of_own * np.maximum(own_std[:, place], floor) / scale**2
             whole.append((of_mean * part, of_std * part * by_inputs[:, place] / scale + of_own))
