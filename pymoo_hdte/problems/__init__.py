@@ -1,6 +1,7 @@
 """Robust design problems for pymoo."""
 
 from pymoo_hdte.problems._simulator.crashes import CrashProbability
+from pymoo_hdte.problems._simulator.direct import DirectProblem
 from pymoo_hdte.problems._simulator.existing import Robust
 from pymoo_hdte.problems._simulator.inputs import Design
 from pymoo_hdte.problems._simulator.problem import SimulatorProblem
@@ -35,6 +36,7 @@ __all__ = [
     "CVaR",
     "CrashProbability",
     "Design",
+    "DirectProblem",
     "Event",
     "FailureProbability",
     "Mean",

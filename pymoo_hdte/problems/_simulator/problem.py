@@ -113,8 +113,6 @@ class SimulatorProblem(Problem):
         self.objectives, self.constraints = tuple(objectives), tuple(constraints)
         self.responses, self.n_runs, self._fit = responses, n_runs, fit
         self._requested = requested_of(objectives, constraints, responses)
-        if fit.success is not None or fit.own is not None:
-            _check_resolved(objectives, constraints)
         super().__init__(
             n_var=len(bounds),
             n_obj=len(objectives),
@@ -391,20 +389,11 @@ class SimulatorProblem(Problem):
 
 
 def _half_width(statistic: Statistic, around: Around) -> Array:
-    """Return the half-width of a statistic's band, what is not known of failures included."""
+    """Return the half-width of a statistic's band, what is not known of failures included.
+
+    Infinite for a quantile beyond what the samples resolve that know of failures and own scatter.
+    """
+    if around.common_alone and statistic.relative_to_scatter and statistic.rarest() < RESOLVED:
+        return np.full(len(around.mean), np.inf)
     uncertain = around.error_of_success(lambda other: statistic.value(other)[0])
     return statistic.half_width(around.mean_error, around.std_error, around) + uncertain
-
-
-def _check_resolved(
-    objectives: Sequence[Statistic], constraints: Sequence[RobustConstraint]
-) -> None:
-    """Refuse probabilities that common samples do not resolve: others do not know of failures.
-
-    Those of an event as an objective are never below what can be told, and stay.
-    """
-    rarest = [statistic.rarest() for statistic in objectives if statistic.relative_to_scatter]
-    least = min([*rarest, *(constraint.rarest for constraint in constraints)], default=0.5)
-    if least < RESOLVED:
-        allowed = f"at least {RESOLVED:.4g} from 0 and from 1 if a simulator fails or is random"
-        raise InvalidInput("probability of a statistic", least, allowed)

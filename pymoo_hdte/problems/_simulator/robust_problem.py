@@ -37,6 +37,7 @@ from pymoo_hdte.problems._simulator.trust import (
     negative_somewhere,
     positive_places,
     random,
+    unresolved,
 )
 from pymoo_hdte.problems._simulator.workers import Workers
 from pymoo_hdte.surrogate._sparse.adaptive import (
@@ -246,7 +247,7 @@ def robust_problem(
             in_hand,
             repeated is not None,
         )
-        refusal = _refusal(inputs, fit, accuracy, simulate, positive, statistics)
+        refusal = _refusal(inputs, fit, accuracy, simulate, positive, (objectives, constraints))
     responses = simulate.responses
     runs = None if repeated is None else repeated.runs
     n_runs = fit.n_runs if runs is None else len(runs.X)
@@ -277,9 +278,14 @@ def _refusal(
     accuracy: float,
     simulate: Simulator,
     positive: Sequence[str] | bool,
-    statistics: Sequence[Statistic],
+    requested: tuple[Sequence[Statistic], Sequence[RobustConstraint]],
 ) -> UntrustedSurrogate | None:
     """Return why the surrogate is not what was asked for, or None."""
+    objectives, constraints = requested
+    statistics = [*objectives, *(limit.statistic for limit in constraints)]
+    # Of a probability as an objective, the band tells what is resolved.
+    rarest = [entry.rarest() for entry in objectives if entry.relative_to_scatter]
+    rarest += [limit.rarest for limit in constraints]
     responses = simulate.responses
     places = _places(statistics, responses)
     limited = any(isinstance(statistic, CrashProbability) for statistic in statistics)
@@ -287,6 +293,7 @@ def _refusal(
     reason = (
         (unsure and fit.own is None and random(inputs, fit, accuracy, responses, simulate.again))
         or (None if limited else failing(inputs, fit))
+        or unresolved(fit, min(rarest, default=0.5))
         or unsure
         or negative_somewhere(inputs, fit, positive_places(positive, responses))
     )

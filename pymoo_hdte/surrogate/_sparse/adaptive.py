@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from pymoo_hdte._one_thread import ONE_THREAD
 from pymoo_hdte.surrogate._sparse.axes import Axis
+from pymoo_hdte.surrogate._sparse.components import PartOfField, fitted_together
 from pymoo_hdte.surrogate._sparse.draws import (
     SpreadPoints,
     draw_around,
@@ -24,7 +25,7 @@ from pymoo_hdte.surrogate._sparse.draws import (
 from pymoo_hdte.surrogate._sparse.kernel import EvenPolynomials
 from pymoo_hdte.surrogate._sparse.moments import SparseMoments
 from pymoo_hdte.surrogate._sparse.polynomial import SparsePolynomial
-from pymoo_hdte.surrogate._sparse.response import LOST, Judged, ResponseFit, fitted
+from pymoo_hdte.surrogate._sparse.response import LOST, Judged, ResponseFit
 from pymoo_hdte.surrogate._sparse.success import STUDENT_OF_DRAWS, Success, fit_success
 from pymoo_hdte.surrogate._sparse.tails import beyond_all_runs
 from pymoo_hdte.surrogate._sparse.terms import closed
@@ -147,6 +148,7 @@ class _SurrogateBuild:
         self.draws = draw_around(axes, self.designs, JUDGED_DRAWS, random_state)
         self.points, self.truth = np.empty((0, len(axes))), np.empty((0, 0))
         self.parameters: list[Array] = []
+        self.own_parameters: list[Array] = []
         self.success: Success | None = None
 
     @property
@@ -190,22 +192,24 @@ class _SurrogateBuild:
         """Fit the surrogate to the runs, and measure it."""
         good = np.asarray(np.isfinite(self.truth).all(axis=1))
         points, truth = self.points[good], self.truth[good]
+        count = truth.shape[1] // 2 if self.is_random else truth.shape[1]
+        truth, own_truth = truth[:, :count], truth[:, count:]
         polynomials = EvenPolynomials(int(np.clip(len(points) // 3, *DEGREES)))
         shares, weights_of_draws, drawn = self._successes(good, polynomials)
         features = polynomials(points)
         judged = Judged.at(self.draws[0], weights_of_draws, polynomials)
         weights = relevance(self.axes, points)
-        starts: list[Array | None] = [*self.parameters] or [None] * truth.shape[1]
-        fits = [
-            fitted(features, values, weights, judged, self.lost, start)
-            for values, start in zip(truth.T, starts, strict=True)
-        ]
-        self.parameters = [fit.regression.parameters for fit in fits]
-        count = truth.shape[1] // 2 if self.is_random else truth.shape[1]
-        fits, own_fits = fits[:count], fits[count:]
-        truth, own_truth = truth[:, :count], truth[:, count:]
+        fits, self.parameters = fitted_together(
+            features, truth, weights, judged, self.lost, self.parameters
+        )
+        own: SparsePolynomial | None = None
+        own_fits: Sequence[ResponseFit | PartOfField] = []
+        if self.is_random:
+            own_fits, self.own_parameters = fitted_together(
+                features, own_truth, weights, judged, self.lost, self.own_parameters
+            )
+            own = _joined(own_fits, polynomials)
         polynomial = _joined(fits, polynomials)
-        own = _joined(own_fits, polynomials) if self.is_random else None
         # Where there are no runs the polynomial runs away: its error would hide behind a scatter
         # that is not there.
         moments = SparseMoments(polynomial, self.axes, [axis.cut for axis in self.axes])
@@ -262,7 +266,7 @@ class _SurrogateBuild:
     def _with_own(
         self,
         errors: list[tuple[Array, Array]],
-        own_fits: list[ResponseFit],
+        own_fits: Sequence[ResponseFit | PartOfField],
         judged: Judged,
         sizes: tuple[Array, Array, Array, Array],
     ) -> list[tuple[Array, Array]]:
@@ -343,7 +347,9 @@ def _weighted_moments(values: Array, weights: Array) -> Array:
     return np.array([mean, np.sqrt(squares)])
 
 
-def _joined(fits: list[ResponseFit], polynomials: EvenPolynomials) -> SparsePolynomial:
+def _joined(
+    fits: Sequence[ResponseFit | PartOfField], polynomials: EvenPolynomials
+) -> SparsePolynomial:
     """Return all responses on the union of their terms."""
     indices = closed(np.concatenate([fit.indices for fit in fits]))
     places = {tuple(row): place for place, row in enumerate(indices.tolist())}

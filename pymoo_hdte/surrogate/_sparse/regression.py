@@ -72,8 +72,7 @@ class Regression:
 
     Notes
     -----
-    Runs scatter by themselves if that makes them more probable by more than a further parameter
-    costs: half the logarithm of the number of runs (Schwarz, Annals of Statistics 6, 1978).
+    Runs scatter by themselves where that makes them more probable.
     """
 
     def __init__(
@@ -181,7 +180,7 @@ def _learnt(
     least, first, most = NOISE
     # From the start: what explains the scatter without noise is no way to what does with it.
     both = optimum(np.append(middle, first), [*bounds, (least, most)])
-    if without.fun - both.fun <= 0.5 * np.log(count):
+    if both.fun >= without.fun:
         return np.array(without.x).reshape(start.shape), 0.0
     return np.array(both.x[:-1]).reshape(start.shape), float(np.exp(both.x[-1]))
 

@@ -186,3 +186,58 @@ def test_a_budget_that_ends_first_gives_a_wide_band():
     truth = np.mean(np.abs(a + b) + 0.3 * np.sin(4.0 * a) > 5.0)
     assert not result.confirmed
     assert result.interval[0] < truth < result.interval[1]
+
+
+def youn_choi(x1, x2):
+    return {
+        "g1": x1**2 * x2 / 20.0 - 1.0,
+        "g2": (x1 + x2 - 5.0) ** 2 / 30.0 + (x1 - x2 - 12.0) ** 2 / 120.0 - 1.0,
+        "g3": 80.0 / (x1**2 + 8.0 * x2 + 5.0) - 1.0,
+    }
+
+
+FAILS = (Response("g1") < 0.0) | (Response("g2") < 0.0) | (Response("g3") < 0.0)
+
+
+def on_a_grid(design, std=0.3, count=3000):
+    """Return the probability of failure around a design by the midpoint rule."""
+    edges = np.linspace(-7.0, 7.0, count + 1)
+    shares, middle = np.diff(norm.cdf(edges)), 0.5 * (edges[1:] + edges[:-1])
+    x1, x2 = (x + std * middle for x in design)
+    margins = youn_choi(x1[:, None], x2[None])
+    fails = np.min(np.broadcast_arrays(*margins.values()), axis=0) < 0.0
+    return shares @ fails @ shares
+
+
+def test_the_published_optimum_of_youn_and_choi_fails_as_probably_as_it_does():
+    design = (3.4391, 3.2866)
+    result = failure_probability(
+        youn_choi,
+        {name: norm(x, 0.3) for name, x in zip(("x1", "x2"), design, strict=True)},
+        FAILS,
+        vectorised=True,
+        progress=False,
+    )
+    truth = on_a_grid(design)
+    assert truth == pytest.approx(2.6e-3, rel=0.02)
+    assert abs(np.log(result.probability / truth)) < 1.5 * np.log(
+        result.interval[1] / result.probability
+    )
+    # Both active limits were designed for three deviations.
+    assert result.form_beta == pytest.approx(3.0, abs=0.01)
+
+
+def test_one_surrogate_serves_all_designs_of_youn_and_choi():
+    problem = robust_problem(
+        youn_choi,
+        {name: Design(3.0, 4.5, deviation=norm(0.0, 0.3)) for name in ("x1", "x2")},
+        objectives=[FailureProbability(event=FAILS)],
+        vectorised=True,
+        progress=False,
+    )
+    X = np.array([[3.4391, 3.2866], [3.7, 3.8], [4.0, 4.4]])
+    P, band = problem.evaluate(X, return_values_of=["F", "F_band"])
+    truth = np.array([on_a_grid(x) for x in X])
+    assert truth[2] < 2e-6
+    assert np.all(np.abs(P[:, 0] - truth) <= 1.5 * band[:, 0])
+    assert np.all(band[:, 0] < 0.5 * truth)

@@ -8,7 +8,7 @@ from threadpoolctl import threadpool_info, threadpool_limits
 from pymoo_hdte._one_thread import ONE_THREAD
 from pymoo_hdte.problems import Design
 from pymoo_hdte.problems._simulator.inputs import Inputs
-from pymoo_hdte.surrogate._sparse import adaptive
+from pymoo_hdte.surrogate._sparse import adaptive, components
 from pymoo_hdte.surrogate._sparse import regression as module
 from pymoo_hdte.surrogate._sparse.adaptive import fit_adaptively
 from pymoo_hdte.surrogate._sparse.draws import SpreadPoints, draw_around, draw_designs
@@ -136,8 +136,8 @@ def test_growth_fits_on_one_thread_and_leaves_the_function_its_own(monkeypatch):
         return np.exp(cube.sum(axis=1, keepdims=True))
 
     # A fit that itself calls what runs on one thread is no other.
-    nested = ONE_THREAD(noted("fit", adaptive.fitted))
-    monkeypatch.setattr(adaptive, "fitted", nested)
+    nested = ONE_THREAD(noted("fit", components.fitted))
+    monkeypatch.setattr(components, "fitted", nested)
     with threadpool_limits(2):
         rng = np.random.default_rng(8)
         adaptive.fit_adaptively(INPUTS.axes, noted("function", function), 0.1, 40, rng)
