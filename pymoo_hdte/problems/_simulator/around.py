@@ -14,6 +14,7 @@ import scipy
 from numpy.typing import NDArray
 
 from pymoo_hdte.problems._simulator.crashes import SuccessAround
+from pymoo_hdte.problems._simulator.replicates import OwnScatter
 from pymoo_hdte.problems._simulator.tails import NormalScatter, Tail
 from pymoo_hdte.surrogate._sparse.moments import SparseMoments, deviation
 from pymoo_hdte.surrogate._sparse.success import STUDENT_OF_DRAWS
@@ -131,6 +132,8 @@ class Around:
         Errors of mean and standard deviation in the response's unit.
     success : SuccessAround or None
         How likely runs succeed there, if some have failed; statistics then are of those that do.
+    own : OwnScatter or None
+        What the response of a random simulator scatters by itself.
     n_runs : int
         Runs behind it.
     """
@@ -143,9 +146,10 @@ class Around:
         expansion: Array,
         part: slice = slice(None),
         success: SuccessAround | None = None,
+        own: OwnScatter | None = None,
     ) -> None:
         self._common, self.expansion, self._part = common, expansion, part
-        self.success, self.n_runs = success, 0
+        self.success, self.own, self.n_runs = success, own, 0
         self.beside: dict[str | None, Around] = {None: self}
         self.mean_error = self.std_error = np.zeros(len(expansion))
 
@@ -186,18 +190,21 @@ class Around:
         if self.weights is None:
             return self.expansion[:, 0]
         # The samples tell how failures change it: without any, it is the exact one.
-        return self.expansion[:, 0] + np.mean((self.weights - 1.0) * self.samples[0], axis=1)
+        values = self.expansion @ self._common.basis[self._part].T
+        return self.expansion[:, 0] + np.mean((self.weights - 1.0) * values, axis=1)
 
     @cached_property
     def std(self) -> Array:
         """The standard deviation, shape (n,), exact where all runs succeed."""
-        whole = deviation(self.expansion)
-        if self.weights is None:
-            return whole
-        values = self.samples[0]
-        mean = np.mean(self.weights * values, axis=1, keepdims=True)
-        variance = np.mean(self.weights * (values - mean) ** 2, axis=1)
-        return whole * np.sqrt(divide_or_zero(variance, values.var(axis=1)))
+        by_inputs = deviation(self.expansion)
+        if self.weights is not None:
+            values = self.expansion @ self._common.basis[self._part].T
+            mean = np.mean(self.weights * values, axis=1, keepdims=True)
+            variance = np.mean(self.weights * (values - mean) ** 2, axis=1)
+            by_inputs = by_inputs * np.sqrt(divide_or_zero(variance, values.var(axis=1)))
+        if self.own is None:
+            return by_inputs
+        return np.sqrt(by_inputs**2 + self.own.variance(self.weights, self._part))
 
     def error_of_success(self, value: Callable[[Around], Array]) -> Array:
         """Return by how much a number may be off since success is uncertain, shape (n,).
@@ -220,7 +227,7 @@ class Around:
     def _with(self, success: SuccessAround | None, part: slice) -> Around:
         """Return all responses with another probability of success and a part of the samples."""
         others = {
-            id(around): Around(self._common, around.expansion, part, success)
+            id(around): Around(self._common, around.expansion, part, success, around.own)
             for around in self.beside.values()
         }
         beside = {name: others[id(around)] for name, around in self.beside.items()}
@@ -232,7 +239,13 @@ class Around:
     def samples(self) -> tuple[Array, Array]:
         """Values at the samples, shape (n, k), and the polynomials there, shape (k, q)."""
         basis = self._common.basis[self._part]
-        return self.expansion @ basis.T, basis
+        values = self.expansion @ basis.T
+        return values if self.own is None else values + self.own.drawn(self._part), basis
+
+    @property
+    def common_alone(self) -> bool:
+        """Whether only common samples serve: others know no failures and no own scatter."""
+        return self.success is not None or self.own is not None
 
     def quarters(self) -> Iterator[Around]:
         """Yield the same with each independent part of the samples."""

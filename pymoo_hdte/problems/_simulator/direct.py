@@ -46,6 +46,7 @@ class Drawn:
 
     resolved = often = 0.0
     weights = success = None
+    common_alone = True
 
     def __init__(self, values: Array) -> None:
         self._values = values

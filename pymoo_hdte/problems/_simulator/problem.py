@@ -16,12 +16,14 @@ from pymoo_hdte.problems._simulator.around import RESOLVED, Around, CommonSample
 from pymoo_hdte.problems._simulator.crashes import CrashProbability, SuccessMoments
 from pymoo_hdte.problems._simulator.data import Runs
 from pymoo_hdte.problems._simulator.inputs import Inputs
+from pymoo_hdte.problems._simulator.replicates import OwnMoments
 from pymoo_hdte.problems._simulator.requested import by_moments, place_of, requested_of
 from pymoo_hdte.problems._simulator.statistics import RobustConstraint, Statistic
 from pymoo_hdte.problems._simulator.stored import read_problem, write_problem
 from pymoo_hdte.surrogate._sparse.adaptive import AdaptiveFit
 from pymoo_hdte.surrogate._sparse.draws import draw_designs
 from pymoo_hdte.surrogate.box import Box
+from pymoo_hdte.surrogate.moments import divide_or_zero
 from pymoo_hdte.surrogate.sensitivity import SobolIndices
 
 Array = NDArray[np.float64]
@@ -57,6 +59,8 @@ class SimulatorProblem(Problem):
         Runs of the simulator that were made.
     refusal : str, optional
         Why the surrogate is not what was asked for.
+    replicates : Runs, optional
+        All runs of a random simulator, of whose means and variances the surrogate is.
 
     Attributes
     ----------
@@ -101,15 +105,14 @@ class SimulatorProblem(Problem):
         constraints: Sequence[RobustConstraint],
         n_runs: int,
         refusal: str | None = None,
+        replicates: Runs | None = None,
     ) -> None:
-        self._inputs, self.refusal = inputs, refusal
+        self._inputs, self.refusal, self._replicates = inputs, refusal, replicates
         bounds = np.array([axis.design for axis in inputs.axes if axis.designed])
         self.design_box = Box(inputs.designed, *bounds.T)
         self.objectives, self.constraints = tuple(objectives), tuple(constraints)
         self.responses, self.n_runs, self._fit = responses, n_runs, fit
         self._requested = requested_of(objectives, constraints, responses)
-        if fit.success is not None:
-            _check_resolved(objectives, constraints)
         super().__init__(
             n_var=len(bounds),
             n_obj=len(objectives),
@@ -120,7 +123,9 @@ class SimulatorProblem(Problem):
         self.var_names, self.input_names = inputs.designed, inputs.names
         self.obj_names = tuple(statistic.name for statistic in objectives)
         self._common = CommonSamples(fit.moments, seed=1)
-        self._success = None
+        self._success = self._own = None
+        if fit.own is not None:
+            self._own = OwnMoments(fit.own, inputs.axes, self._common.scatter)
         if fit.success is not None:
             self._success = SuccessMoments(fit.success, inputs.axes, self._common.scatter)
         self.failed = inputs.values(fit.failed) if len(fit.failed) else fit.failed
@@ -137,6 +142,8 @@ class SimulatorProblem(Problem):
         """Inputs and responses of all runs; None for a problem that was loaded."""
         if not len(self._fit.points):
             return None
+        if self._replicates is not None:
+            return self._replicates
         return Runs(self._inputs.values(self._fit.points), self._fit.truth.copy())
 
     @property
@@ -280,9 +287,12 @@ class SimulatorProblem(Problem):
         """Return the expansion of each response around the designs."""
         expansion = self._fit.moments.expansion(X)
         success = None if self._success is None else self._success.around(X)
+        owns: Sequence[Any] = [None] * len(self.responses)
+        if self._own is not None:
+            owns = self._own.around(X)
         around = [
-            Around(self._common, expansion[:, k], success=success)
-            for k in range(len(self.responses))
+            Around(self._common, expansion[:, k], success=success, own=own)
+            for k, own in enumerate(owns)
         ]
         beside: dict[str | None, Around] = dict(zip(self.responses, around, strict=True))
         if len(around) == 1:
@@ -327,7 +337,7 @@ class SimulatorProblem(Problem):
         slopes: list[str] = [key for key in ("dF", "dG") if key in out]
         blocks = range(0, len(x), _AT_ONCE)
         quick = None
-        if not slopes and self._success is None:
+        if not slopes and self._success is None and self._own is None:
             quick = by_moments(self._requested, self._fit.moments, x)
         if quick is not None:
             parts = [{"F": quick[:, : self.n_obj], "G": quick[:, self.n_obj :]}]
@@ -346,7 +356,7 @@ class SimulatorProblem(Problem):
             value, slope = statistic.value(around[place])
             values.append(sign * value - bound)
             if slopes:
-                gradients.append(sign * self._gradient(x, statistic, slope, place))
+                gradients.append(sign * self._gradient(x, statistic, slope, around[place], place))
         F, G = np.split(np.column_stack(values), [self.n_obj], axis=1)
         outputs = {"F": F, "G": G}
         if slopes:
@@ -354,7 +364,9 @@ class SimulatorProblem(Problem):
             outputs |= {"dF": dF, "dG": dG}
         return outputs
 
-    def _gradient(self, x: Array, statistic: Statistic, slope: Array, place: int) -> Array:
+    def _gradient(
+        self, x: Array, statistic: Statistic, slope: Array, around: Around, place: int
+    ) -> Array:
         if not statistic.has_gradient:
             raise InvalidInput("dF or dG", statistic, "statistics that have a gradient")
         if self._success is not None:
@@ -362,24 +374,26 @@ class SimulatorProblem(Problem):
             raise InvalidInput("dF or dG", statistic, allowed)
         weights = np.zeros((len(x), len(self.responses), slope.shape[1]))
         weights[:, place] = slope
-        return self._fit.moments.pulled_back(x, weights)[:, place]
+        gradient = self._fit.moments.pulled_back(x, weights)[:, place]
+        if around.own is None or self._own is None:
+            return gradient
+        if statistic.weights is None:
+            allowed = "mean, deviation or their sum for a random simulator"
+            raise InvalidInput("dF or dG", statistic, allowed)
+        # Of the own variance, as far as it is above 0.
+        shape = len(x), len(self.responses), around.own.expansion.shape[1]
+        weights = np.zeros(shape)
+        half = np.where(around.own.expansion[:, 0] > 0.0, 0.5, 0.0)
+        weights[:, place, 0] = statistic.weights[1] * divide_or_zero(half, around.std)
+        return gradient + self._own.moments.pulled_back(x, weights)[:, place]
 
 
 def _half_width(statistic: Statistic, around: Around) -> Array:
-    """Return the half-width of a statistic's band, what is not known of failures included."""
+    """Return the half-width of a statistic's band, what is not known of failures included.
+
+    Infinite for a quantile beyond what the samples resolve that know of failures and own scatter.
+    """
+    if around.common_alone and statistic.relative_to_scatter and statistic.rarest() < RESOLVED:
+        return np.full(len(around.mean), np.inf)
     uncertain = around.error_of_success(lambda other: statistic.value(other)[0])
     return statistic.half_width(around.mean_error, around.std_error, around) + uncertain
-
-
-def _check_resolved(
-    objectives: Sequence[Statistic], constraints: Sequence[RobustConstraint]
-) -> None:
-    """Refuse probabilities that common samples do not resolve: others do not know of failures.
-
-    Those of an event as an objective are never below what can be told, and stay.
-    """
-    rarest = [statistic.rarest() for statistic in objectives if statistic.relative_to_scatter]
-    least = min([*rarest, *(constraint.rarest for constraint in constraints)], default=0.5)
-    if least < RESOLVED:
-        allowed = f"at least {RESOLVED:.4g} from 0 and from 1 for a simulator that fails"
-        raise InvalidInput("probability of a statistic", least, allowed)

@@ -20,6 +20,7 @@ from pymoo_hdte.problems._simulator.data import read_data
 from pymoo_hdte.problems._simulator.identity import identity
 from pymoo_hdte.problems._simulator.inputs import Design, Inputs
 from pymoo_hdte.problems._simulator.problem import SimulatorProblem
+from pymoo_hdte.problems._simulator.replicates import SEED, Replicates
 from pymoo_hdte.problems._simulator.requested import least_tail, places_of
 from pymoo_hdte.problems._simulator.run_file import RunFile
 from pymoo_hdte.problems._simulator.runs import Simulator, no_simulator
@@ -36,6 +37,7 @@ from pymoo_hdte.problems._simulator.trust import (
     negative_somewhere,
     positive_places,
     random,
+    unresolved,
 )
 from pymoo_hdte.problems._simulator.workers import Workers
 from pymoo_hdte.surrogate._sparse.adaptive import (
@@ -74,6 +76,7 @@ def robust_problem(
     progress: bool = True,
     accept: str = "accurate",
     data: tuple[Any, Any] | None = None,
+    replicates: int | None = None,
 ) -> SimulatorProblem:
     """Return the robust design problem of a simulator.
 
@@ -148,6 +151,12 @@ def robust_problem(
         designs and noise, and responses Y, shape (n,) or (n, r), NaN where a run failed; or both as
         mappings or data frames of columns by name. ``runs`` of a problem or of a refusal fits.
         One of them is made again, to see whether they are this simulator's.
+    replicates : int, optional
+        Runs at each point of a random simulator, 2 or more; each counts in the budget. A simulator
+        that takes an argument ``seed``, which is no design and no noise, is given a whole number
+        there and has 2 by default. What it scatters by itself is part of standard deviations and,
+        as a normal deviation, of quantiles and probabilities; a `WorstCase` is that of the mean.
+        A point at which one of its runs fails has failed.
 
     Returns
     -------
@@ -191,22 +200,34 @@ def robust_problem(
     one_of("accept", accept, ACCEPTED)
     least = least_runs(len(inputs.axes))
     given = None if data is None else read_data(data, inputs)
-    least = max(0, least - (0 if given is None else len(given.points)))
+    takes_seed = _takes_seed(simulator, inputs.names, replicates)
+    if takes_seed is not None:
+        replicates = whole_number("replicates", 2 if replicates is None else replicates, 2)
+    each, names = replicates or 1, (*inputs.names, *([SEED] if takes_seed is not None else []))
+    least = max(0, each * least - (0 if given is None else len(given.points)))
     if simulator is None and given is not None and not least:
         simulator, vectorised, budget, cache = no_simulator, False, 0, None
     else:
-        simulator = _checked_signature(simulator, inputs.names)
+        simulator = _checked_signature(simulator, names if takes_seed else inputs.names)
         budget = whole_number("budget", budget, least)
-    file = None if cache is None else RunFile(cache, inputs.names, identity(simulator))
+    file = None if cache is None else RunFile(cache, names, identity(simulator))
     count, batch = whole_number("tries", tries, 1), whole_number("at_once", at_once, 1)
     random_state = np.random.default_rng(whole_number("seed", seed, 0))
     if vectorised and time_limit is not None:
         raise InvalidInput("time_limit", time_limit, "None for a vectorised simulator")
     bar = _announce(inputs, least, budget) if progress else tqdm(disable=True)
     with bar, closing(Workers(executor, time_limit)) as workers:
-        simulate = Simulator(simulator, inputs.names, vectorised, workers, count, file, bar)
+        simulate = Simulator(simulator, names, vectorised, workers, count, file, bar, takes_seed)
+        at_points: Callable[[Array], Array] = simulate
+        in_hand = None if given is None else (given.points, given.values)
         if given is not None:
             simulate.check_data(inputs.values(given.points), given.values, given.responses)
+        repeated = None if takes_seed is None else Replicates(simulate, each, seed)
+        if repeated is not None:
+            at_points = repeated
+            if given is not None:
+                repeated.keep(inputs.values(given.points), given.values)
+                in_hand = repeated.grouped(given)
         statistics = [*objectives, *(limit.statistic for limit in constraints)]
 
         def requested_places() -> list[int]:
@@ -214,21 +235,24 @@ def robust_problem(
 
         fit = fit_adaptively(
             inputs.axes,
-            lambda cube: simulate(inputs.values(cube)),
+            lambda cube: at_points(inputs.values(cube)),
             accuracy,
-            budget,
+            budget // each,
             random_state,
             lambda fit: (
                 not negative_somewhere(inputs, fit, positive_places(positive, simulate.responses))
             ),
-            batch,
+            -(-batch // each),
             lambda fit: largest_error(fit, requested_places())[0],
-            None if given is None else (given.points, given.values),
+            in_hand,
+            repeated is not None,
         )
-        refusal = _refusal(inputs, fit, accuracy, simulate, positive, statistics)
+        refusal = _refusal(inputs, fit, accuracy, simulate, positive, (objectives, constraints))
     responses = simulate.responses
-    parts = inputs, fit, responses, objectives, constraints, fit.n_runs
-    problem = SimulatorProblem(*parts, refusal=str(refusal) if refusal else None)
+    runs = None if repeated is None else repeated.runs
+    n_runs = fit.n_runs if runs is None else len(runs.X)
+    parts = inputs, fit, responses, objectives, constraints, n_runs
+    problem = SimulatorProblem(*parts, str(refusal) if refusal else None, runs)
     if refusal is not None and accept == "accurate":
         refusal.problem, refusal.runs = problem, problem.runs
         raise refusal
@@ -254,16 +278,22 @@ def _refusal(
     accuracy: float,
     simulate: Simulator,
     positive: Sequence[str] | bool,
-    statistics: Sequence[Statistic],
+    requested: tuple[Sequence[Statistic], Sequence[RobustConstraint]],
 ) -> UntrustedSurrogate | None:
     """Return why the surrogate is not what was asked for, or None."""
+    objectives, constraints = requested
+    statistics = [*objectives, *(limit.statistic for limit in constraints)]
+    # Of a probability as an objective, the band tells what is resolved.
+    rarest = [entry.rarest() for entry in objectives if entry.relative_to_scatter]
+    rarest += [limit.rarest for limit in constraints]
     responses = simulate.responses
     places = _places(statistics, responses)
     limited = any(isinstance(statistic, CrashProbability) for statistic in statistics)
     unsure = inaccurate(inputs, fit, accuracy, responses, places)
     reason = (
-        (unsure and random(inputs, fit, accuracy, responses, simulate.again))
+        (unsure and fit.own is None and random(inputs, fit, accuracy, responses, simulate.again))
         or (None if limited else failing(inputs, fit))
+        or unresolved(fit, min(rarest, default=0.5))
         or unsure
         or negative_somewhere(inputs, fit, positive_places(positive, responses))
     )
@@ -298,6 +328,23 @@ def _share(field: str, given: Any) -> float:
         allowed = f"above 0 and below 1, a share: {share / 100.0:g} for {share:g} %"
         raise InvalidInput(field, given, allowed)
     return share
+
+
+def _takes_seed(
+    simulator: Callable[..., Any] | None, names: Sequence[str], replicates: int | None
+) -> bool | None:
+    """Return whether a random simulator takes a seed; None for one that is not random."""
+    if SEED in names or simulator is None:
+        takes = False
+    else:
+        try:
+            parameters = inspect.signature(simulator, follow_wrapped=False).parameters
+        except (TypeError, ValueError):
+            parameters = {}  # type: ignore[assignment]
+        parameter = parameters.get(SEED)
+        # One with a default is a random simulator whose seed was fixed, unless runs are repeated.
+        takes = parameter is not None and (parameter.default is parameter.empty or bool(replicates))
+    return takes if takes or replicates is not None else None
 
 
 def _checked_signature(

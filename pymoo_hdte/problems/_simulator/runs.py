@@ -70,6 +70,8 @@ class Simulator:
         File of finished runs.
     progress : tqdm
         A bar to move.
+    takes_seed : bool, optional
+        Where the last input is the seed of a random function, whether that takes it.
 
     Raises
     ------
@@ -91,9 +93,10 @@ class Simulator:
         tries: int,
         file: RunFile | None,
         progress: tqdm,
+        takes_seed: bool | None = None,
     ) -> None:
         self.function, self.names, self.vectorised = function, names, vectorised
-        self.workers, self.tries = workers, tries
+        self.workers, self.tries, self.takes_seed = workers, tries, takes_seed
         self.file, self.progress = file, progress
         self.responses = file.responses if file else ()
         self._ran = self._sized = False
@@ -126,7 +129,10 @@ class Simulator:
             raise InvalidInput("responses in data", responses, str(self.responses))
         self.responses = self.responses or responses
         whole = np.isfinite(Y).all(axis=1)
-        if self.function is not no_simulator:
+        if self.takes_seed is not None and self.function is not no_simulator:
+            # Another run of a random function gives something else; only its names are of use.
+            self.again((*X[0].tolist(), 0.0))
+        elif self.function is not no_simulator:
             rows = zip(map(tuple, X[whole].tolist()), Y[whole], strict=True)
             check_again("data", rows, self.again, f"an array of shape {Y.shape}")
         if not self.responses:
@@ -219,9 +225,8 @@ class Simulator:
         self, rows: Sequence[tuple[float, ...]]
     ) -> list[tuple[tuple[float, ...], list[float] | None]]:
         """Make runs of a vectorised simulator; one by one where it raises."""
-        columns = dict(zip(self.names, np.array(rows).T, strict=True))
         try:
-            gave = self.function(**columns)
+            gave = self.function(**self._inputs(np.array(rows).T))
         except Exception as error:  # A user's simulator may raise anything.
             self._last_failure = failure_of(error)
             if len(rows) == 1:
@@ -229,13 +234,22 @@ class Simulator:
             return [run for row in rows for run in self._together([row])]
         return list(zip(rows, self._table(gave, len(rows)).tolist(), strict=True))
 
+    def _inputs(self, values: Any) -> dict[str, Any]:
+        """Return numbers or columns by the names of the inputs, as the function takes them."""
+        inputs: dict[str, Any] = dict(zip(self.names, values, strict=True))
+        if self.takes_seed is not None:
+            seed = inputs.pop(self.names[-1])
+            if self.takes_seed:
+                inputs[self.names[-1]] = np.asarray(seed, dtype=int)[()]
+        return inputs
+
     def _on_workers(
         self, rows: Sequence[tuple[float, ...]]
     ) -> Iterable[tuple[tuple[float, ...], Any]]:
         """Yield runs as they end, so that a finished one is kept whatever happens to the others."""
         try:
             for row in rows:
-                inputs = dict(zip(self.names, row, strict=True))
+                inputs = self._inputs(row)
                 # Not by a function of ours: processes beside workers would import our package.
                 self.workers.start(row, partial(self.function, **inputs))
             for _ in rows:

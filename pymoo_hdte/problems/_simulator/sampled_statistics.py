@@ -360,8 +360,7 @@ class FailureProbability(Statistic):
         errors = Z * np.sqrt(np.maximum(shares * (1.0 - shares), 0.0) / len(around.samples[1]))
         errors = np.maximum(errors, NONE_OF / len(around.samples[1]))
         rare = np.minimum(shares[0], 1.0 - shares[0]) < around.often
-        # Samples by importance know nothing of runs that fail.
-        for row in np.flatnonzero(rare) if around.weights is None else ():
+        for row in () if around.common_alone else np.flatnonzero(rare):
             side = 1.0 if shares[0, row] < 0.5 else -1.0
             tail = around.tail(int(row), partial(self._signed, side))
             for place, part in enumerate(slacks):

@@ -45,6 +45,7 @@ HIGHEST_DEGREE = 100
 """Largest degree that is read from a file; surrogates have 60 at most."""
 _OF_RESPONSES = ("mean_error", "std_error", "smallest_scatter")
 _OF_SUCCESS = ("success_indices", "success_coefficients", "success_draws")
+_OF_OWN = ("own_indices", "own_coefficients")
 _OF_POINTS = ("failed", "held_out_points", "points")
 
 FORMAT = FileFormat(
@@ -56,9 +57,9 @@ FORMAT = FileFormat(
     ),
     arrays=(
         *("indices", "coefficients", *_OF_RESPONSES, *_OF_POINTS, "held_out_error", "truth"),
-        *_OF_SUCCESS,
+        *(*_OF_SUCCESS, *_OF_OWN),
     ),
-    later=dict.fromkeys(("refusal", "points", "truth", *_OF_SUCCESS), (2, None)),
+    later=dict.fromkeys(("refusal", "points", "truth", *_OF_SUCCESS, *_OF_OWN), (2, None)),
 )
 
 
@@ -93,6 +94,21 @@ def _read_success(arrays: dict[str, Array], inputs: int) -> Success | None:
     stays = np.isin(rows_of(whole), rows_of(closed(whole[mode[0] != 0.0])))
     polynomial = SparsePolynomial(whole[stays], mode[:, stays])
     return Success(polynomial, SparsePolynomial(whole, draws), np.empty(0))
+
+
+def _read_own(arrays: dict[str, Array], inputs: int, responses: int) -> SparsePolynomial | None:
+    indices, coefficients = arrays["own_indices"], arrays["own_coefficients"]
+    if indices is None or not len(indices):
+        return None
+    for name, shape in zip(
+        _OF_OWN, ((len(indices), inputs), (responses, len(indices))), strict=True
+    ):
+        if arrays[name].shape != shape:
+            raise InvalidInput(f"shape of {name}", arrays[name].shape, str(shape))
+    _check_indices(indices)
+    if not np.all(np.isfinite(coefficients)):
+        raise InvalidInput("own_coefficients of the file", coefficients.tolist(), "finite")
+    return SparsePolynomial(indices.astype(int), coefficients)
 
 
 def write_problem(
@@ -136,6 +152,13 @@ def write_problem(
         "refusal": refusal,
     }
     arrays = {name: getattr(fit, name) for name in _OF_FIT} | _of_success(fit)
+    none = np.empty((0, 0))
+    arrays |= {"own_indices": none, "own_coefficients": none}
+    if fit.own is not None:
+        arrays |= {
+            "own_indices": fit.own.indices.astype(float),
+            "own_coefficients": fit.own.coefficients,
+        }
     polynomial = {
         "indices": fit.polynomial.indices.astype(float),
         "coefficients": fit.polynomial.coefficients,
@@ -321,5 +344,6 @@ def _read_fit(
     measures = [axis.measure if has_tail else axis.cut for axis, has_tail in pairs]
     others: dict[str, Any] = {name: np.array(arrays[name]) for name in _OF_FIT}
     others["success"] = _read_success(arrays, len(axes))
+    others["own"] = _read_own(arrays, len(axes), responses)
     moments = SparseMoments(polynomial, axes, measures)
     return AdaptiveFit(polynomial=polynomial, moments=moments, n_runs=n_runs, **others)

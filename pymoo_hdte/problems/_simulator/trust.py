@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pymoo_hdte.checks import InvalidInput
+from pymoo_hdte.problems._simulator.around import RESOLVED
 from pymoo_hdte.problems._simulator.inputs import Inputs
 from pymoo_hdte.surrogate._sparse.adaptive import AdaptiveFit
 from pymoo_hdte.surrogate._sparse.draws import draw_around, draw_designs
@@ -47,6 +48,17 @@ def failing(inputs: Inputs, fit: AdaptiveFit) -> Refusal | None:
     region = region_of(inputs.designed, designs[bad], bounds)
     allowed = f"at most {MOST_FAILED:g} at every design, or CrashProbability() limited or minimised"
     return "probability of failing runs", float(f"{share.max():.3g}"), allowed, region
+
+
+def unresolved(fit: AdaptiveFit, rarest: float) -> Refusal | None:
+    """Return why a probability is too small where runs fail or are random, or None.
+
+    Only common samples know of failures and of own scatter.
+    """
+    if rarest >= RESOLVED or (fit.success is None and fit.own is None):
+        return None
+    allowed = f"at least {RESOLVED:.4g} from 0 and from 1 for a simulator that fails or is random"
+    return "probability of a statistic", rarest, allowed, {}
 
 
 def largest_error(fit: AdaptiveFit, places: Sequence[int]) -> tuple[float, int, int]:
@@ -104,8 +116,8 @@ def random(
         if high - low > _OF_ACCURACY * accuracy * size:
             field = f"difference between values of {name!r} with the same inputs"
             allowed = (
-                f"0, not {low:.6g} and {high:.6g}: the simulator must not be random; fix its seed, "
-                "or return the mean of enough runs"
+                f"0, not {low:.6g} and {high:.6g}: the simulator is random; fix its seed, or say "
+                "replicates=2, which makes its own scatter part of mean, deviation and quantiles"
             )
             return field, float(f"{high - low:.3g}"), allowed, {}
     return None

@@ -90,6 +90,9 @@ class AdaptiveFit:
     success : Success or None
         How likely the function succeeds, if it failed anywhere; errors then are of what it gives
         where it does, and designs count in them by how often it does.
+    own : SparsePolynomial or None
+        Own variances of the responses of a random function, in squares of their units; they are
+        part of the scatter.
     confirmed : bool
         Whether the required judgements passed before the budget was spent.
     """
@@ -106,6 +109,7 @@ class AdaptiveFit:
     held_out_points: Array
     held_out_error: Array
     success: Success | None = None
+    own: SparsePolynomial | None = None
     confirmed: bool = True
 
     def __deepcopy__(self, memo: dict[int, Any]) -> AdaptiveFit:
@@ -133,8 +137,9 @@ class _SurrogateBuild:
         accuracy: float,
         random_state: np.random.Generator,
         given: tuple[Array, Array] | None = None,
+        is_random: bool = False,
     ) -> None:
-        self.axes, self.function = axes, function
+        self.axes, self.function, self.is_random = axes, function, is_random
         self._given = (np.empty((0, len(axes))), np.empty((0, 0))) if given is None else given
         self._in_hand = None if given is None else scipy.spatial.KDTree(given[0])
         self.lost = LOST * min(accuracy, LARGEST_ACCURACY)
@@ -143,6 +148,7 @@ class _SurrogateBuild:
         self.draws = draw_around(axes, self.designs, JUDGED_DRAWS, random_state)
         self.points, self.truth = np.empty((0, len(axes))), np.empty((0, 0))
         self.parameters: list[Array] = []
+        self.own_parameters: list[Array] = []
         self.success: Success | None = None
 
     @property
@@ -186,6 +192,8 @@ class _SurrogateBuild:
         """Fit the surrogate to the runs, and measure it."""
         good = np.asarray(np.isfinite(self.truth).all(axis=1))
         points, truth = self.points[good], self.truth[good]
+        count = truth.shape[1] // 2 if self.is_random else truth.shape[1]
+        truth, own_truth = truth[:, :count], truth[:, count:]
         polynomials = EvenPolynomials(int(np.clip(len(points) // 3, *DEGREES)))
         shares, weights_of_draws, drawn = self._successes(good, polynomials)
         features = polynomials(points)
@@ -194,25 +202,41 @@ class _SurrogateBuild:
         fits, self.parameters = fitted_together(
             features, truth, weights, judged, self.lost, self.parameters
         )
+        own: SparsePolynomial | None = None
+        own_fits: Sequence[ResponseFit | PartOfField] = []
+        if self.is_random:
+            own_fits, self.own_parameters = fitted_together(
+                features, own_truth, weights, judged, self.lost, self.own_parameters
+            )
+            own = _joined(own_fits, polynomials)
         polynomial = _joined(fits, polynomials)
         # Where there are no runs the polynomial runs away: its error would hide behind a scatter
         # that is not there.
         moments = SparseMoments(polynomial, self.axes, [axis.cut for axis in self.axes])
         _, judged_std = moments(self.designs)
         if drawn is not None:
-            values = polynomial(self.draws[0].reshape(-1, len(self.axes)))
-            values = values.reshape(*weights_of_draws.shape, -1)
-            given, judged_std = _weighted_moments(values, weights_of_draws)
+            given, judged_std = self._around(polynomial, weights_of_draws)
+        by_inputs = judged_std
+        if own is not None:
+            own_mean, own_std = self._around(own, weights_of_draws)
+            judged_std = np.sqrt(by_inputs**2 + np.maximum(own_mean, 0.0))
         spread = np.std(truth, axis=0)
         least = np.maximum(
             SMALLEST_SCATTER * np.median(judged_std, axis=0), SCATTER_OF_RANGE * spread
         )
         least = np.where(least > 0.0, least, np.finfo(float).tiny ** 0.25)
         self.scale = np.maximum(judged_std, least)
-        errors = [fit.errors(judged, size) for fit, size in zip(fits, least.tolist(), strict=True)]
+        errors = [
+            fit.errors(judged, size, self.is_random)
+            for fit, size in zip(fits, least.tolist(), strict=True)
+        ]
+        if own is not None:
+            errors = self._with_own(
+                errors, own_fits, judged, (least, by_inputs, own_std, own_truth)
+            )
         if drawn is not None:
-            own = np.array([given, judged_std])
-            off = [_weighted_moments(values, draw) - own for draw in drawn]
+            whole = np.array([given, by_inputs])
+            off = [self._around(polynomial, draw) - whole for draw in drawn]
             uncertain = STUDENT_OF_DRAWS * np.sqrt(np.mean(np.square(off), axis=0)) / self.scale
             errors = np.array(errors) + np.moveaxis(uncertain, 2, 0)
         of_mean, of_std = np.sqrt(np.average(np.square(errors), axis=2, weights=shares)).T
@@ -226,12 +250,50 @@ class _SurrogateBuild:
             self.n_runs,
             least,
             self.points,
-            self.truth,
+            self.truth[:, :count],
             self.points[~good],
             points,
             left_out / np.maximum(std, least),
             self.success,
+            own,
         )
+
+    def _around(self, polynomial: SparsePolynomial, weights: Array) -> Array:
+        """Return mean and deviation of a polynomial by the draws around designs, (2, v, r)."""
+        values = polynomial(self.draws[0].reshape(-1, len(self.axes)))
+        return _weighted_moments(values.reshape(*weights.shape, -1), weights)
+
+    def _with_own(
+        self,
+        errors: list[tuple[Array, Array]],
+        own_fits: Sequence[ResponseFit | PartOfField],
+        judged: Judged,
+        sizes: tuple[Array, Array, Array, Array],
+    ) -> list[tuple[Array, Array]]:
+        """Return errors as shares of a scatter of which the function's own is part.
+
+        Parameters
+        ----------
+        errors : list of tuple
+            Those of the means of runs, as shares of the scatter by the inputs.
+        own_fits : list of ResponseFit
+            Fits of the own variances.
+        judged : Judged
+        sizes : tuple of ndarray
+            Least scatter, (r,); scatter by the inputs, (v, r); deviation of the own variance over
+            the scatter, (v, r); own variances of the runs, (n, r).
+        """
+        least, by_inputs, own_std, own_truth = sizes
+        whole = []
+        for place, (of_mean, of_std) in enumerate(errors):
+            scale = self.scale[:, place]
+            part = np.maximum(by_inputs[:, place], least[place]) / scale
+            floor = max(SCATTER_OF_RANGE * float(np.std(own_truth[:, place])), 1e-300)
+            of_own, _ = own_fits[place].errors(judged, floor, counted=True)
+            # The variance is the sum of both; half its error, over the scatter twice, is the std's.
+            of_own = 0.5 * of_own * np.maximum(own_std[:, place], floor) / scale**2
+            whole.append((of_mean * part, of_std * part * by_inputs[:, place] / scale + of_own))
+        return whole
 
     def _successes(
         self, good: NDArray[np.bool_], polynomials: EvenPolynomials
@@ -308,6 +370,7 @@ def fit_adaptively(
     at_once: int = 1,
     error_of: Callable[[AdaptiveFit], float] = lambda fit: fit.largest_error,
     given: tuple[Array, Array] | None = None,
+    is_random: bool = False,
 ) -> AdaptiveFit:
     """Grow a surrogate until mean and standard deviation are accurate, or the budget is spent.
 
@@ -331,6 +394,9 @@ def fit_adaptively(
     given : tuple of ndarray, optional
         Points and values of runs in hand, which do not count in the budget. They come first, in an
         order by chance, and are judged like others: twice, without and with the last of them.
+    is_random : bool
+        Whether the function gives means of several runs, and beside them, in as many columns,
+        their variances.
 
     Returns
     -------
@@ -343,7 +409,7 @@ def fit_adaptively(
         given = given[0][order], given[1][order]
         budget += len(order)
         first = max(first, int(np.ceil(len(order) / (1.0 + BATCH))))
-    build = _SurrogateBuild(axes, function, accuracy, random_state, given)
+    build = _SurrogateBuild(axes, function, accuracy, random_state, given, is_random)
     build.run(min(first, budget))
     passed = 0
     while True:

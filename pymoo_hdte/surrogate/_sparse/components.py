@@ -189,7 +189,7 @@ class PartOfField:
         """Every run minus what the others predict there, shape (n,)."""
         return self._field.left_out[:, self._place]
 
-    def errors(self, judged: Judged, least: float) -> tuple[Array, Array]:
+    def errors(self, judged: Judged, least: float, counted: bool = False) -> tuple[Array, Array]:
         """Return expected errors of mean and deviation as shares of the scatter, shape (v,) each.
 
         Parameters
@@ -197,6 +197,8 @@ class PartOfField:
         judged : Judged
         least : float
             Scatter below which it counts as this, in the response's unit.
+        counted : bool
+            Of no effect: what runs scatter by themselves is an error here in any case.
         """
         scatter, mean, std = (part[:, self._place] for part in self._field.errors(judged))
         unit = np.maximum(scatter, least)

@@ -91,7 +91,8 @@ class Regression:
         shares = np.ones(len(values)) if shares is None else shares
         self.parameters, self.noise = _learnt(features, standard, start, shares)
         self.variance, _ = variances(self.parameters, len(features[0]))
-        matrix = _with_nugget(covariance(features, features, self.variance), self.noise * shares)
+        self._noises = self.noise * shares
+        matrix = _with_nugget(covariance(features, features, self.variance), self._noises)
         self._lower = cholesky(matrix, lower=True)
         self._inverse = cho_solve((self._lower, True), np.eye(len(values)))
         self.weights = self._inverse @ standard
@@ -115,6 +116,15 @@ class Regression:
         Its squares, summed over the runs, are what the prior variance shrinks by.
         """
         return np.asarray(solve_triangular(self._lower, across, lower=True))
+
+    def spread_by_noise(self, features: list[Array], functionals: Array) -> Array:
+        """Return what of `spread` is due to the runs' own scatter, the same shape and unit.
+
+        A sum over points is one over runs, each of which scatters independently of the others.
+        """
+        across = covariance(self._features, features, self.variance)
+        of_runs = self._inverse @ (across @ functionals.T)
+        return self.unit * np.sqrt(self.size * (self._noises @ of_runs**2))
 
     def spread(self, features: list[Array], functionals: Array) -> Array:
         """Return the standard deviation of sums over points, shape (f,), in the response's unit.
