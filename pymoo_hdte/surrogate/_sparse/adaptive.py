@@ -49,6 +49,10 @@ JUDGED_DRAWS = 128
 """Designs, and draws of the scatter at each, at which errors are judged."""
 DEGREES = (6, 40)
 """Least and largest degree in one variable; between them a third of the runs."""
+OTHERS_AGAIN = 1.5
+"""Ratio of runs from where no other surrogate was better to where one is tried again."""
+DENSE = 1500
+"""Points at which another surrogate than a polynomial is made one."""
 LARGEST_ACCURACY = 0.01
 """Requested accuracy above which no more terms are left out."""
 SMALLEST_SCATTER = 0.1
@@ -146,6 +150,9 @@ class _SurrogateBuild:
         self.spread = SpreadPoints(axes, random_state)
         self.designs = draw_designs(axes, JUDGED_DESIGNS, random_state)
         self.draws = draw_around(axes, self.designs, JUDGED_DRAWS, random_state)
+        # Of points at which only surrogates are evaluated.
+        self.dense = SpreadPoints(axes, np.random.default_rng(0)).next(DENSE)
+        self.process, self.others_from = True, 0
         self.points, self.truth = np.empty((0, len(axes))), np.empty((0, 0))
         self.parameters: list[Array] = []
         self.own_parameters: list[Array] = []
@@ -200,8 +207,18 @@ class _SurrogateBuild:
         judged = Judged.at(self.draws[0], weights_of_draws, polynomials)
         weights = relevance(self.axes, points)
         fits, self.parameters = fitted_together(
-            features, truth, weights, judged, self.lost, self.parameters
+            features,
+            truth,
+            weights,
+            judged,
+            self.lost,
+            self.parameters,
+            (lambda: polynomials(self.dense)) if self.n_runs >= self.others_from else None,
+            self.process,
         )
+        plain = all(isinstance(fit, PartOfField) or fit.plain for fit in fits)
+        if plain and self.n_runs >= self.others_from:
+            self.others_from = int(OTHERS_AGAIN * self.n_runs)
         own: SparsePolynomial | None = None
         own_fits: Sequence[ResponseFit | PartOfField] = []
         if self.is_random:
