@@ -187,8 +187,8 @@ print(f"with logarithms: {wide.n_runs} runs")
 # the same call goes on from there and makes no run twice. Where the study had come to its end, or
 # the simulator's source, state or globals have changed since, the first run is made again, to see
 # whether the file is this simulator's. Files that it reads and programs that it calls are not seen:
-# delete the file where these have changed. A run that raises or gives NaN is made again, then it has
-# failed; the coordinates are in ``problem.failed``.
+# delete the file where these have changed. A run that raises or gives NaN is made again before it
+# counts as failed; the coordinates are in ``problem.failed``.
 # :ref:`Three simulators <sphx_glr_auto_guides_robust_examples.py>` shows an equation of motion, a
 # program that is called by `subprocess`, and the drive.
 
