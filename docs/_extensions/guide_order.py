@@ -4,6 +4,7 @@ ORDER = (
     "robust_simulator.py",
     "robust_examples.py",
     "robust_reliability.py",
+    "robust_failures.py",
     "robust_study.py",
     "drive_data_sheet.py",
     "own_problem.py",

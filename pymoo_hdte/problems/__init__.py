@@ -1,6 +1,7 @@
 """Robust design problems for pymoo."""
 
 from pymoo_hdte.problems._simulator.crashes import CrashProbability
+from pymoo_hdte.problems._simulator.data import Runs
 from pymoo_hdte.problems._simulator.direct import DirectProblem
 from pymoo_hdte.problems._simulator.existing import Robust
 from pymoo_hdte.problems._simulator.inputs import Design
@@ -53,6 +54,7 @@ __all__ = [
     "RobustDTETolerance",
     "RobustProblem",
     "RobustToy",
+    "Runs",
     "SimulatorFailed",
     "SimulatorProblem",
     "Std",

@@ -105,7 +105,7 @@ class Simulator:
         if file and file.goes_on:
             file.retry_within(workers.time_limit)
             self._given_up |= set(file.failures)
-        elif file:
+        elif file and takes_seed is not False:
             file.check(self.again)
 
     def check_data(self, X: Array, Y: Array, responses: tuple[str, ...]) -> None:
@@ -240,7 +240,8 @@ class Simulator:
         if self.takes_seed is not None:
             seed = inputs.pop(self.names[-1])
             if self.takes_seed:
-                inputs[self.names[-1]] = np.asarray(seed, dtype=int)[()]
+                single = np.ndim(seed) == 0
+                inputs[self.names[-1]] = int(seed) if single else np.asarray(seed, dtype=int)
         return inputs
 
     def _on_workers(

@@ -77,7 +77,7 @@ def test_files_and_data_hold_its_own_scatter(problem, tmp_path):
         robust_problem(None, *INPUTS, data=single, replicates=2, progress=False)
 
 
-def test_seeds_differ_from_run_to_run_and_a_study_is_repeatable():
+def test_seeds_differ_from_run_to_run_and_a_study_is_repeatable(tmp_path):
     seeds = []
 
     def noted(x, a, seed):
@@ -88,9 +88,15 @@ def test_seeds_differ_from_run_to_run_and_a_study_is_repeatable():
     first, second = (robust_problem(noted, *INPUTS, **options) for _ in range(2))
     assert np.array_equal(first.evaluate(X), second.evaluate(X))
     half = len(seeds) // 2
+    for further in (half, 0):
+        made = len(seeds)
+        third = robust_problem(noted, *INPUTS, **options, cache=tmp_path / "runs.jsonl")
+        assert len(seeds) - made in (further, further + 1)
+        assert np.array_equal(third.evaluate(X), first.evaluate(X))
+    seeds = seeds[: 2 * half]
     assert seeds[:half] == seeds[half:]
     assert len(set(seeds)) == half == first.n_runs
-    assert all(type(seed) is int or isinstance(seed, np.integer) for seed in seeds)
+    assert all(type(seed) is int for seed in seeds)
 
 
 def test_one_that_takes_no_seed_is_repeated_if_told_so():
