@@ -38,6 +38,11 @@ EXACT = 1e-3
 They are chosen by all runs, so that their own error is told too small; polynomials of low degree
 give ratios of 1e-6 and less.
 """
+LEAST_JUDGED = 1e-2
+"""Scatter below which errors of two surrogates are compared as if it were this.
+
+As a share of the response's deviation over all runs.
+"""
 MOST_CONVERTED = 3000
 """Terms that are looked at where another surrogate is made a polynomial."""
 MOST_FITTED = 0.4
@@ -172,12 +177,12 @@ def fitted(
         return plain
     converted = _converted(other, dense(), judged, lost)
     # A polynomial may follow it less well than it follows the response.
-    return min((plain, converted), key=lambda fit: _judged_error(fit, judged))
+    least = LEAST_JUDGED * float(np.std(values))
 
+    def error(fit: ResponseFit) -> float:
+        return float(np.max(np.sqrt(np.mean(np.square(fit.errors(judged, least)), axis=1))))
 
-def _judged_error(fit: ResponseFit, judged: Judged) -> float:
-    """Return the larger error of mean and deviation, in the response's unit."""
-    return float(np.max(np.sqrt(np.mean(np.square(fit.errors(judged, 1.0)), axis=1))))
+    return min((plain, converted), key=error)
 
 
 def _plain(
@@ -213,7 +218,7 @@ def _converted(
 ) -> ResponseFit:
     """Return a polynomial of another surrogate."""
     values = surrogate.predict(dense)
-    regression = Regression(dense, values, np.ones(len(values)))
+    regression = Regression(dense, values, np.ones(len(values)), noisy=False)
     scatters = [
         _std(surrogate.predict(features), weights)
         for features, weights in zip(judged.features, judged.weights, strict=True)

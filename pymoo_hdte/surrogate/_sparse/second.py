@@ -9,6 +9,7 @@ stated error.
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
@@ -139,6 +140,7 @@ class Process:
     def __init__(
         self, features: list[Array], values: Array, relevance: Array, start: Array | None
     ) -> None:
+        from sklearn.exceptions import ConvergenceWarning
         from sklearn.gaussian_process import GaussianProcessRegressor, kernels
 
         self.parameters = np.tile((np.log(0.1), 0.0, 0.0), (len(features), 1))
@@ -151,7 +153,10 @@ class Process:
             np.full(d, 1.0), (0.05, 100.0), nu=1.5
         ) + kernels.WhiteKernel(1e-6, (1e-10, 1.0))
         self._model = GaussianProcessRegressor(kernel, alpha=0.0)
-        self._model.fit(points, (values - self._centre) / self._unit)
+        with warnings.catch_warnings():
+            # A length at its bound says that an input has no influence.
+            warnings.simplefilter("ignore", ConvergenceWarning)
+            self._model.fit(points, (values - self._centre) / self._unit)
         self._covariance: Any = self._model.kernel_.k1
         noise = float(self._model.kernel_.k2.noise_level)
         self.noise_std = self._unit * float(np.sqrt(noise))
