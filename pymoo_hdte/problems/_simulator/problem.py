@@ -5,13 +5,14 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pymoo.core.problem import Problem
 
 from pymoo_hdte.checks import InvalidInput, finite_array
+from pymoo_hdte.problems._simulator import plots
 from pymoo_hdte.problems._simulator.around import RESOLVED, Around, CommonSamples
 from pymoo_hdte.problems._simulator.crashes import CrashProbability, SuccessMoments
 from pymoo_hdte.problems._simulator.data import Runs
@@ -25,6 +26,9 @@ from pymoo_hdte.surrogate._sparse.draws import draw_designs
 from pymoo_hdte.surrogate.box import Box
 from pymoo_hdte.surrogate.moments import divide_or_zero
 from pymoo_hdte.surrogate.sensitivity import SobolIndices
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 Array = NDArray[np.float64]
 
@@ -282,6 +286,103 @@ class SimulatorProblem(Problem):
         expansion = moments.expansion(point)[0, place]
         variance, first_order, total = moments.divided_variance(expansion)
         return SobolIndices(self.input_names, float(expansion[0]), variance, first_order, total)
+
+    def scatter(self, design: ArrayLike, response: str | None = None) -> tuple[str, Array]:
+        """Return the name of a response and its values at the common samples around a design.
+
+        Parameters
+        ----------
+        design : array_like, shape (n_var,)
+            In the variables' units.
+        response : str, optional
+            Its name, where there are several.
+
+        Returns
+        -------
+        name : str
+        values : ndarray, shape (4096,)
+            Of the surrogate, in the response's unit.
+
+        Raises
+        ------
+        ExtrapolationError
+            If the design lies outside the box.
+        InvalidInput
+            If there is no such response, or the design has another shape.
+        """
+        place = place_of(Statistic(response=response), self.responses)
+        point = self.design_box.settle(finite_array("design", design, (self.n_var,))[None])
+        return self.responses[place], self._around(point)[place].samples[0][0]
+
+    def plot_front(self, result: Any, axes: Axes | None = None) -> Axes:
+        """Draw the first two objectives of a result with their error bands.
+
+        Parameters
+        ----------
+        result : pymoo.core.result.Result
+            Of this problem; with a single objective, that is drawn over the first variable.
+        axes : matplotlib.axes.Axes, optional
+            Where to draw; by default on a new figure.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+        """
+        return plots.plot_front(self, result, axes)
+
+    def plot_scatter(
+        self, design: ArrayLike, response: str | None = None, axes: Axes | None = None
+    ) -> Axes:
+        """Draw how a response scatters around a design.
+
+        Parameters
+        ----------
+        design : array_like, shape (n_var,)
+            In the variables' units.
+        response : str, optional
+            Its name, where there are several.
+        axes : matplotlib.axes.Axes, optional
+            Where to draw; by default on a new figure.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+
+        Raises
+        ------
+        ExtrapolationError, InvalidInput
+            As `scatter`.
+        """
+        return plots.plot_scatter(self, design, response, axes)
+
+    def report(
+        self,
+        path: str | os.PathLike[str],
+        result: Any = None,
+        design: ArrayLike | None = None,
+    ) -> None:
+        """Write one HTML page: responses, errors, Sobol indices, the front, one design's scatter.
+
+        Parameters
+        ----------
+        path : str or path-like
+            The file; it needs no other.
+        result : pymoo.core.result.Result, optional
+            Whose front is shown.
+        design : array_like, shape (n_var,), optional
+            In the variables' units; by default the design of the result that is nearest to the best
+            of every objective.
+
+        Raises
+        ------
+        InvalidInput
+            If neither a result nor a design is given.
+        OSError
+            If the file cannot be written.
+        """
+        text = plots.page(self, result, design)
+        with open(path, "w", encoding="utf-8") as stream:
+            stream.write(text)
 
     def _around(self, X: Array) -> list[Around]:
         """Return the expansion of each response around the designs."""
