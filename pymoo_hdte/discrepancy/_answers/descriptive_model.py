@@ -30,7 +30,7 @@ from pymoo_hdte.discrepancy._evidence.force_balances.unexplained import (
     root_mean_square,
 )
 from pymoo_hdte.discrepancy._records.rig_model import MechanismModel
-from pymoo_hdte.discrepancy._records.rig_records import SPLIT
+from pymoo_hdte.discrepancy._records.split import SPLIT
 from pymoo_hdte.discrepancy._selection.candidate import Candidate
 from pymoo_hdte.discrepancy._verdicts.mechanism_finding import MechanismFinding
 from pymoo_hdte.discrepancy._verdicts.mechanism_simulation import laws_of

@@ -186,6 +186,7 @@ def _lines_beyond(half: Half, joint: Joint, cutoff: float, rules: Rules) -> Ripp
                 name: record.channels[name],
                 ANGLE: motion_at_port(gear, dict(record.channels), still).position,
             },
+            context=record.context,
         )
         for record in half.records
     ]
