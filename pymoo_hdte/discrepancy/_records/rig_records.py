@@ -199,7 +199,7 @@ def read_records(
     if listed.sha256 is not None:
         _check_sha256(*listed.sha256, listed.place)
     layout, notes = _with_positions(listed, coordinates)
-    records = []
+    records: list[Record] = []
     tables = [
         (name if len(pieces) == 1 else f"{name}_{number}", role, table)
         for name, role, part in listed.parts

@@ -66,7 +66,7 @@ class Block(NamedTuple):
     stop: float
 
 
-DEFAULT = (Block("train", 0.0, SPLIT), Block("held_out", SPLIT, 1.0))
+DEFAULT: tuple[Block, ...] = (Block("train", 0.0, SPLIT), Block("held_out", SPLIT, 1.0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,7 +110,7 @@ def split_of(mechanism: Mechanism, pieces: Sequence[Record], cutoff: float | Non
         # What is wrong is told where the record is analysed.
         return Split()
     default = moments.error(DEFAULT)
-    best = [(default, DEFAULT)]
+    best: list[tuple[float, tuple[Block, ...]]] = [(default, DEFAULT)]
     for splits in _splits():
         possible = ((moments.error(split), split) for split in splits if moments.room(split))
         error, split = min(possible, default=(math.inf, DEFAULT))
@@ -227,7 +227,7 @@ class _Moments:
 
         Combinations that the sensor makes, as of two columns that are alike, do not move.
         """
-        count = max(np.count_nonzero(np.any(rows != 0.0, axis=1)), 1)
+        count = max(int(np.count_nonzero(np.any(rows != 0.0, axis=1))), 1)
         scale = np.linalg.norm(rows, axis=0) / count**0.5
         moves = scale > 0.0
         rows, noise = rows[:, moves] / scale[moves], noise[moves] / scale[moves] ** 2
@@ -266,6 +266,8 @@ class _Moments:
             for known, asked in (ROLES, ROLES[::-1]):
                 values = float(total(self._values, asked))
                 learned = total(sums, known)
+                if not len(learned):
+                    continue
                 if values <= 0.0 or np.linalg.matrix_rank(learned, hermitian=True) < len(learned):
                     return math.inf
                 # Of as many rows as there are independent values in each part.
