@@ -187,6 +187,7 @@ def limits(finding: MechanismFinding) -> list[str]:
         if name in finding.judged_by_balance and finding.simulated
     ]
     sentences += _delays_told(finding)
+    sentences += _gains_told(finding)
     sentences += _not_validated(finding)
     if not any(record.role == "held_out" for record in finding.records):
         sentences.append("No record was held out: the correction is not validated.")
@@ -208,6 +209,23 @@ def _delays_told(finding: MechanismFinding) -> list[str]:
                 f"than its column says ({middle - spread:.3g} to {middle + spread:.3g}, "
                 f"{abs(delay.samples):.2g} samples), by the phase of the force balance. It is "
                 f"not corrected; inputs.{delay.input}.delay in the rig's file does so."
+            )
+    return sentences
+
+
+def _gains_told(finding: MechanismFinding) -> list[str]:
+    """Return a sentence on each gain of an input whose interval excludes one."""
+    sentences = []
+    for gain in finding.gains:
+        if gain.evident:
+            lower, upper = gain.lower, gain.upper
+            times = f"{lower:.3g} to {upper:.3g}" if upper < np.inf else f"at least {lower:.3g}"
+            stated = " and ".join(gain.quantities)
+            sentences.append(
+                f"{gain.input} is {times} times what its column says (95 %), if the stated "
+                f"{stated} {'is' if len(gain.quantities) == 1 else 'are'} right. It is not "
+                f"corrected; a tolerance for inputs.{gain.input}.gain in the rig's file, beside an "
+                "inertia or a stiffness without one, does so."
             )
     return sentences
 

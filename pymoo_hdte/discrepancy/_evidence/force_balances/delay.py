@@ -8,11 +8,11 @@ port, so that what the base lacks does not pass for a delay (as sensor delays in
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from scipy.stats import t
 
 from pymoo_hdte.discrepancy._evidence.force_balances.evidence import MeasuredData
@@ -82,8 +82,11 @@ def _delay(data: MeasuredData, name: str, laws: tuple[LawAt, ...]) -> Delay | No
     period = 1.0 / data.spectra[0].cutoff
     half, value = _QUOTIENT * period, 0.0
     for _ in range(_ROUNDS):
-        early, late = _force(data, name, value - half), _force(data, name, value + half)
-        force, slope = _force(data, name, value), (late - early) / (2.0 * half)
+        early, late = (
+            force_of_input(data, name, value - half),
+            force_of_input(data, name, value + half),
+        )
+        force, slope = force_of_input(data, name, value), (late - early) / (2.0 * half)
         change = _change(force, slope, columns, every)
         value += float(np.clip(change, -0.25 * period, 0.25 * period))
         if not abs(value) < _LONGEST * period:
@@ -92,13 +95,30 @@ def _delay(data: MeasuredData, name: str, laws: tuple[LawAt, ...]) -> Delay | No
             break
     else:
         return None
-    # Without each range in turn (Tukey's jackknife), because the residual of a model is not white.
-    ranges = np.array_split(np.argsort(data.frequency, kind="stable"), _RANGES)
-    changes = np.array([_change(force, slope, columns, np.setdiff1d(every, one)) for one in ranges])
-    variance = (_RANGES - 1.0) / _RANGES * np.sum((changes - changes.mean()) ** 2)
-    spread = float(t.ppf(0.975, _RANGES - 1) * variance**0.5)
+    _, spread = jackknifed(data, lambda rows: _change(force, slope, columns, rows))
     slowest = max(one.record.step for one in data.spectra)
-    return Delay(name, value, spread, value / slowest) if spread < period else None
+    return Delay(name, value, float(spread), value / slowest) if spread < period else None
+
+
+def jackknifed(
+    data: MeasuredData, estimate: Callable[[NDArray[np.int_]], ArrayLike]
+) -> tuple[Values, Values]:
+    """Return an estimate, and half the width of its 95 % interval.
+
+    Without each range of frequency in turn (Tukey's jackknife), because the residual of a model is
+    not white.
+
+    Parameters
+    ----------
+    data : MeasuredData
+    estimate : callable
+        From the rows that it may use.
+    """
+    every = np.arange(len(data.frequency))
+    ranges = np.array_split(np.argsort(data.frequency, kind="stable"), _RANGES)
+    without = np.array([estimate(np.setdiff1d(every, one)) for one in ranges])
+    variance = (_RANGES - 1.0) * np.var(without, axis=0)
+    return np.asarray(estimate(every)), np.asarray(t.ppf(0.975, _RANGES - 1) * variance**0.5)
 
 
 def _change(force: Values, slope: Values, columns: Values, rows: NDArray[np.int_]) -> float:
@@ -110,27 +130,37 @@ def _change(force: Values, slope: Values, columns: Values, rows: NDArray[np.int_
     return -float(moved @ unexplained) / power if power else float("nan")
 
 
-def _force(data: MeasuredData, name: str, delay: float) -> Values:
+def force_of_input(data: MeasuredData, name: str, delay: float) -> Values:
     """Return the whitened force of an input, (n,), at its believed gain."""
     (gain,) = (one.gain.value for one in data.mechanism.inputs if one.name == name)
-    return _whitened(data, [gain * one.of_input(name, delay) for one in data.spectra])
+    return in_units_of_noise(data, [gain * one.of_input(name, delay) for one in data.spectra])
 
 
 def _columns(data: MeasuredData, name: str, laws: tuple[LawAt, ...]) -> Values:
     """Return the whitened forces, (n, columns), of all that is fitted with a delay."""
-    quantities = [one.name for one in data.base if one.name != f"gain of {name}"]
     slopes = [
-        data._linear[1][:, place] for place, one in enumerate(data.base) if one.name in quantities
+        data._linear[1][:, place]
+        for place, one in enumerate(data.base)
+        if one.name != f"gain of {name}"
     ]
-    forces = [_whitened(data, [one.forces([law]) for one in data.spectra]) for law in laws]
-    shapes = [list(_shapes(one, data)) for one in data.spectra]
-    forces += [_whitened(data, list(each)) for each in zip(*shapes, strict=True)]
-    for other in data.mechanism.inputs:
-        if other.name != name:
-            forces.append(_force(data, other.name, 0.0))
-    columns = np.column_stack([*slopes, *forces])
+    columns = np.column_stack([*slopes, *free_forces(data, name, laws)])
     scale = np.linalg.norm(columns, axis=0)
     return np.asarray(columns[:, scale > 0.0] / scale[scale > 0.0])
+
+
+def free_forces(data: MeasuredData, name: str, laws: tuple[LawAt, ...]) -> list[Values]:
+    """Return the whitened forces, (n,) each, of which the size is free beside an input.
+
+    Those of laws, of friction, gravity and a constant at each port, and of the other inputs.
+    """
+    forces = [in_units_of_noise(data, [one.forces([law]) for one in data.spectra]) for law in laws]
+    shapes = [list(_shapes(one, data)) for one in data.spectra]
+    forces += [in_units_of_noise(data, list(each)) for each in zip(*shapes, strict=True)]
+    return forces + [
+        force_of_input(data, other.name, 0.0)
+        for other in data.mechanism.inputs
+        if other.name != name
+    ]
 
 
 def _shapes(balance: ForceBalance, data: MeasuredData) -> Iterator[Values]:
@@ -145,7 +175,7 @@ def _shapes(balance: ForceBalance, data: MeasuredData) -> Iterator[Values]:
                 yield balance.of_port(port.name, np.cos(motion.position))
 
 
-def _whitened(data: MeasuredData, coefficients: list[Values]) -> Values:
+def in_units_of_noise(data: MeasuredData, coefficients: list[Values]) -> Values:
     """Return coefficients (n_balances, n_bins) of each record in units of its noise, (n,)."""
     return np.concatenate(
         [
