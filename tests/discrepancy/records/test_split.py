@@ -1,5 +1,7 @@
 """Which rows of a log without roles are fitted, and which are held out."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -96,7 +98,7 @@ file = "log.csv"
 def test_blocks_divide_a_record_and_keep_the_shares(periods, phase):
     blocks = _blocks(periods, phase)
     assert (blocks[0].start, blocks[-1].stop) == (0.0, 1.0)
-    for one, after in zip(blocks, blocks[1:], strict=False):
+    for one, after in pairwise(blocks):
         assert one.stop == after.start
         assert one.role != after.role
     fitted = sum(one.stop - one.start for one in blocks if one.role == "train")
@@ -173,7 +175,7 @@ def test_a_push_in_one_log_is_fitted_and_proved(tmp_path):
     assert effect.law.level == pytest.approx(LEVEL, rel=0.05)
     # Rows of a force balance belong to one record only.
     times = [ForceBalance(AXIS, one, analysis.finding.cutoff).time for one in records]
-    for one, after in zip(times, times[1:], strict=False):
+    for one, after in pairwise(times):
         assert one[-1] < after[0]
     simulated = [one for record in analysis.finding.simulated for one in record.time]
     for balance in analysis.finding.data.spectra:

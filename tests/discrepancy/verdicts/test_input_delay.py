@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.signal import StateSpace, butter, lsim, sosfilt
 
 from pymoo_hdte.discrepancy._evidence.force_balances.delay import delays
 from pymoo_hdte.discrepancy._evidence.force_balances.evidence import measured_data
@@ -10,6 +11,7 @@ from pymoo_hdte.discrepancy._records.rig_model import (
     model_text,
     read_mechanism_model,
 )
+from pymoo_hdte.discrepancy._selection.fitting import fit
 from pymoo_hdte.discrepancy._verdicts.mechanism import examine_mechanism
 from pymoo_hdte.mechanism import BelievedValue, Input, Mechanism, Port, Record
 
@@ -53,12 +55,49 @@ def test_a_part_of_a_sample_is_estimated_within_its_interval(delay, missing):
     assert found.evident
     assert found.samples == pytest.approx(found.value / STEP)
     assert abs(found.value - delay * STEP) < 2.0 * found.spread
-    assert found.spread < 0.1 * STEP
+    assert found.spread < 0.3 * STEP
 
 
 def test_no_delay_is_evident_where_there_is_none():
     data = [measured_data(joint(), [record_of(0.0, LEVEL, seed=seed)], CUTOFF) for seed in range(9)]
     assert sum(delays(one)[0].evident for one in data) <= 1
+
+
+def in_a_loop(seed):
+    """Return a record of the joint under control, moved as much by an unseen torque as by it."""
+    rng = np.random.default_rng(seed)
+    time = STEP * np.arange(6000)
+    tones, phases = rng.uniform(0.2, 3.0, (9, 1)), rng.uniform(0.0, 6.3, (9, 1))
+    turned = 2.0 * np.pi * tones * time + phases
+    wanted = 0.02 * np.sum(np.sin(turned), axis=0)
+    speed = 0.02 * np.sum(2.0 * np.pi * tones * np.cos(turned), axis=0)
+    unseen = sosfilt(butter(2, 3.0, fs=1.0 / STEP, output="sos"), rng.standard_normal(len(time)))
+    unseen *= 2.0 / unseen.std()
+    stiff, damped = 200.0, 20.0
+    loop = StateSpace(
+        [[0.0, 1.0], [-stiff / INERTIA, -(DAMPING + damped) / INERTIA]],
+        [[0.0, 0.0, 0.0], [stiff / INERTIA, damped / INERTIA, 1.0 / INERTIA]],
+        [[1.0, 0.0], [-stiff, -damped]],
+        [[0.0, 0.0, 0.0], [stiff, damped, 0.0]],
+    )
+    _, (q, torque), _ = [
+        *map(np.transpose, lsim(loop, np.column_stack([wanted, speed, unseen]), time))
+    ]
+    noise = rng.standard_normal((2, len(time)))
+    channels = {"q": q + 1e-5 * noise[0], "torque": torque + 0.01 * noise[1]}
+    return Record("loop", "train", time, channels)
+
+
+def test_a_disturbance_in_a_loop_is_no_delay():
+    """The motion answers to what is unseen, and the controller to the motion."""
+    found = []
+    for seed in range(10):
+        data = measured_data(joint(), [in_a_loop(seed)], 10.0)
+        found += delays(data.with_residual_as_noise(fit(data).residuals))
+    assert len(found) > 5
+    assert np.mean([one.value for one in found]) > 3.0 * STEP / 2.0
+    # Of 95 % intervals three of twelve miss in one of fifty such tests.
+    assert sum(one.evident for one in found) < 3
 
 
 @pytest.mark.parametrize("stated", [3.4 * STEP, None])
