@@ -23,7 +23,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pymoo_hdte.checks import InvalidInput
-from pymoo_hdte.discrepancy._selection.rules import RULES
 from pymoo_hdte.mechanism import Mechanism, Record
 from pymoo_hdte.mechanism.motion import (
     highest_frequency,
@@ -44,6 +43,8 @@ _MOST_PERIODS = 8
 """Largest number of held-out blocks, but for one that is cut by the ends of the record."""
 _PHASES = 20
 """Places at which the first held-out block may begin, in a period of the blocks."""
+_ENOUGH = 2.0
+"""Ratio of mean square errors up to which a split adds less than what no split avoids."""
 _FADING = 0.2
 """Speed at which a friction has faded, in units of the highest: the largest that is tried first."""
 _STANDS_OUT = 4.0
@@ -92,8 +93,8 @@ class Split:
 def split_of(mechanism: Mechanism, pieces: Sequence[Record], cutoff: float | None = None) -> Split:
     """Return the blocks of a record: the default, unless others are clearly expected to prove more.
 
-    Of the splits that are expected to do about as well as the best one, within
-    `Rules.parsimony_ratio`, the one with the fewest blocks is taken, the default first.
+    Of the splits that add to the least error that can be expected no more than this error, the one
+    with the fewest blocks is taken, the default first.
 
     Parameters
     ----------
@@ -116,7 +117,7 @@ def split_of(mechanism: Mechanism, pieces: Sequence[Record], cutoff: float | Non
         error, split = min(possible, default=(math.inf, DEFAULT))
         if _long_enough(mechanism, pieces, split, moments.beside, cutoff):
             best.append((error, split))
-    most = RULES.parsimony_ratio * min(error for error, _ in best)
+    most = _ENOUGH * min(error for error, _ in best)
     error, blocks = next((error, split) for error, split in best if error <= most)
     beside = 0.0 if blocks == DEFAULT else moments.beside
     return Split(blocks, beside, default**0.5, error**0.5)
