@@ -157,16 +157,16 @@ def _division(blocks: Sequence[Block], split: Split) -> str:
         for block in blocks
         if block.role == ROLES[1]
     )
+    first = f"its first {100.0 * SPLIT:.0f} %"
     expected = (
-        "say nothing about some of the motion of the others"
+        f"{first} hold nothing of some of it, or the others do"
         if math.isinf(split.by_default)
-        else f"would make {split.by_default:.2g} times the error in the others or the reverse, "
-        f"{split.chosen:.2g} times with these"
+        else f"with {first} an error of {split.by_default:.2g} times the noise is to be expected "
+        f"where a part is predicted from the other, with these rows {split.chosen:.2g} times"
     )
     return (
-        f"Rows from {held_out} of the file are held out and the others are fitted, so that both "
-        f"parts hold the directions, speeds and accelerations that occur: its first "
-        f"{100.0 * SPLIT:.0f} % alone {expected}."
+        f"Rows from {held_out} of the file are held out and the others are fitted, because both "
+        f"parts then hold the directions, speeds and accelerations that occur: {expected}."
     )
 
 
