@@ -53,14 +53,24 @@ def position_orders(data: MeasuredData, base: Fit) -> dict[str, tuple[float, ...
             residual = np.array(list(shares.values())) @ residual_by_row[rows]
             position, step = balance.ports[port.name].shaft, balance.time[1] - balance.time[0]
             band = float(balance.frequency[balance.kept[rows].any(axis=0)].max())
-            highest = min(_finest_order(position), _order_within(band, position, float(step)))
+            highest = min(_finest_order(position), order_within(band, position, float(step)))
             signals.append((position, _detrended(balance.in_time(residual)), highest))
         orders[port.name] = _strongest(signals, data.rules)
     return orders
 
 
-def _order_within(band: float, position: Values, step: float) -> float:
-    """Return the highest order whose frequency, Hz, is within a band on half of the travel."""
+def order_within(band: float, position: Values, step: float) -> float:
+    """Return the highest order whose frequency is within a band, Hz, on half of the travel.
+
+    Parameters
+    ----------
+    band : float
+        Hz.
+    position : ndarray, shape (n,)
+        rad or m.
+    step : float
+        s.
+    """
     ways = np.sort(np.abs(np.diff(position)))
     travelled = np.cumsum(ways)
     half = float(ways[np.searchsorted(travelled, 0.5 * travelled[-1])])
