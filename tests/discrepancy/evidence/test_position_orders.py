@@ -1,11 +1,15 @@
 """Orders of the position that a force balance shows within its band."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from pymoo_hdte.discrepancy._evidence.force_balances.evidence import measured_data
 from pymoo_hdte.discrepancy._evidence.force_balances.orders import position_orders
 from pymoo_hdte.discrepancy._selection.fitting import fit
+from pymoo_hdte.discrepancy._selection.rules import RULES
+from pymoo_hdte.discrepancy._verdicts.joint_torsion import _low_orders
 from pymoo_hdte.mechanism import BelievedValue, Input, Mechanism, Port, Record
 
 STEP, CUTOFF = 0.002, 15.0
@@ -37,3 +41,15 @@ def test_an_order_within_the_band_is_seen():
 def test_an_order_that_is_within_the_band_only_while_the_joint_creeps_is_not():
     """At 1.5 rad/s the band of 15 Hz ends at order 63."""
     assert all(order < 2.0 * np.pi * CUTOFF / 1.4 for order in shown(300.0))
+
+
+@pytest.mark.parametrize(("seconds", "expected"), [(4.0, True), (0.2, False)])
+def test_a_way_that_takes_less_than_a_period_of_the_band_resolves_no_order(seconds, expected):
+    """The lowest order that a hundredth of a radian resolves has one period on it."""
+    time = STEP * np.arange(2500)
+    shaft = 0.01 * np.minimum(time / seconds, 1.0)
+    (port,) = JOINT.ports
+    motions = {port.name: SimpleNamespace(shaft=shaft)}
+    balance = SimpleNamespace(ports=motions, time=time, cutoff=1.0)
+    data = SimpleNamespace(spectra=[balance], rules=RULES)
+    assert bool(_low_orders(data, port, ())) == expected
