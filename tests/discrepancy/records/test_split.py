@@ -12,6 +12,7 @@ from pymoo_hdte.discrepancy._records.split import DEFAULT, SPLIT, _blocks, _Mome
 from pymoo_hdte.mechanism import BelievedValue, Input, Mechanism, Port, Record
 from pymoo_hdte.mechanism.balances import ForceBalance
 from pymoo_hdte.mechanism.motion import margin_of
+from pymoo_hdte.mechanism.resampling import refined
 
 MASS, DAMPING, LEVEL = 25.0, 40.0, 18.0
 STEP, CUTOFF = 0.002, 30.0
@@ -185,3 +186,16 @@ def test_a_push_in_one_log_is_fitted_and_proved(tmp_path):
 def test_a_stated_role_is_kept(tmp_path):
     (record,) = rig(tmp_path, record_of(one_push()), 'role = "train"').records
     assert len(record.time) == len(one_push())
+
+
+def test_rows_of_other_records_stay_marked_at_other_rates_and_delays():
+    """A row that belongs to another record has its time in no force balance."""
+    position = steady(3000)
+    time = STEP * np.arange(len(position))
+    channels = {"x": position, "force": np.gradient(position, STEP)}
+    own = 400, 2300
+    one = Record("part", "train", time, channels, context=(own[0], len(time) - 1 - own[1]))
+    for changed in (one, one.finer(3), refined(one, 2), one.with_delays({"force": 11.4 * STEP})):
+        balance = ForceBalance(AXIS, changed, CUTOFF)
+        assert own[0] * STEP - 1e-9 <= balance.time[0] < (own[0] + 20) * STEP
+        assert (own[1] - 60) * STEP < balance.time[-1] <= own[1] * STEP + 1e-9
