@@ -15,7 +15,7 @@ from pymoo_hdte.algorithms.compact import size_for
 from pymoo_hdte.algorithms.horizon import evaluation_limit
 from pymoo_hdte.algorithms.moves import NeighbourDifference, nearest_in_objectives
 from pymoo_hdte.algorithms.points import Points
-from pymoo_hdte.algorithms.quadratic import ModelStep, Quadratic, fitted, lowest_within
+from pymoo_hdte.algorithms.quadratic import ModelStep, Quadratic, Span, fitted, lowest_within
 from pymoo_hdte.algorithms.spread import most_spread
 
 D = 5
@@ -216,6 +216,29 @@ def test_no_place_within_the_radius_is_lower(rng, signs):
         inside = directions * radius * rng.random((2000, 1)) ** 0.2
         found = values(place[np.newaxis])[0]
         assert found <= values(inside).min() + 1e-3 * abs(found)
+
+
+def test_the_lowest_place_in_many_variables_lies_in_the_span_of_the_points(rng):
+    """Found in the coordinates of the span, it is as low as the one of the model as a whole."""
+    Z = 0.2 * rng.standard_normal((30, 200))
+    Z[0] = 0.0
+    F = np.column_stack([Z[:, 0] + 0.3 * Z[:, 1] ** 2, (Z[:, :5] ** 2).sum(axis=1) - 0.2 * Z[:, 2]])
+    weights = np.array([[0.5, 0.5], [0.0, 1.0], [1.0, 0.0]])
+    which, radii = np.array([0, 1, 2, 0]), np.array([0.1, 0.5, 1.0, 1.0])
+    whole = fitted(Z, F).weighted(weights)
+    span = Span.of(Z)
+    places = span.lowest(fitted(span.places, F).weighted(weights), which, radii)
+
+    def values(at):
+        slopes = np.einsum("ki,ki->k", whole.gradient[which], at)
+        return slopes + 0.5 * np.einsum("ki,kij,kj->k", at, whole.hessian[which], at)
+
+    np.testing.assert_allclose(
+        values(places), values(lowest_within(whole, which, radii)), rtol=1e-3
+    )
+    assert np.all(np.linalg.norm(places, axis=1) <= radii * (1.0 + 1e-6))
+    beside = places - np.linalg.lstsq(Z.T, places.T, rcond=None)[0].T @ Z
+    assert np.abs(beside).max() < 1e-9
 
 
 def test_model_steps_lead_to_the_front_of_quadratics(rng):
