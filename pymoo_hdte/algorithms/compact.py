@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import copy
 import warnings
-from copy import copy
 from typing import Any
 
 import numpy as np
@@ -13,6 +13,7 @@ from pymoo.core.result import Result
 from pymoo.core.sampling import Sampling
 
 from pymoo_hdte.algorithms.archive import FrontArchive
+from pymoo_hdte.algorithms.base import twin
 from pymoo_hdte.algorithms.dominance import best_front
 from pymoo_hdte.algorithms.elitist import ElitistSwarm
 from pymoo_hdte.algorithms.horizon import evaluation_limit
@@ -182,9 +183,26 @@ class CompactSwarm(ElitistSwarm):
         judged = swarm[np.flatnonzero(np.isfinite(swarm.violation))]
         return judged[np.argsort(judged.violation, kind="stable")[: max(1, len(judged) // 2)]]
 
+    def __deepcopy__(self, memo: dict[int, Any]) -> CompactSwarm:
+        """Return a copy with particles of its own, which shares arrays and what is archived.
+
+        A history has a copy for every generation, and there are more of them than in other swarms.
+        """
+        own = [self.pop, self.opt, self._offered.members, *self._waiting]
+        for particle in self._front_archive.members:
+            memo[id(particle)] = particle
+        for population in own:
+            for particle in () if population is None else population.tolist():
+                if memo.get(id(particle), particle) is particle:
+                    memo[id(particle)] = twin(particle)
+        other = object.__new__(type(self))
+        memo[id(self)] = other
+        other.__dict__ |= copy.deepcopy(self.__dict__, memo)
+        return other
+
     def archive_all(self) -> Population:
         """Return all non-dominated feasible solutions found, at most ``n_archive``, thinned out."""
-        archive = copy(self._front_archive)
+        archive = copy.copy(self._front_archive)
         self._enter(archive)
         return archive.members.copy()
 

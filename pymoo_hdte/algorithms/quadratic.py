@@ -57,7 +57,7 @@ def fitted(Z: NDArray[np.float64], F: NDArray[np.float64]) -> Quadratic:
 
 
 class Span(NamedTuple):
-    """Places (n, d) in as few coordinates as they span: n of them where the variables are more.
+    """Places (n, d) in n coordinates of their span, or as they stand without ``originals``.
 
     Gradient and second derivatives of `fitted` are combinations of the places, so that a model is
     flat at right angles to their span, and its lowest place lies within. The rows of the Cholesky
@@ -76,13 +76,11 @@ class Span(NamedTuple):
         numpy.linalg.LinAlgError
             If they are not finite.
         """
-        n, d = Z.shape
-        if d <= n:
-            return cls(Z, None)
+        n = len(Z)
         products = Z @ Z.T
         # Places that depend on each other, the leader itself among them, have no factor without.
         products[np.diag_indices(n)] += _DEPENDENT * np.trace(products) / n
-        return cls(np.linalg.cholesky(products), Z)
+        return cls(np.asarray(np.linalg.cholesky(products), dtype=np.float64), Z)
 
     def lowest(
         self, model: Quadratic, which: NDArray[np.int_], radii: NDArray[np.float64]
@@ -173,17 +171,22 @@ class ModelStep:
         widths : ndarray, shape (d,), optional
             Ranges of the variables, in which distances are measured; by default they are equal.
         """
-        self._known: Points | None = None
+        self._told: list[Points] = []
         self._reach = np.ones(1)
         if widths is not None and np.any(widths > 0.0):
             self._reach = widths / widths.max()
 
     def learn(self, points: Points) -> None:
         """Remember evaluated points."""
-        points = points[np.flatnonzero(np.isfinite(points.F).all(axis=1))]
-        if self._known is not None:
-            points = self._known.followed_by(points)
-        self._known = points[-self.MEMORY :] if len(points) > 2 * self.MEMORY else points
+        # In pieces, which copies of a swarm share: a history would hold all points many times.
+        self._told.append(points[np.flatnonzero(np.isfinite(points.F).all(axis=1))])
+        while sum(map(len, self._told[1:])) >= self.MEMORY:
+            del self._told[0]
+
+    def _known(self) -> Points:
+        """Return the latest points, at most as many as it remembers."""
+        first, *others = self._told or [Points.none(0, 0)]
+        return first.followed_by(*others)[-self.MEMORY :]
 
     def __call__(
         self,
@@ -194,9 +197,9 @@ class ModelStep:
     ) -> NDArray[np.float64]:
         """Return the steps (n, d); none while there is nothing to fit."""
         n, d = X.shape
-        if not n or self._known is None or len(self._known) < 3:
+        if not n or len(known := self._known()) < 3:
             return np.zeros((n, d))
-        centre, known = leaders[0], self._known[-self.MEMORY :]
+        centre = leaders[0]
         away = (known.X - centre) / np.where(self._reach > 0.0, self._reach, 1.0)
         distances = np.sqrt((away**2).sum(axis=1))
         nearest = min(len(distances), 3 * d + 20, self.LARGEST_FIT)
@@ -210,7 +213,9 @@ class ModelStep:
         weights = self._weights(F.shape[1], random_state)
         radii = 10.0 ** random_state.uniform(self.SMALLEST_EXPONENT, self.LARGEST_EXPONENT, n)
         try:
-            span = Span.of(away[neighbours] / unit)
+            Z = away[neighbours] / unit
+            # Few variables cost less as they stand.
+            span = Span.of(Z) if d > self.LARGEST_FIT else Span(Z, None)
             model = fitted(span.places, F).weighted(weights)
             places = span.lowest(model, np.arange(n) % len(weights), radii)
         except np.linalg.LinAlgError:

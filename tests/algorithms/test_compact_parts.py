@@ -266,11 +266,12 @@ def test_model_steps_survive_what_cannot_be_fitted(rng):
 
 
 def test_model_steps_remember_no_more_than_they_say(rng):
-    move, one = ModelStep(), Points(rng.random((300, D)), rng.random((300, 2)), np.zeros(300))
-    for _ in range(20):
-        move.learn(one)
-        assert len(move._known[-move.MEMORY :]) <= move.MEMORY
-        assert len(move._known) <= 2 * move.MEMORY
+    move = ModelStep()
+    X = rng.random((6000, D))
+    for told in range(300, 6001, 300):
+        move.learn(Points(X[told - 300 : told], X[told - 300 : told, :2], np.zeros(300)))
+        np.testing.assert_array_equal(move._known().X, X[max(0, told - move.MEMORY) : told])
+        assert sum(map(len, move._told)) < move.MEMORY + 300
 
 
 def test_flat_models_give_no_step_without_a_warning():

@@ -63,8 +63,8 @@ def test_models_learn_every_evaluated_point_once_and_in_its_turn(kwargs):
     algorithm = run(problem, 300, **kwargs).algorithm
     (model,) = (move for move in algorithm.moves if isinstance(move, ModelStep))
     asked = np.vstack(algorithm.problem.asked)
-    np.testing.assert_array_equal(model._known.X, asked)
-    np.testing.assert_array_equal(model._known.F, Parabolas().evaluate(asked))
+    np.testing.assert_array_equal(model._known().X, asked)
+    np.testing.assert_array_equal(model._known().F, Parabolas().evaluate(asked))
 
 
 # --- result and archive ---------------------------------------------------------------------------
@@ -314,6 +314,26 @@ def test_a_copy_taken_anywhere_goes_on_alike(problem, clone):
         swarm.archive_all()
         swarm.next()
     assert digest(swarm.result()) == digest(uninterrupted)
+
+
+def test_a_history_holds_each_generation_as_it_was():
+    """Copies share arrays, but a callback may evaluate the particles of one of them again."""
+    swarm = CompactSwarm(save_history=True)
+    swarm.setup(get_problem("zdt1"), termination=("n_eval", 300), seed=3)
+    fronts = []
+    while swarm.has_next():
+        swarm.next()
+        fronts.append(swarm.opt.get("F"))
+    for particle in (*swarm.pop, *swarm.opt):
+        particle.F, particle.data["again"] = particle.F + 1.0, True
+    for then, front in zip(swarm.history, fronts, strict=True):
+        np.testing.assert_array_equal(then.opt.get("F"), front)
+        assert not any("again" in particle.data for particle in then.pop)
+    first, last = swarm.history[0].opt, swarm.history[-1].opt
+    assert first[0] is not last[0]
+    (model,) = (move for move in swarm.history[-2].moves if isinstance(move, ModelStep))
+    (later,) = (move for move in swarm.history[-1].moves if isinstance(move, ModelStep))
+    assert model._told[0].X is later._told[0].X
 
 
 def test_with_more_evaluations_the_swarm_goes_on_growing():
