@@ -39,6 +39,14 @@ def size_for(evaluations: float) -> int:
     return int(np.clip(np.sqrt(min(evaluations, 1e9)) / 2.0, SMALLEST, LARGEST).round())
 
 
+def evaluations_of(generations: int) -> int:
+    """Return the evaluations of a number of generations of a swarm that grows."""
+    spent = 0
+    for _ in range(generations):
+        spent += size_for(spent)
+    return spent
+
+
 class CompactSwarm(ElitistSwarm):
     """An `ElitistSwarm` that starts small and grows, and whose result does not depend on its size.
 
@@ -77,6 +85,9 @@ class CompactSwarm(ElitistSwarm):
 
     Warns
     -----
+    UserWarning
+        From ``setup`` for more than four objectives, and for a number of generations as the limit
+        of a swarm that grows: its generations are small, so that 100 of them are 1,217 evaluations.
     RuntimeWarning
         If no solution could be judged, for want of finite objectives and constraints; the result
         is empty then.
@@ -139,6 +150,14 @@ class CompactSwarm(ElitistSwarm):
         if self._by_budget:
             allowed = evaluation_limit(self.termination) if constrained else 0.0
             self.pop_size = size_for(allowed)
+        n_gen = getattr(self.termination, "n_max_gen", None)
+        if self._grows and n_gen is not None:
+            warnings.warn(
+                f"{n_gen} generations of a {type(self).__name__} are {evaluations_of(n_gen)} "
+                "evaluations, since it starts small and grows: stop by ('n_eval', n)",
+                UserWarning,
+                stacklevel=4,
+            )
         if self._by_problem and constrained:
             self.moves = tuple(move for move in self.moves if not isinstance(move, ModelStep))
 

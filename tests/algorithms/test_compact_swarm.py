@@ -336,6 +336,20 @@ def test_a_history_holds_each_generation_as_it_was():
     assert model._told[0].X is later._told[0].X
 
 
+def test_a_number_of_generations_is_told_in_evaluations():
+    with pytest.warns(UserWarning, match=r"20 generations .* 200 evaluations"):
+        result = minimize(Parabolas(), CompactSwarm(), ("n_gen", 20), seed=1)
+    assert result.algorithm.evaluator.n_eval == 200
+    # A size of one's own makes generations alike.
+    minimize(Parabolas(), CompactSwarm(10), ("n_gen", 3), seed=1)
+
+
+def test_many_objectives_are_not_claimed():
+    with pytest.warns(UserWarning, match="5"):
+        CompactSwarm().setup(get_problem("dtlz2", n_obj=5), termination=("n_eval", 100))
+    CompactSwarm().setup(get_problem("dtlz2", n_obj=4), termination=("n_eval", 100))
+
+
 def test_with_more_evaluations_the_swarm_goes_on_growing():
     first = run("zdt1", 500).algorithm
     first.setup(first.problem, termination=("n_eval", 2000), seed=1)
