@@ -99,9 +99,10 @@ class ExactMoments:
         Returns
         -------
         mean : ndarray, shape (k_1 + 1, ..., k_m + 1)
-            Entry (a, b, ...) belongs to T_a(t_1) T_b(t_2) ..., t being the design in the box scaled
-            to -1 ... 1.
+            In the surrogate's output unit. Entry (a, b, ...) belongs to T_a(t_1) T_b(t_2) ..., t
+            being the design in the box scaled to -1 ... 1.
         variance : ndarray, shape (2 k_1 + 1, ..., 2 k_m + 1)
+            In the square of that unit.
         """
         mean, variance = self._polynomial.coefficients
         return mean[tuple(slice((size + 1) // 2) for size in mean.shape)], variance
