@@ -128,7 +128,7 @@ def test_what_a_verdict_accepts_is_kept_where_it_predicts_best():
 def test_no_term_is_large_where_nothing_was_measured():
     """Of a friction that falls at speeds where those of the library have long faded."""
     generator = np.random.default_rng(3)
-    time = np.arange(0.0, 20.0, 0.005)
+    time = np.arange(0.0, 12.0, 0.005)
     tones = np.arange(1, 9) * 0.37
     angles = np.outer(time, 2.0 * np.pi * tones) + generator.uniform(0.0, 6.3, 8)
     q = 1.5 * time + np.sin(angles) @ (0.02 / tones)
@@ -142,9 +142,9 @@ def test_no_term_is_large_where_nothing_was_measured():
     }
     halves = [
         Record(role, role, time[rows], {name: one[rows] for name, one in channels.items()})
-        for role, rows in (("train", slice(0, 2400)), ("held_out", slice(2400, 4000)))
+        for role, rows in (("train", slice(0, 1400)), ("held_out", slice(1400, 2400)))
     ]
-    described = analyse(MeasuredMechanism(ARM, halves, 8.0)).descriptive_model()
+    described = analyse(MeasuredMechanism(ARM, halves, 5.0)).descriptive_model()
     slow = PortMotion(q[:400], np.linspace(0.01, v.max(), 400))
     for effect, _ in described.effects:
         size = np.abs(law_force(effect.law, slow, 0.0)).max()
