@@ -22,7 +22,7 @@ from pymoo_hdte.discrepancy._evidence.force_balances.candidates import port_size
 from pymoo_hdte.discrepancy._evidence.force_balances.evidence import MeasuredData, measured_data
 from pymoo_hdte.discrepancy._evidence.force_balances.joint_halves import Half, Joint
 from pymoo_hdte.discrepancy._evidence.force_balances.orders import (
-    order_within,
+    periods_within,
     position_orders,
 )
 from pymoo_hdte.discrepancy._evidence.force_balances.preconditions import (
@@ -156,12 +156,13 @@ def _low_orders(data: MeasuredData, gear: Port, seen: Sequence[float]) -> tuple[
     """
     shafts = [balance.ports[gear.name].shaft for balance in data.spectra]
     turns, rules = max(map(np.ptp, shafts)) / (2.0 * np.pi), data.rules
-    within = max(
-        order_within(balance.cutoff, shaft, float(balance.time[1] - balance.time[0]))
-        for balance, shaft in zip(data.spectra, shafts, strict=True)
-    )
     lowest, highest = rules.fewest_error_periods / turns, rules.fewest_periods / turns
-    orders = np.arange(max(1.0, np.ceil(lowest)), min(np.ceil(highest), within))
+    orders = np.arange(max(1.0, np.ceil(lowest)), np.ceil(highest))
+    periods = [
+        periods_within(balance.cutoff, shaft, float(balance.time[1] - balance.time[0]), orders)
+        for balance, shaft in zip(data.spectra, shafts, strict=True)
+    ]
+    orders = orders[np.max(periods, axis=0) >= rules.fewest_error_periods]
     return tuple(order for order in orders.tolist() if order not in seen)
 
 

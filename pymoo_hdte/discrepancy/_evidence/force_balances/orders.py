@@ -17,8 +17,6 @@ from pymoo_hdte.discrepancy._selection.fitting import Fit
 from pymoo_hdte.discrepancy._selection.rules import Rules
 
 Values = NDArray[np.float64]
-Signal = tuple[Values, Values, float]
-"""Position, signal over it, and the highest order that it shows."""
 
 # Grid and smoothing of the search; `Rules` decide which order counts as seen.
 _MOST_TRIED = 2000
@@ -32,9 +30,7 @@ def position_orders(data: MeasuredData, base: Fit) -> dict[str, tuple[float, ...
     """Return orders by port, the strongest first.
 
     They are whole cycles per turn of an angle in rad, or radians per m of a length. Variations that
-    are slower than the trend of the residual in time are attributed to friction. Orders of which
-    less than half of the travel is within the band are not among them: what shows of them while a
-    port creeps may be anything, and the rest of the travel is searched beyond the band.
+    are slower than the trend of the residual in time are attributed to friction.
 
     Parameters
     ----------
@@ -51,16 +47,13 @@ def position_orders(data: MeasuredData, base: Fit) -> dict[str, tuple[float, ...
             # A force at the port would enter all rows with these shares.
             rows = [data.names.index(name) for name in shares]
             residual = np.array(list(shares.values())) @ residual_by_row[rows]
-            position, step = balance.ports[port.name].shaft, balance.time[1] - balance.time[0]
-            band = float(balance.frequency[balance.kept[rows].any(axis=0)].max())
-            highest = min(_finest_order(position), order_within(band, position, float(step)))
-            signals.append((position, _detrended(balance.in_time(residual)), highest))
+            signals.append((balance.ports[port.name].shaft, _detrended(balance.in_time(residual))))
         orders[port.name] = _strongest(signals, data.rules)
     return orders
 
 
-def order_within(band: float, position: Values, step: float) -> float:
-    """Return the highest order whose frequency is within a band, Hz, on half of the travel.
+def periods_within(band: float, position: Values, step: float, orders: Values) -> Values:
+    """Return how many periods of orders pass while their frequency is within a band, (n_orders,).
 
     Parameters
     ----------
@@ -70,11 +63,13 @@ def order_within(band: float, position: Values, step: float) -> float:
         rad or m.
     step : float
         s.
+    orders : ndarray, shape (n_orders,)
+        Cycles per turn, or rad/m.
     """
     ways = np.sort(np.abs(np.diff(position)))
-    travelled = np.cumsum(ways)
-    half = float(ways[np.searchsorted(travelled, 0.5 * travelled[-1])])
-    return 2.0 * np.pi * band * step / half if half > 0.0 else np.inf
+    travelled = np.r_[0.0, np.cumsum(ways)]
+    slow = np.searchsorted(ways, 2.0 * np.pi * band * step / orders, side="right")
+    return np.asarray(travelled[slow] * orders / (2.0 * np.pi))
 
 
 def _detrended(signal: Values) -> Values:
@@ -83,13 +78,12 @@ def _detrended(signal: Values) -> Values:
     return signal - np.polynomial.Polynomial.fit(time, signal, 3)(time)
 
 
-def _strongest(signals: list[Signal], rules: Rules) -> tuple[float, ...]:
-    """Return orders with more power in signals over positions than neighbouring orders.
+def _strongest(signals: list[tuple[Values, Values]], rules: Rules) -> tuple[float, ...]:
+    """Return orders with more power in (position, signal) pairs than neighbouring orders.
 
     Each order found is removed before the next search, so that none is found twice.
     """
-    highest = max(highest for _, _, highest in signals)
-    orders, step = _order_grid([position for position, _, _ in signals], highest, rules)
+    orders, step = _order_grid([position for position, _ in signals], rules)
     strongest: list[float] = []
     while len(strongest) < rules.most_position_orders and orders.size:
         ratio = _significance(signals, orders, rules)
@@ -100,13 +94,12 @@ def _strongest(signals: list[Signal], rules: Rules) -> tuple[float, ...]:
         if not any(abs(order - stronger) <= _BESIDE * step for stronger in strongest):
             strongest.append(order)
         signals = [
-            (position, _without_wave(signal, order * position), highest)
-            for position, signal, highest in signals
+            (position, _without_wave(signal, order * position)) for position, signal in signals
         ]
     return tuple(strongest)
 
 
-def _order_grid(positions: Sequence[Values], finest: float, rules: Rules) -> tuple[Values, float]:
+def _order_grid(positions: Sequence[Values], rules: Rules) -> tuple[Values, float]:
     """Return the orders that are searched, and their step.
 
     Orders are whole numbers where the travel resolves them, as for a shaft; otherwise they step by
@@ -117,7 +110,7 @@ def _order_grid(positions: Sequence[Values], finest: float, rules: Rules) -> tup
         return np.empty(0), 1.0
     step = 1.0 if np.pi / widest < _WHOLE else np.pi / widest
     lowest = step * np.ceil(max(1.0, 2.0 * np.pi * rules.fewest_periods / widest) / step)
-    highest = min(finest, lowest + _MOST_TRIED * step)
+    highest = min(max(map(_finest_order, positions)), lowest + _MOST_TRIED * step)
     return np.arange(lowest, highest, step), step
 
 
@@ -126,24 +119,24 @@ def _finest_order(position: Values) -> float:
     return len(position) * np.pi / (4.0 * max(float(np.sum(np.abs(np.diff(position)))), 1e-300))
 
 
-def _refined(signals: Sequence[Signal], order: float, step: float) -> float:
+def _refined(signals: Sequence[tuple[Values, Values]], order: float, step: float) -> float:
     """Return the order of largest power near one of a coarse grid."""
     if step == 1.0:
         return order
     fine_grid = order + step * np.linspace(-1.0, 1.0, 41)
     power = sum(
         np.abs(np.exp(-1j * np.outer(fine_grid, position)) @ signal) ** 2
-        for position, signal, _ in signals
+        for position, signal in signals
     )
     return float(fine_grid[np.argmax(power)])
 
 
-def _significance(signals: Sequence[Signal], orders: Values, rules: Rules) -> Values:
+def _significance(signals: Sequence[tuple[Values, Values]], orders: Values, rules: Rules) -> Values:
     """Return the ratio of power to noise at each order, shape (n_orders,)."""
     total, counted = np.zeros((2, len(orders)))
-    for position, signal, highest in signals:
+    for position, signal in signals:
         seen = orders * np.ptp(position) >= 2.0 * np.pi * rules.fewest_periods
-        seen &= orders <= highest
+        seen &= orders <= _finest_order(position)
         if not seen.any():
             continue
         power = np.abs(phasors(position, signal, orders[seen])) ** 2
