@@ -21,6 +21,11 @@ COVERAGE = 4.0
 together, and larger towards corners. With 3, 91 % of 40 designs of the borehole with a scatter of
 5 % were covered. Chosen on that and the six functions that `experiments robust` names.
 """
+COVERAGE_OF_DRAWS = 2.0
+"""The same of what runs of a random simulator scatter: a sum of independent draws is normal.
+
+Noise of a mesh is none: its errors belong to one function, too.
+"""
 LEAST_SURPRISE = 0.3
 """Runs that are predicted better than expected make errors smaller by no more than this factor."""
 LOST = 0.05
@@ -81,7 +86,7 @@ class ResponseFit:
     left_out: Array
     alone: bool
 
-    def errors(self, judged: Judged, least: float) -> tuple[Array, Array]:
+    def errors(self, judged: Judged, least: float, counted: bool = False) -> tuple[Array, Array]:
         """Return expected errors of mean and deviation as shares of the scatter, shape (v,) each.
 
         Parameters
@@ -89,6 +94,8 @@ class ResponseFit:
         judged : Judged
         least : float
             Scatter below which it counts as this, in the response's unit.
+        counted : bool
+            Whether what runs scatter by themselves is counted elsewhere.
         """
         errors = []
         for features, weights in zip(judged.features, judged.weights, strict=True):
@@ -102,9 +109,15 @@ class ResponseFit:
             off = self.regression.predict(features) - values
             functionals = np.array([weights, weights * deviation / scatter])
             expected = self.regression.spread(features, functionals)
+            by_noise = self.regression.spread_by_noise(features, functionals)
+            expected = COVERAGE * np.sqrt(np.maximum(expected**2 - by_noise**2, 0.0))
+            expected = np.hypot(expected, (COVERAGE_OF_DRAWS if counted else COVERAGE) * by_noise)
             expected = expected * max(self.regression.surprise, LEAST_SURPRISE)
             cut = np.array([abs(float(weights @ off)), _std(off, weights)])
-            errors.append(tuple((COVERAGE * expected + cut) / scatter))
+            # What runs scatter by themselves may as well be a part of the response.
+            if not counted:
+                cut[1] += np.hypot(scatter, self.regression.noise_std) - scatter
+            errors.append(tuple((expected + cut) / scatter))
         mean, std = np.array(errors).T
         return mean, std
 
