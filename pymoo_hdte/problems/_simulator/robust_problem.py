@@ -77,6 +77,7 @@ def robust_problem(
     accept: str = "accurate",
     data: tuple[Any, Any] | None = None,
     replicates: int | None = None,
+    surrogate: str = "auto",
 ) -> SimulatorProblem:
     """Return the robust design problem of a simulator.
 
@@ -157,6 +158,9 @@ def robust_problem(
         there and has 2 by default. What it scatters by itself is part of standard deviations and,
         as a normal deviation, of quantiles and probabilities; a `WorstCase` is that of the mean.
         A point at which one of its runs fails has failed.
+    surrogate : {"auto", "polynomial"}
+        With ``"auto"``, a polynomial of the response's logarithm or logit, or a normal process
+        (needs scikit-learn, extra ``process``), is taken where it predicts runs left out better.
 
     Returns
     -------
@@ -195,6 +199,7 @@ def robust_problem(
     5.02
     """
     _check_statistics(objectives, constraints)
+    one_of("surrogate", surrogate, ("auto", "polynomial"))
     inputs = Inputs(designs, {} if noise is None else noise, least_tail(objectives, constraints))
     accuracy = _share("accuracy", accuracy)
     one_of("accept", accept, ACCEPTED)
@@ -246,6 +251,7 @@ def robust_problem(
             lambda fit: largest_error(fit, requested_places())[0],
             in_hand,
             repeated is not None,
+            surrogate == "auto",
         )
         refusal = _refusal(inputs, fit, accuracy, simulate, positive, (objectives, constraints))
     responses = simulate.responses

@@ -49,6 +49,10 @@ JUDGED_DRAWS = 128
 """Designs, and draws of the scatter at each, at which errors are judged."""
 DEGREES = (6, 40)
 """Least and largest degree in one variable; between them a third of the runs."""
+OTHERS_AGAIN = 1.5
+"""Ratio of runs from where no other surrogate was better to where one is tried again."""
+DENSE = 1000
+"""Points at which another surrogate than a polynomial is made one."""
 LARGEST_ACCURACY = 0.01
 """Requested accuracy above which no more terms are left out."""
 SMALLEST_SCATTER = 0.1
@@ -138,6 +142,7 @@ class _SurrogateBuild:
         random_state: np.random.Generator,
         given: tuple[Array, Array] | None = None,
         is_random: bool = False,
+        others: bool = True,
     ) -> None:
         self.axes, self.function, self.is_random = axes, function, is_random
         self._given = (np.empty((0, len(axes))), np.empty((0, 0))) if given is None else given
@@ -146,6 +151,9 @@ class _SurrogateBuild:
         self.spread = SpreadPoints(axes, random_state)
         self.designs = draw_designs(axes, JUDGED_DESIGNS, random_state)
         self.draws = draw_around(axes, self.designs, JUDGED_DRAWS, random_state)
+        # Of points at which only surrogates are evaluated.
+        self.dense = SpreadPoints(axes, np.random.default_rng(0)).next(DENSE)
+        self.others_from = 0 if others else np.inf
         self.points, self.truth = np.empty((0, len(axes))), np.empty((0, 0))
         self.parameters: list[Array] = []
         self.own_parameters: list[Array] = []
@@ -200,8 +208,18 @@ class _SurrogateBuild:
         judged = Judged.at(self.draws[0], weights_of_draws, polynomials)
         weights = relevance(self.axes, points)
         fits, self.parameters = fitted_together(
-            features, truth, weights, judged, self.lost, self.parameters
+            features,
+            truth,
+            weights,
+            judged,
+            self.lost,
+            self.parameters,
+            (lambda: polynomials(self.dense)) if self.n_runs >= self.others_from else None,
+            process=True,
         )
+        plain = all(isinstance(fit, PartOfField) or fit.plain for fit in fits)
+        if plain and self.n_runs >= self.others_from:
+            self.others_from = int(OTHERS_AGAIN * self.n_runs)
         own: SparsePolynomial | None = None
         own_fits: Sequence[ResponseFit | PartOfField] = []
         if self.is_random:
@@ -371,6 +389,7 @@ def fit_adaptively(
     error_of: Callable[[AdaptiveFit], float] = lambda fit: fit.largest_error,
     given: tuple[Array, Array] | None = None,
     is_random: bool = False,
+    others: bool = True,
 ) -> AdaptiveFit:
     """Grow a surrogate until mean and standard deviation are accurate, or the budget is spent.
 
@@ -391,6 +410,8 @@ def fit_adaptively(
         Least number of runs to add together.
     error_of : callable
         Error of a fit that must be as small as requested; by default the largest of all responses.
+    others : bool
+        Whether other surrogates than polynomials of the responses are tried.
     given : tuple of ndarray, optional
         Points and values of runs in hand, which do not count in the budget. They come first, in an
         order by chance, and are judged like others: twice, without and with the last of them.
@@ -409,7 +430,7 @@ def fit_adaptively(
         given = given[0][order], given[1][order]
         budget += len(order)
         first = max(first, int(np.ceil(len(order) / (1.0 + BATCH))))
-    build = _SurrogateBuild(axes, function, accuracy, random_state, given, is_random)
+    build = _SurrogateBuild(axes, function, accuracy, random_state, given, is_random, others)
     build.run(min(first, budget))
     passed = 0
     while True:

@@ -7,7 +7,7 @@ what they leave of it (Blatman and Sudret, ICASP 11, 2011).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -39,13 +39,15 @@ def fitted_together(
     judged: Judged,
     lost: float,
     starts: list[Array],
+    dense: Callable[[], list[Array]] | None = None,
+    process: bool = False,
 ) -> tuple[Sequence[ResponseFit | PartOfField], list[Array]]:
     """Return the surrogates of all responses, and the parameters of the regressions behind them.
 
     Parameters
     ----------
-    features, relevance, judged, lost
-        As in `fitted`.
+    features, relevance, judged, lost, dense, process
+        As in `fitted`; components are always polynomials.
     truth : ndarray, shape (n, r)
         The responses.
     starts : list of ndarray
@@ -54,8 +56,9 @@ def fitted_together(
     components = _components(truth, OF_LOST * lost)
     values = truth if components is None else components.scores
     found = [*starts, *[None] * values.shape[1]][: values.shape[1]]
+    others = (dense, process) if components is None else (None, False)
     fits = [
-        fitted(features, column, relevance, judged, lost, start)
+        fitted(features, column, relevance, judged, lost, start, *others)
         for column, start in zip(values.T, found, strict=True)
     ]
     parameters = [fit.regression.parameters for fit in fits]

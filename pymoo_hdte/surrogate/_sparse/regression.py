@@ -54,6 +54,8 @@ class Regression:
         Where to start learning them.
     shares : ndarray, shape (n,), optional
         Variance of every run's own scatter over that of one run; 1 by default.
+    noisy : bool
+        Whether runs may scatter by themselves.
 
     Attributes
     ----------
@@ -82,6 +84,7 @@ class Regression:
         relevance: Array,
         parameters: Array | None = None,
         shares: Array | None = None,
+        noisy: bool = True,
     ) -> None:
         self.centre = float(values.mean())
         self.unit = float(values.std()) or 1.0
@@ -89,7 +92,7 @@ class Regression:
         standard = (values - self.centre) / self.unit
         start = np.tile(START, (len(features), 1)) if parameters is None else parameters
         shares = np.ones(len(values)) if shares is None else shares
-        self.parameters, self.noise = _learnt(features, standard, start, shares)
+        self.parameters, self.noise = _learnt(features, standard, start, shares, noisy)
         self.variance, _ = variances(self.parameters, len(features[0]))
         self._noises = self.noise * shares
         matrix = _with_nugget(covariance(features, features, self.variance), self._noises)
@@ -150,7 +153,7 @@ def _with_nugget(matrix: Array, noise: Array | float = 0.0) -> Array:
 
 
 def _learnt(
-    features: list[Array], standard: Array, start: Array, shares: Array
+    features: list[Array], standard: Array, start: Array, shares: Array, noisy: bool
 ) -> tuple[Array, float]:
     """Return the most probable parameters, by the marginal likelihood and what is expected.
 
@@ -177,6 +180,8 @@ def _learnt(
         )
 
     without = optimum(start.ravel(), bounds)
+    if not noisy:
+        return np.array(without.x).reshape(start.shape), 0.0
     least, first, most = NOISE
     # From the start: what explains the scatter without noise is no way to what does with it.
     both = optimum(np.append(middle, first), [*bounds, (least, most)])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,6 +10,7 @@ from numpy.typing import NDArray
 
 from pymoo_hdte.surrogate._sparse.kernel import EvenPolynomials
 from pymoo_hdte.surrogate._sparse.regression import Regression
+from pymoo_hdte.surrogate._sparse.second import Linked, Process, Surrogate, better
 from pymoo_hdte.surrogate._sparse.terms import closed, largest, likely_terms, products
 
 Array = NDArray[np.float64]
@@ -36,6 +38,13 @@ EXACT = 1e-3
 They are chosen by all runs, so that their own error is told too small; polynomials of low degree
 give ratios of 1e-6 and less.
 """
+LEAST_JUDGED = 1e-2
+"""Scatter below which errors of two surrogates are compared as if it were this.
+
+As a share of the response's deviation over all runs.
+"""
+MOST_CONVERTED = 3000
+"""Terms that are looked at where another surrogate is made a polynomial."""
 MOST_FITTED = 0.4
 """Largest number of such terms as a share of the runs."""
 
@@ -69,7 +78,7 @@ class ResponseFit:
 
     Attributes
     ----------
-    regression : Regression
+    regression : Regression, Linked or Process
     indices : ndarray of int, shape (p, d)
         Degrees of the terms, a downward-closed set.
     coefficients : ndarray, shape (p,)
@@ -80,11 +89,16 @@ class ResponseFit:
         Whether the terms are fitted alone, without the prior.
     """
 
-    regression: Regression
+    regression: Surrogate
     indices: Indices
     coefficients: Array
     left_out: Array
     alone: bool
+
+    @property
+    def plain(self) -> bool:
+        """Whether it is a polynomial of the response itself."""
+        return isinstance(self.regression, Regression)
 
     def errors(self, judged: Judged, least: float, counted: bool = False) -> tuple[Array, Array]:
         """Return expected errors of mean and deviation as shares of the scatter, shape (v,) each.
@@ -129,6 +143,8 @@ def fitted(
     judged: Judged,
     lost: float,
     start: Array | None,
+    dense: Callable[[], list[Array]] | None = None,
+    process: bool = False,
 ) -> ResponseFit:
     """Return the surrogate of one response.
 
@@ -145,8 +161,38 @@ def fitted(
         Largest change by terms left out, as a share of the least scatter.
     start : ndarray, shape (d, 3), or None
         Parameters of the regression to start from.
+    dense : callable, optional
+        Returns features of very many points, at which other surrogates of the response are made a
+        polynomial; without it, there are no others.
+    process : bool
+        Whether a normal process is tried.
     """
     regression = Regression(features, values, relevance, start)
+    plain = _plain(features, values, regression, judged, lost)
+    left_out = float(np.sqrt(np.mean(regression.left_out**2)))
+    if plain.alone or dense is None or left_out <= lost * float(np.std(values)):
+        return plain
+    other = better(features, values, relevance, regression, start, process)
+    if other is None:
+        return plain
+    converted = _converted(other, dense(), judged, lost)
+    # A polynomial may follow it less well than it follows the response.
+    least = LEAST_JUDGED * float(np.std(values))
+
+    def error(fit: ResponseFit) -> float:
+        return float(np.max(np.sqrt(np.mean(np.square(fit.errors(judged, least)), axis=1))))
+
+    return min((plain, converted), key=error)
+
+
+def _plain(
+    features: list[Array],
+    values: Array,
+    regression: Regression,
+    judged: Judged,
+    lost: float,
+) -> ResponseFit:
+    """Return the most probable polynomial of the response itself."""
     scatters = [
         _std(regression.predict(features), weights)
         for features, weights in zip(judged.features, judged.weights, strict=True)
@@ -165,6 +211,24 @@ def fitted(
         regression.left_out,
         alone=False,
     )
+
+
+def _converted(
+    surrogate: Linked | Process, dense: list[Array], judged: Judged, lost: float
+) -> ResponseFit:
+    """Return a polynomial of another surrogate."""
+    values = surrogate.predict(dense)
+    regression = Regression(dense, values, np.ones(len(values)), noisy=False)
+    scatters = [
+        _std(surrogate.predict(features), weights)
+        for features, weights in zip(judged.features, judged.weights, strict=True)
+    ]
+    looked_at = likely_terms(regression.variance, MOST_CONVERTED)
+    coefficients = _posterior(regression, dense, looked_at)
+    essential = largest(coefficients, lost * float(np.quantile(scatters, 0.1)))
+    indices = closed(looked_at[essential])
+    own = _posterior(regression, dense, indices)
+    return ResponseFit(surrogate, indices, own, surrogate.left_out, alone=False)
 
 
 def _std(values: Array, weights: Array) -> float:
