@@ -16,6 +16,7 @@ from pymoo_hdte.effects.friction import (
     PeriodicFriction,
     StribeckFriction,
 )
+from pymoo_hdte.effects.gravity import Gravity
 from pymoo_hdte.effects.hysteresis import MaxwellSlip
 from pymoo_hdte.effects.load_friction import LoadFriction
 from pymoo_hdte.effects.ripple import PeriodicTorque
@@ -49,6 +50,8 @@ EFFECTS = [
     KinematicReaction(),
     LoadDependentError(3.0, 2 * ARCSEC, 0.7, 40.0),
     LawAtPort("load_dependent_damping", "mesh", LoadDamping(4.0, 40.0)),
+    LawAtPort("torque_ripple", "load", PeriodicTorque(3.0, 1.0, 0.5)),
+    LawAtPort("gravity", "load", Gravity(0.5, 0.4)),
 ]
 
 

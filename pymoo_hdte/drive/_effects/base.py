@@ -189,7 +189,7 @@ class LawAtPort(DriveEffect):
     name : str
         Name of the effect, in model files and verdicts, e.g. ``"coulomb_friction"``.
     port : str
-        ``"input"``, ``"output"`` or ``"mesh"``, where the law may be.
+        ``"input"``, ``"output"``, ``"mesh"`` or ``"load"``, where the law may be.
     law : Law
         A law of the type that belongs to the name; its numbers are in SI.
 

@@ -4,7 +4,8 @@
     J_out th_out'' + B_out th_out' - (k d + c d')     = -T_L(t)
     d = th_in / N - th_out - th_s(th_in),   k = K (1 + kappa cos(2 th_in + psi))
 
-and laws at ports, which add their torques, and the reaction of theta_s on the input.
+and laws at ports, which add their torques, and the reaction of theta_s on the input. A law at the
+load acts on the second equation as one at the output does, beyond the output torque sensor.
 `hill_steady_state`, `harmonic_balance` and `time_domain` all solve these equations, so each term is
 defined here once.
 """

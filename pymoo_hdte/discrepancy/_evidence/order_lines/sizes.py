@@ -24,7 +24,9 @@ LARGEST = 5.0
 """Largest missing line of the transmission error, in units of the residual of the base: the base
 absorbs no line, but because of a resonance a line may be several times smaller in one record than
 in another."""
-_SHAFTS = {"input": (1.0, 2.0), "output": (1.0,), "mesh": (1.0, 2.0), "sensor": (1.0,)}
+_SHAFTS = {
+    "input": (1.0, 2.0), "output": (1.0,), "mesh": (1.0, 2.0), "sensor": (1.0,), "load": (1.0,),
+}  # fmt: skip
 """Orders at which a shaft varies by design or manufacture: once a turn, and twice for the wave
 generator, which has two lobes."""
 
@@ -164,6 +166,7 @@ def port_sizes(
         # A missing torsion is converted into a torque by the stiffness.
         "mesh": max(at_output, believed.stiffness * scales.error),
         "sensor": 0.0,
+        "load": at_output,
     }
     # Friction cannot exceed the whole torque, whatever part of it the base absorbs.
     largest = {
@@ -171,6 +174,7 @@ def port_sizes(
         "output": believed.ratio * scales.motor_torque,
         "mesh": scales.torque,
         "sensor": 0.0,
+        "load": believed.ratio * scales.motor_torque,
     }
     damping = dict.fromkeys(residual, 0.0)
     damping |= {"input": believed.input_damping, "mesh": believed.damping}
@@ -198,7 +202,7 @@ def port_sizes(
         changes=scales.changes,
         loads_differ=scales.loads_differ,
     )
-    slower = {"input": 1.0, "mesh": 1.0, "output": believed.ratio, "sensor": believed.ratio}
+    slower = {port: 1.0 if port in ("input", "mesh") else believed.ratio for port in residual}
     return {
         port: replace(
             shared,
@@ -211,6 +215,7 @@ def port_sizes(
             damping=damping[port],
             load=scales.torque / believed.ratio if port == "input" else 0.0,
             swept=scales.swept and port == "output",
+            turns=port == "load",
             slower=slower[port],
             expected=_SHAFTS[port],
         )
