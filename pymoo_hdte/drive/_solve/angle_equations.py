@@ -45,9 +45,9 @@ class TorsionMotion:
 
     ``energy`` are the harmonics of E, (n, n_harmonics). ``mesh_slope`` and ``mesh_damping`` are the
     derivatives of ``mesh_torque`` by torsion and by its rate, ``output_loss`` that of
-    ``output_friction`` by speed, both of the laws at output and load together; ``of_load`` is the
-    part of those at the load, and ``of_brake`` of what drives or brakes there. What is the same on the whole grid, or of no law, may have one column
-    or row, or be a number.
+    ``output_friction`` by speed, both of the laws at output and load together. ``of_load`` is the
+    part of those at the load, and ``of_brake`` of what drives or brakes there. What is the same on
+    the whole grid, or of no law, may have one column or row, or be a number.
     """
 
     energy: Phasors
