@@ -40,7 +40,8 @@ def with_effects(campaign: Campaign, rig: TrueRig, effects: Sequence[DriveEffect
     base = base_parameters(rig.drive, campaign.rig, rig.error_phases, 0.0)
     values = {pair.name: np.array([pair.start]) for pair in base}
     count = len(records)
-    when = Conditions(speed, load, np.zeros(count), np.zeros((count, 3, 2), dtype=complex))
+    elapsed = np.array([record.elapsed for record in records])
+    when = Conditions(speed, load, elapsed, np.zeros((count, 3, 2), dtype=complex))
     calm, changed = (
         predict(rig.drive, campaign.rig, when, [1.0], values, added).balance
         for added in ((), tuple(effects))

@@ -150,6 +150,7 @@ def _predict_group(
     gain = 1.0 + values["output_torque_gain"][:, None]
     load = (conditions.output_torque - values["output_torque_zero"][:, None]) / gain
     coefficients = coefficients_of(believed, values, present, records)
+    coefficients = replace(coefficients, elapsed=np.tile(conditions.elapsed, count))
     if conditions.temperature is not None:
         coefficients = replace(coefficients, temperature=np.tile(conditions.temperature, count))
     nearby = None if start is None else start.rows(np.tile(np.arange(records), count))
