@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from experiments.studies.virtual_rig.rig import TrueRig
 from pymoo_hdte.discrepancy._evidence.order_lines.parameters import base_parameters
@@ -55,14 +56,16 @@ def with_effects(campaign: Campaign, rig: TrueRig, effects: Sequence[DriveEffect
     return replace(campaign, running=running)
 
 
+def _signals(motion: SteadyMotion, row: int, record: RunningRecord) -> NDArray[np.float64]:
+    """Return the channels (4, n) of a row at the times of a record."""
+    waves = np.exp(1j * np.outer(motion.torus.orders, record.input_angle))
+    return (np.array([getattr(motion, name)[row] for name in _CHANNELS]) @ waves).real
+
+
 def _changed(
     record: RunningRecord, row: int, calm: SteadyMotion, changed: SteadyMotion, ratio: float
 ) -> RunningRecord:
-    waves = np.exp(1j * np.outer(record.input_angle, calm.torus.orders))
-    error, motor, coupling, lead = (
-        (waves @ (getattr(changed, name)[row] - getattr(calm, name)[row])).real
-        for name in _CHANNELS
-    )
+    error, motor, coupling, lead = _signals(changed, row, record) - _signals(calm, row, record)
     return replace(
         record,
         input_angle=record.input_angle + lead,
