@@ -16,6 +16,8 @@ from pymoo_hdte.discrepancy._records.records import RunningRecord
 from pymoo_hdte.drive import DriveEffect, SteadyMotion
 
 _CHANNELS = ("transmission_error", "motor_torque", "coupling_torque", "lead")
+_STEPS = 4
+"""Steps to the angle of the changed drive; each leaves the lead's slope, some hundredths, of it."""
 
 
 def with_effects(campaign: Campaign, rig: TrueRig, effects: Sequence[DriveEffect]) -> Campaign:
@@ -56,20 +58,25 @@ def with_effects(campaign: Campaign, rig: TrueRig, effects: Sequence[DriveEffect
     return replace(campaign, running=running)
 
 
-def _signals(motion: SteadyMotion, row: int, record: RunningRecord) -> NDArray[np.float64]:
-    """Return the channels (4, n) of a row at the times of a record."""
-    waves = np.exp(1j * np.outer(motion.torus.orders, record.input_angle))
+def _signals(motion: SteadyMotion, row: int, angle: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the channels (4, n) of a row at angles (n,) of the input."""
+    waves = np.exp(1j * np.outer(motion.torus.orders, angle))
     return (np.array([getattr(motion, name)[row] for name in _CHANNELS]) @ waves).real
 
 
 def _changed(
     record: RunningRecord, row: int, calm: SteadyMotion, changed: SteadyMotion, ratio: float
 ) -> RunningRecord:
-    error, motor, coupling, lead = _signals(changed, row, record) - _signals(calm, row, record)
+    before = _signals(calm, row, record.input_angle)
+    even, angle = record.input_angle - before[3], record.input_angle
+    # All signals depend on the angle as it is, which the lead changes; it varies far more slowly.
+    for _ in range(_STEPS):
+        angle = even + _signals(changed, row, angle)[3]
+    error, motor, coupling, _ = _signals(changed, row, angle) - before
     return replace(
         record,
-        input_angle=record.input_angle + lead,
-        output_angle=record.output_angle + lead / ratio - error,
+        input_angle=angle,
+        output_angle=record.output_angle + (angle - record.input_angle) / ratio - error,
         input_torque=record.input_torque + motor,
         output_torque=record.output_torque + coupling,
     )
