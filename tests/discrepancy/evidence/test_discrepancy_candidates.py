@@ -33,9 +33,9 @@ NAMES = {
     "coulomb_friction", "stribeck_friction", "position_dependent_friction", "nonlinear_drag",
     "mesh_stiffness_variation", "kinematic_error", "kinematic_reaction", "eccentricity",
     "torque_ripple", "load_dependent_friction", "load_inertia", "damping_reference",
-    "thermal_drift", "presliding_friction",
+    "thermal_drift", "presliding_friction", "uneven_load_sharing",
 }  # fmt: skip
-"""Of design section 7, "Words", and the friction before breakaway that a sweep shows."""
+"""Of design section 7, "Words", with the friction before breakaway and the half stiffness."""
 SEEN = [3.0, 6.0, 46.0 / BELIEVED.ratio]
 LISTED = drive_candidates(
     port_sizes(BELIEVED, [*ORDERS, *SEEN, 2.0 * 46.0 / BELIEVED.ratio], SEEN, SCALES)
