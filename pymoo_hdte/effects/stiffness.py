@@ -313,8 +313,9 @@ def guess_of_clearance(
     """Guess a play that varies with the shaft, by half of its mean and more.
 
     There is one guess for each of the orders. ``law`` is made of order, phase, half-width,
-    variation, and half-width where the input is locked. The least width is an unknown of its own: a
-    play with negative width would be clipped to zero, where a search has no gradient.
+    variation and, where a sweep shows it, half-width where the input was locked. The least width is
+    an unknown of its own: a play with negative width would be clipped to zero, where a search has
+    no gradient.
     """
     if sizes.stiffness == 0.0 or sizes.between:
         return []
@@ -324,14 +325,16 @@ def guess_of_clearance(
 
         def build(values: Sequence[float], order: float = order) -> tuple[Law, ...]:
             variation, phase = polar(values[0], values[1])
-            return (law((order, phase, values[2] + variation, variation, values[3])),)
+            return (law((order, phase, values[2] + variation, variation, *values[3:])),)
 
         unknowns = (
             *wave("variation", widest / 2.0, size),
             unknown("narrowest", 0.0, widest, size, linear=True),
-            unknown("locked", 0.0, 2.0 * widest, size, linear=True),
         )
-        shapes = ((1, 0, 1, 1), (0, 1, 1, 1), (0, 0, 1, 1), (0, 0, 1, 2))
+        shapes: list[tuple[int, ...]] = [(1, 0, 1), (0, 1, 1), (0, 0, 1)]
+        if sizes.swept:
+            unknowns = (*unknowns, unknown("locked", 0.0, 2.0 * widest, size, linear=True))
+            shapes = [(1, 0, 1, 1), (0, 1, 1, 1), (0, 0, 1, 1), (0, 0, 1, 2)]
         starts = [[size * factor for factor in shape] for shape in shapes]
         guesses.append(Guess(unknowns, starts, build, Family((order,))))
     return guesses

@@ -69,6 +69,19 @@ def test_what_is_not_listed_is_the_encoder_s_alone():
     }
 
 
+@pytest.mark.parametrize("swept", [True, False])
+def test_the_play_where_the_input_was_locked_is_sought_with_a_sweep_only(swept):
+    """No other record knows it: it would end at a bound by chance."""
+    sizes = port_sizes(BELIEVED, ORDERS.tolist(), [], replace(SCALES, swept=swept))
+    plays = [one for one in drive_candidates(sizes) if "narrowest" in names_of(one)]
+    assert {one.name for one in plays} == {"clearance_variation", "uneven_load_sharing"}
+    assert {"locked" in names_of(one) for one in plays} == {swept}
+
+
+def names_of(candidate):
+    return [parameter.name for parameter in candidate.parameters]
+
+
 def test_labels_tell_candidates_apart():
     assert len({candidate.label for candidate in LISTED}) == len(LISTED)
 

@@ -232,7 +232,8 @@ def port_sizes(
             speed=shared.speed / slower[port],
             damping=damping[port],
             load=scales.torque / believed.ratio if port == "input" else 0.0,
-            swept=scales.swept and port == "output",
+            # The output turns as far as the mesh is twisted.
+            swept=scales.swept and port in ("output", "mesh"),
             turns=port == "load",
             slower=slower[port],
             expected=_SHAFTS[port],
