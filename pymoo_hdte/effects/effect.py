@@ -35,7 +35,7 @@ FORMS: Mapping[str, tuple[str, ...]] = {
     "power_of_load": ("input",),
     "curve_of_torsion": ("mesh",),
     "slipping_springs": ("mesh",),
-    "harmonics_of_torque": ("input",),
+    "harmonics_of_torque": ("input", "load"),
     "harmonics_of_stiffness": ("mesh",),
     "harmonics_of_error": ("mesh",),
     "harmonics_of_scale": ("sensor",),
@@ -77,8 +77,9 @@ class Effect:
     law : type or None
         Dataclass of the law, whose fields are numbers in SI; None if it is no law at a port.
     ports : tuple of str
-        Ports of a drive where it may be, of ``"input"``, ``"output"``, ``"mesh"`` and ``"sensor"``;
-        empty for an effect of other mechanisms only. A law may be at any port of a mechanism.
+        Ports of a drive where it may be, of ``"input"``, ``"output"``, ``"mesh"``, ``"load"``
+        and ``"sensor"``; empty for an effect of other mechanisms only. A law may be at any port of
+        a mechanism.
     quantities : mapping of str to str
         For each number its quantity, of `fields.UNITS`, or a unit of SI; empty for a dimensionless
         one. Fields of the law that are not listed here are in no file.

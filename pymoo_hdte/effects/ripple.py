@@ -1,4 +1,4 @@
-"""A torque ripple of the motor: a force at an order of its position that acts on the motion."""
+"""A torque ripple of motor or brake: a force at an order of the position, with the motion."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from pymoo_hdte.effects.effect import Effect, register
 from pymoo_hdte.effects.guess import Guess, Sizes, guess_of_lines
 from pymoo_hdte.effects.law import Periodic, PortState, Response
 from pymoo_hdte.effects.portable import Formula
+from pymoo_hdte.effects.unknowns import is_whole
 
 
 @dataclass(frozen=True)
@@ -31,7 +32,7 @@ class PeriodicTorque(Periodic):
 
     @property
     def driving(self) -> complex:
-        """Its phasor, N.m: the torque is the motor's."""
+        """Its phasor, N.m: the torque is that of motor or brake."""
         return complex(self.amplitude * np.exp(1j * self.phase))
 
     @property
@@ -46,11 +47,17 @@ def torque_line(order: float, amplitude: float, phase: float) -> PeriodicTorque:
 
 
 def _ripple(sizes: Sizes) -> list[Guess]:
+    """Guess ripples at seen orders, behind a gear at those of two and more whole cycles in a turn.
+
+    There nothing of a shaft has other orders, and a ripple once a turn is the same as `Gravity`.
+    """
+    turns = [family.orders[0] for family in sizes.lines]
     return [
         guess_of_lines(
             family, "amplitude", sizes.largest, sizes.residual, torque_line, form=family.form
         )
-        for family in sizes.lines
+        for family, order in zip(sizes.lines, turns, strict=True)
+        if sizes.slower == 1.0 or (order > 1.5 and is_whole(order))
     ]
 
 
@@ -58,10 +65,11 @@ register(
     Effect(
         "torque_ripple",
         PeriodicTorque,
-        ("input",),
+        ("input", "output", "load"),
         {"order": "", "phase": "angle", "amplitude": "torque"},
         "A ripple at the {port}, order {order} of its position, that acts on the motion.",
         _ripple,
+        sought=("input", "load"),
         exact=True,
         forms="harmonics_of_torque",
     )

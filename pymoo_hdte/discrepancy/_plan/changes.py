@@ -19,6 +19,7 @@ from pymoo_hdte.discrepancy._selection.candidate import Candidate, Layout
 from pymoo_hdte.discrepancy._selection.fitting import Fit
 from pymoo_hdte.drive import DriveEffect
 from pymoo_hdte.effects.effect import effect_named, place_of
+from pymoo_hdte.effects.law import OUTPUT_SHAFT
 
 Values = NDArray[np.float64]
 Change = Callable[[Sequence[DriveEffect]], Values]
@@ -115,7 +116,7 @@ def stated_orders(effects: Sequence[DriveEffect], ratio: float) -> list[float]:
     for effect in effects:
         _, port, order = place_of(effect)
         if order is not None:
-            orders.add(order / (ratio if port in ("output", "sensor") else 1.0))
+            orders.add(order / (ratio if port in (*OUTPUT_SHAFT, "sensor") else 1.0))
     return sorted(orders)
 
 

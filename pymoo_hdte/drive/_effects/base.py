@@ -44,6 +44,8 @@ class DriveSizes(Sizes):
         Duration of the session, s.
     changes : tuple of float
         Times of the session between records, at which a reading may have changed at once, s.
+    series : tuple of float
+        Times of the session between series of measurements, s: as stated, else ``changes``.
     loads_differ : bool
         Whether the records are taken under different loads.
     """
@@ -55,6 +57,7 @@ class DriveSizes(Sizes):
     inertia: float = 0.0
     duration: float = 0.0
     changes: tuple[float, ...] = ()
+    series: tuple[float, ...] = ()
     loads_differ: bool = False
 
     def further(self) -> Self:
@@ -189,7 +192,7 @@ class LawAtPort(DriveEffect):
     name : str
         Name of the effect, in model files and verdicts, e.g. ``"coulomb_friction"``.
     port : str
-        ``"input"``, ``"output"`` or ``"mesh"``, where the law may be.
+        ``"input"``, ``"output"``, ``"mesh"`` or ``"load"``, where the law may be.
     law : Law
         A law of the type that belongs to the name; its numbers are in SI.
 

@@ -150,15 +150,14 @@ def _predict_group(
     gain = 1.0 + values["output_torque_gain"][:, None]
     load = (conditions.output_torque - values["output_torque_zero"][:, None]) / gain
     coefficients = coefficients_of(believed, values, present, records)
+    coefficients = replace(coefficients, elapsed=np.tile(conditions.elapsed, count))
     if conditions.temperature is not None:
         coefficients = replace(coefficients, temperature=np.tile(conditions.temperature, count))
     nearby = None if start is None else start.rows(np.tile(np.arange(records), count))
     speed = np.tile(conditions.input_speed, count)
     balance = steady_motions(coefficients, speed, load.ravel(), rig, nearby, effort)
-    output_torque = balance.coupling_torque
-    if rig.output_torque_at == "brake":
-        # Behind the load inertia there is only the torque of the load, which is constant.
-        output_torque = output_torque * (np.arange(output_torque.shape[1]) == 0)
+    at_brake = rig.output_torque_at == "brake"
+    output_torque = balance.brake_torque if at_brake else balance.coupling_torque
     channels = [
         balance.transmission_error,
         balance.motor_torque + _motor_ripple(balance, coefficients),
