@@ -75,6 +75,11 @@ class Sizes:
         All orders at which records could show lines; further harmonics could not be determined.
     together : bool
         Whether the variation at all seen orders is searched for as one effect.
+    coupling : bool
+        Whether a coupling of a bench, which may be out of line, sits between the port and the
+        sensor of its torque.
+    braked : float
+        Largest load, N.m, of a port where a brake holds it; 0 elsewhere.
     between : bool
         Whether the port lies between two measured angles: its position is the torsion of a gear,
         and what is periodic there varies with the angle of its input.
@@ -101,6 +106,8 @@ class Sizes:
     clear: tuple[float, ...] = ()
     shown: tuple[float, ...] = ()
     together: bool = False
+    coupling: bool = False
+    braked: float = 0.0
     between: bool = False
 
     def family(self, order: float, most: int = 2) -> Family:

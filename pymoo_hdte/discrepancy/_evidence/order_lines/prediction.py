@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from pymoo_hdte.discrepancy._evidence.order_lines.bench import IDEAL, Bench
 from pymoo_hdte.discrepancy._evidence.order_lines.steady_states import (
     PREDICTION,
     Effort,
@@ -21,7 +22,6 @@ from pymoo_hdte.discrepancy._evidence.order_lines.steady_states import (
     steady_motions,
 )
 from pymoo_hdte.discrepancy._records.believed import MECHANICAL, BelievedDrive, Rig
-from pymoo_hdte.discrepancy._records.known_values import of_equal_numbers
 from pymoo_hdte.discrepancy._records.line_fit import CHANNELS
 from pymoo_hdte.drive import (
     Coefficients,
@@ -102,6 +102,7 @@ def predict(
     effects: Sequence[DriveEffect] = (),
     start: SteadyMotion | None = None,
     effort: Effort = PREDICTION,
+    bench: Bench = IDEAL,
 ) -> Prediction:
     """Return the predicted readings of the sensors.
 
@@ -121,9 +122,11 @@ def predict(
         Steady states of the records for nearby values, to begin from.
     effort : Effort
         How far the steady states are searched for.
+    bench : Bench
+        Nuisances, whose unknowns are among the values.
     """
     parts = []
-    groups = of_equal_numbers(believed.effects, values)
+    groups = bench.groups(believed.effects, values)
     for rows, known in groups:
         group = {name: column[rows] for name, column in values.items()}
         present = (*known, *effects)

@@ -216,6 +216,8 @@ def port_sizes(
             load=scales.torque / believed.ratio if port == "input" else 0.0,
             swept=scales.swept and port == "output",
             turns=port == "load",
+            coupling=port in ("input", "output"),
+            braked=scales.torque if port == "load" else 0.0,
             slower=slower[port],
             expected=_SHAFTS[port],
         )

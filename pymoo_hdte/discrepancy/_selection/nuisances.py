@@ -1,0 +1,111 @@
+"""Nuisances of a bench: whether one of them explains a misfit better than any effect does.
+
+They are searched for as effects are, by signature first and then by a fit, alone and beside effects
+that have been fitted. One that leads becomes a part of the base, and everything is judged anew: so
+no hypothesis has it or lacks it, and none is preferred for it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from pymoo_hdte.discrepancy._selection.fitting import Fit, fit
+from pymoo_hdte.discrepancy._selection.hypothesis import Hypothesis
+from pymoo_hdte.discrepancy._selection.screening import Screened, beyond_parameters, reduced
+from pymoo_hdte.discrepancy._selection.search import Search
+
+
+def leading_nuisance(search: Search, beside: Hypothesis | None = None) -> Fit | None:
+    """Return a fit with the nuisance that explains most of what a set leaves; None without one.
+
+    It has to do better than each effect that has been fitted in its place and, beside a set, than
+    each that could be added to it. Gains count in units of what is left, as if that were noise
+    (Birge, Physical Review 40, 1932), and each unknown costs its share of the BIC.
+
+    Parameters
+    ----------
+    search : Search
+    beside : Hypothesis, optional
+        Set beside which it is searched for; by default there are no effects.
+    """
+    fitted = search.base if beside is None else beside.fit
+    ranked = _ranked(search, beside, [*search.nuisances, *search.screened])
+    nuisances = [effect for effect in ranked if effect.candidate.nuisance]
+    promising = [
+        effect
+        for effect in nuisances[: search.data.rules.most_seconds]
+        if effect.reduction >= _cost(search, effect.candidate.unknowns)
+        and _may_lead(search, effect, beside)
+    ]
+    trials = [_with(search, fitted, effect) for effect in promising]
+    if not trials:
+        return None
+    best = min(trials, key=lambda trial: trial.chi_square)
+    nuisance = best.candidates[-1]
+    misfit, gain = best.misfit, fitted.chi_square - best.chi_square
+    if gain < misfit * _cost(search, nuisance.unknowns):
+        return None
+    logarithm = np.log(len(fitted.residuals))
+    lead = gain / misfit - nuisance.unknowns * logarithm
+    others = [
+        effect.reduction / misfit - effect.candidate.unknowns * logarithm
+        for effect in (ranked if beside is not None else [])
+        if not effect.candidate.nuisance and effect.candidate.releases is None
+    ]
+    others += [
+        (fitted.chi_square - rival.fit.chi_square) / misfit
+        - (_unknowns(rival.fit) - _unknowns(fitted)) * logarithm
+        for rival in search.hypotheses
+        if beside is None or set(rival.candidates) > set(beside.candidates)
+    ]
+    return best if lead >= max(others, default=-np.inf) else None
+
+
+def _may_lead(search: Search, effect: Screened, beside: Hypothesis | None) -> bool:
+    """Tell whether a nuisance could do as well as the best single effect.
+
+    A prediction is nearly linear in most nuisances, so that half of it to first order is enough.
+    """
+    if beside is not None or not search.hypotheses:
+        return True
+    share = search.data.rules.explained_part_share
+    return effect.reduction >= share * search.hypotheses[0].removed
+
+
+def _ranked(
+    search: Search, beside: Hypothesis | None, screened: Sequence[Screened]
+) -> list[Screened]:
+    """Return screened candidates by what each could remove of what a set leaves in any form."""
+    if beside is None:
+        effects = list(screened)
+    else:
+        unexplained = search.forms.unexplained(beside.fit)
+        if unexplained is None:
+            directions, residual = beyond_parameters(beside.fit)
+        else:
+            directions, residual = unexplained.directions, unexplained.residual
+        effects = [
+            reduced(effect, directions, residual)
+            for effect in screened
+            if effect.candidate.releases is None
+            and all(effect.candidate.goes_with(member) for member in beside.candidates)
+        ]
+    return sorted(effects, key=lambda effect: -effect.reduction)
+
+
+def _with(search: Search, fitted: Fit, effect: Screened) -> Fit:
+    """Return a fit with one more candidate, just enough to rank it."""
+    values = np.append(fitted.values, effect.start)
+    settled = search.data.rules.trial_gain
+    return fit(search.data, (*fitted.candidates, effect.candidate), values, settled=settled)
+
+
+def _cost(search: Search, unknowns: int) -> float:
+    """Return the gain that so many unknowns need, in units of the noise."""
+    return float(unknowns * np.log(len(search.base.residuals)) + search.data.rules.bic_gain)
+
+
+def _unknowns(fitted: Fit) -> int:
+    return fitted.n_base + sum(candidate.unknowns for candidate in fitted.candidates)
