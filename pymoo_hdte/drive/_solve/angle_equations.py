@@ -198,7 +198,10 @@ class AngleEquations:
         load = self.load if port in ("mesh", "load") else load
         warmth = np.reshape(self.coefficients.temperature, (-1, 1))
         around = (self._path, self._back)
-        state = PortState(position, speed, phase, stiffness, *around, load, warmth, recurs=True)
+        elapsed = np.reshape(self.coefficients.elapsed, (-1, 1))
+        state = PortState(
+            position, speed, phase, stiffness, *around, load, warmth, recurs=True, elapsed=elapsed
+        )
         return reduce(added, (law.respond(state) for law in laws))
 
     def _path(self, values: Values) -> Values:

@@ -30,6 +30,7 @@ from pymoo_hdte.drive import (
 )
 from pymoo_hdte.drive._effects import Session
 from pymoo_hdte.drive._solve.order_spectrum import sine_phasor
+from pymoo_hdte.effects.law import Values
 
 _SAME = 1e-8
 """Orders nearer to each other are one; those of a torus are sums of rounded numbers."""
@@ -151,8 +152,11 @@ def _predict_group(
     """Return the prediction of vectors that share all effects ``present``."""
     count, records = len(values["offset"]), len(conditions)
     gain = 1.0 + values["output_torque_gain"][:, None]
-    load = (conditions.output_torque - values["output_torque_zero"][:, None]) / gain
+    of_torques = _torque_readings(present, conditions)
+    load = conditions.output_torque - of_torques[1] - values["output_torque_zero"][:, None]
+    load = load / gain
     coefficients = coefficients_of(believed, values, present, records)
+    coefficients = replace(coefficients, elapsed=np.tile(conditions.elapsed, count))
     if conditions.temperature is not None:
         coefficients = replace(coefficients, temperature=np.tile(conditions.temperature, count))
     nearby = None if start is None else start.rows(np.tile(np.arange(records), count))
@@ -160,8 +164,12 @@ def _predict_group(
     balance = steady_motions(coefficients, speed, load.ravel(), rig, nearby, effort)
     at_brake = rig.output_torque_at == "brake"
     output_torque = balance.brake_torque if at_brake else balance.coupling_torque
+    error = balance.transmission_error
+    for effect in present:
+        turned = effect.turned_back(balance.torus.orders * speed[:, None])
+        error = error if turned is None else error + turned * balance.coupling_torque
     channels = [
-        balance.transmission_error,
+        error,
         balance.motor_torque + _motor_ripple(balance, coefficients),
         output_torque,
         balance.lead,
@@ -170,6 +178,7 @@ def _predict_group(
     means = np.array([channel[:, 0].real for channel in channels])
     phasors = lines.reshape(count, records, len(CHANNELS), len(orders))
     mean = means.T.reshape(count, records, len(CHANNELS))
+    mean[..., 1:3] += of_torques.T
     _add_sensor_errors(believed.ratio, conditions, orders, values, present, mean, phasors)
     return Prediction(mean, phasors, balance)
 
@@ -286,6 +295,15 @@ def _motor_ripple(balance: SteadyMotion, coefficients: Coefficients) -> NDArray[
             column, conjugate = balance.torus.place(order)
             total[:, column] += law.driving.conjugate() if conjugate else law.driving
     return total
+
+
+def _torque_readings(effects: Sequence[DriveEffect], conditions: Conditions) -> Values:
+    """Return what effects add to the readings of both torques in each record, N.m, shape (2, r)."""
+    added = np.zeros((2, len(conditions)))
+    for effect in effects:
+        reading = effect.torque_reading(conditions.elapsed)
+        added += 0.0 if reading is None else reading
+    return added
 
 
 def _add_sensor_errors(

@@ -201,6 +201,8 @@ def port_sizes(
         temperature=scales.temperature,
         changes=scales.changes,
         loads_differ=scales.loads_differ,
+        readings=(scales.input_torque, scales.output_torque),
+        largest_readings=(LARGEST * scales.input_torque, LARGEST * scales.output_torque),
     )
     slower = {port: 1.0 if port in ("input", "mesh") else believed.ratio for port in residual}
     return {
