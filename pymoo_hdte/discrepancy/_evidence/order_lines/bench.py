@@ -14,6 +14,9 @@ from numpy.typing import NDArray
 
 from pymoo_hdte.discrepancy._records.known_values import of_equal_numbers
 from pymoo_hdte.discrepancy._selection.candidate import Candidate
+from pymoo_hdte.discrepancy._selection.caveats import strength_is_certain
+from pymoo_hdte.discrepancy._selection.fitting import Fit
+from pymoo_hdte.discrepancy._selection.rules import Rules
 from pymoo_hdte.drive import DriveEffect
 from pymoo_hdte.effects.unknowns import Parameter
 
@@ -50,6 +53,24 @@ class Bench:
             )
         )
 
+    @property
+    def unknowns(self) -> tuple[str, ...]:
+        """Names of their unknowns among those of the base."""
+        return tuple(name for nuisance in self.nuisances for name in names_of(nuisance))
+
+    def shown(self, fitted: Fit, rules: Rules) -> list[tuple[Candidate, slice]]:
+        """Return the nuisances whose strength a fit shows, each with the places of its values."""
+        names = [parameter.name for parameter in fitted.parameters]
+        places = []
+        for nuisance in self.nuisances:
+            begin = names.index(names_of(nuisance)[0])
+            places.append((nuisance, slice(begin, begin + len(nuisance.parameters))))
+        return [
+            (nuisance, place)
+            for nuisance, place in places
+            if strength_is_certain(fitted, nuisance, place, rules)
+        ]
+
     def effects(self, values: Mapping[str, float]) -> tuple[DriveEffect, ...]:
         """Return them as effects of a drive, for values by the names of `parameters`."""
         return tuple(
@@ -73,7 +94,7 @@ class Bench:
         list of tuple
             Indices of the vectors of a group; its believed effects, then those of the bench.
         """
-        names = [name for nuisance in self.nuisances for name in names_of(nuisance)]
+        names = self.unknowns
         groups = of_equal_numbers(known, values)
         if not names:
             return groups
