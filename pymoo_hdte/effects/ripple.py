@@ -107,19 +107,19 @@ def _ripple(sizes: Sizes) -> list[Guess]:
     """Guess ripples at seen orders, behind a gear at those of two and more whole cycles in a turn.
 
     There nothing of a shaft has other orders, and a ripple once a turn is the same as `Gravity`. A
-    coupling behind a gear has both, and a brake its ripple in proportion to the load as well.
+    coupling has both, and a brake its ripple in proportion to the load as well.
     """
     behind_gear, lines = sizes.slower != 1.0, sizes.lines
-    if behind_gear and sizes.coupling:
-        return [_of_coupling(sizes, torque_line)]
     if behind_gear:
-        lines = [family for family in lines if _is_of_shaft(family.orders[0])]
+        lines = [family for family in lines if sizes.turns and _is_of_shaft(family.orders[0])]
     guesses = [
         guess_of_lines(
             family, "amplitude", sizes.largest, sizes.residual, torque_line, form=family.form
         )
         for family in lines
     ]
+    if behind_gear and sizes.coupling:
+        guesses.append(_of_coupling(sizes, torque_line))
     brakes = [sizes.family(1.0), *lines] if sizes.braked else []
     return [*guesses, *(_of_brake(family, sizes) for family in brakes)]
 

@@ -218,7 +218,7 @@ def port_sizes(
             load=scales.torque / believed.ratio if port == "input" else 0.0,
             swept=scales.swept and port == "output",
             turns=port == "load",
-            coupling=port in ("input", "output"),
+            coupling=port in ("input", "output", "load"),
             braked=scales.torque if port == "load" else 0.0,
             slower=slower[port],
             expected=_SHAFTS[port],
