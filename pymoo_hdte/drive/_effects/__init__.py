@@ -16,6 +16,7 @@ from pymoo_hdte.drive._effects.load_damping import LoadDamping
 from pymoo_hdte.drive._effects.load_error import LoadDependentError
 from pymoo_hdte.drive._effects.mesh_stiffness import MeshStiffnessVariation
 from pymoo_hdte.drive._effects.presliding import PreslidingFriction
+from pymoo_hdte.drive._effects.series_error import ChangedStaticError
 from pymoo_hdte.drive._effects.shafts import CoupledInertia, DampingReference, LoadInertia
 from pymoo_hdte.drive._effects.static_error import KinematicErrorLine, KinematicReaction
 from pymoo_hdte.drive._effects.torque_sensors import (
@@ -29,6 +30,7 @@ from pymoo_hdte.drive._effects.warming import WarmingFriction
 __all__ = [
     "ENCODER_LINE",
     "BenchResonance",
+    "ChangedStaticError",
     "CoupledInertia",
     "DampingReference",
     "DriveEffect",

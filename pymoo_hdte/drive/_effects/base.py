@@ -44,6 +44,8 @@ class DriveSizes(Sizes):
         Duration of the session, s.
     changes : tuple of float
         Times of the session between records, at which a reading may have changed at once, s.
+    series : tuple of float
+        Times of the session between series of measurements, s: as stated, else ``changes``.
     loads_differ : bool
         Whether the records are taken under different loads.
     readings, largest_readings : tuple of float
@@ -58,6 +60,7 @@ class DriveSizes(Sizes):
     inertia: float = 0.0
     duration: float = 0.0
     changes: tuple[float, ...] = ()
+    series: tuple[float, ...] = ()
     loads_differ: bool = False
     readings: tuple[float, float] = (0.0, 0.0)
     largest_readings: tuple[float, float] = (0.0, 0.0)

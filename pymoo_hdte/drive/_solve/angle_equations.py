@@ -25,12 +25,12 @@ from pymoo_hdte.drive._solve.coefficients import Coefficients
 from pymoo_hdte.drive._solve.recursion import Recollection
 from pymoo_hdte.drive._solve.steady_motion import Phasors, SpeedLoop
 from pymoo_hdte.drive._solve.torus import Torus
-from pymoo_hdte.effects.law import OUTPUT_SHAFT, Memory, PortState, Response
+from pymoo_hdte.effects.law import Memory, PortState, Response
 
 _STATIC_STEPS = 8
 _BY_ROW = (
-    "speed", "load", "output_inertia", "output_damping", "static", "_static_slope", "_stiffness",
-    "_backward", "_share_of_mesh", "rate", "input_operator",
+    "speed", "load", "output_inertia", "output_damping", "static", "_static_error", "_static_slope",
+    "_stiffness", "_backward", "_share_of_mesh", "rate", "input_operator",
 )  # fmt: skip
 """Attributes of `AngleEquations` with a row per case; the last three are computed on demand."""
 
@@ -45,9 +45,9 @@ class TorsionMotion:
 
     ``energy`` are the harmonics of E, (n, n_harmonics). ``mesh_slope`` and ``mesh_damping`` are the
     derivatives of ``mesh_torque`` by torsion and by its rate, ``output_loss`` that of
-    ``output_friction`` by speed, both of the laws at output and load together; ``of_load`` is the
-    part of those at the load. What is the same on the whole grid, or of no law, may have one column
-    or row, or be a number.
+    ``output_friction`` by speed, both of the laws at output and load together. ``of_load`` is the
+    part of those at the load, and ``of_brake`` of what drives or brakes there. What is the same on
+    the whole grid, or of no law, may have one column or row, or be a number.
     """
 
     energy: Phasors
@@ -61,6 +61,7 @@ class TorsionMotion:
     output_friction: Values
     output_loss: Values
     of_load: Values
+    of_brake: Values
 
 
 class AngleEquations:
@@ -86,6 +87,7 @@ class AngleEquations:
         ):
             place, conjugate = torus.place(float(order))
             self.static[:, place] += phasor.conj() if conjugate else phasor
+        self._static_error = torus.signal(self.static)
         self._static_slope = torus.signal(torus.derivative(self.static))
         angle = 2.0 * torus.phase(1.0) + coefficients.stiffness_phase
         varying = 1.0 + coefficients.stiffness_depth * np.cos(angle)
@@ -117,7 +119,7 @@ class AngleEquations:
     def torsion_by_load(self) -> Values:
         """Return the largest torsion, shape (n, 1), by which laws at the load twist the mesh."""
         speed = np.broadcast_to(self.speed / self.coefficients.ratio, (len(self.speed), 1))
-        torque = np.atleast_2d(self._laws("load", np.full_like(speed, np.nan), speed).torque)
+        torque = self._of_output("load", speed, np.zeros_like(speed)).torque
         return np.abs(torque).max(axis=1, keepdims=True) / self.coefficients.stiffness[:, None]
 
     def motion(self, torsion: Phasors, energy: Phasors) -> TorsionMotion:
@@ -146,12 +148,9 @@ class AngleEquations:
         rate = angular_speed * slope_there
         stiffness, damping = self._stiffness, coefficients.damping[:, None]
         mesh = self._laws("mesh", position, rate)
-        # The position is not known on the grid, whose points are no times of one turn.
-        at_load = self._laws("load", np.full_like(output_speed, np.nan), output_speed)
-        output = added(
-            self._laws("output", np.zeros_like(output_speed), output_speed),
-            at_load,
-        )
+        lag = self._static_error + position
+        at_load = self._of_output("load", output_speed, lag)
+        output = added(self._of_output("output", output_speed, lag), at_load)
         return TorsionMotion(
             energy=energy * faster**2,
             angular_speed=angular_speed,
@@ -164,7 +163,19 @@ class AngleEquations:
             output_friction=output.torque,
             output_loss=np.asarray(output.damping),
             of_load=np.asarray(at_load.torque),
+            of_brake=np.asarray(self._of_output("load", output_speed, lag, driving=True).torque),
         )
+
+    def _of_output(
+        self, port: str, speed: Values, lag: Values, *, driving: bool = False
+    ) -> Response:
+        """Return the sum of the laws at a port that turns with the output, ``lag`` behind alpha/N.
+
+        The grid knows angles up to whole turns only, and so no position. With ``driving`` only laws
+        of what drives or brakes the port count.
+        """
+        position = np.full_like(speed, np.nan)
+        return self._laws(port, position, speed, lag=lag, driving=driving)
 
     def _laws(
         self,
@@ -173,13 +184,13 @@ class AngleEquations:
         speed: Values,
         load: Values | None = None,
         *,
+        lag: Values | None = None,
         driving: bool = False,
     ) -> Response:
         """Return the sum of the laws at a port, which passes on ``load`` besides them.
 
         What the mesh passes on is the load itself: a damping that followed the torque that
-        accelerates inertias would rectify it. With ``driving`` only laws of what drives or brakes
-        the port count.
+        accelerates inertias would rectify it.
         """
         laws = [
             law
@@ -188,11 +199,11 @@ class AngleEquations:
         ]
         if not laws:
             return _NO_LAW
-        # The angle of periodic laws at the output omits the small fluctuation of the output.
-        slower = self.coefficients.ratio if port in OUTPUT_SHAFT else 1.0
 
         def phase(order: float) -> Values:
-            return self.torus.phase(order / slower)
+            if lag is None:
+                return self.torus.phase(order)
+            return np.asarray(self.torus.phase(order / self.coefficients.ratio) - order * lag)
 
         stiffness = self.coefficients.stiffness[:, None]
         load = self.load if port in ("mesh", "load") else load
@@ -278,9 +289,7 @@ class AngleEquations:
 
     def brake_torque(self, motion: TorsionMotion) -> Values:
         """Return the torque between load inertia and brake: T_L and what the brake adds, N.m."""
-        speed = motion.output_speed
-        ripple = self._laws("load", np.full_like(speed, np.nan), speed, driving=True)
-        return self.load + ripple.torque + np.zeros_like(speed)
+        return self.load + motion.of_brake + np.zeros_like(motion.output_speed)
 
     def _of_input(self, motion: TorsionMotion, delivered: Values) -> Values:
         """Return the residual of the first equation on the grid, without the lead's share."""

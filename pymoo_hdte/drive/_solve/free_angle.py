@@ -51,7 +51,7 @@ _SHRINKS = 0.1
 def torus_of(coefficients: Coefficients) -> Torus:
     """Return a torus that holds all excited orders with room for their combinations."""
     excited = [float(order) for order in coefficients.error_orders]
-    excited += [order for order, _ in coefficients.load_errors]
+    excited += coefficients.further_orders
     for port, law in coefficients.laws:
         scale = 1.0 / coefficients.ratio if port in OUTPUT_SHAFT else 1.0
         excited += [scale * order for order in law.orders]

@@ -128,7 +128,7 @@ def equations_of_motion(
         input_torque = accelerating * envelope_rate + (holding + excess) * envelope
         input_torque += losses(speed * envelope)
         output_speed = input_speed / ratio - error_rate
-        output_angle = position / ratio
+        output_angle = position / ratio - error
         delivered = load * envelope + bearing_out * output_speed
         delivered += laws("output", output_angle, output_speed, output_angle)
         delivered += laws("load", output_angle, output_speed, output_angle, load * envelope)

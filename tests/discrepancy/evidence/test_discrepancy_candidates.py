@@ -55,7 +55,7 @@ def values_of(candidate):
 def orders_of(candidate):
     """Orders, in cycles per input turn, of the effects of a candidate that is a line."""
     effects = candidate.build(candidate.starts[-1])
-    slower = BELIEVED.ratio if candidate.port == "sensor" else 1.0
+    slower = BELIEVED.ratio if candidate.port in ("load", "sensor") else 1.0
     return [getattr(effect, "law", effect).order / slower for effect in effects]
 
 

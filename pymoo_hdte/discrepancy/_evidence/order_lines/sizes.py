@@ -45,6 +45,8 @@ class Scales:
         Time from the first record of the session to the last, s.
     changes : tuple of float
         Times between records, none of them near the ends of the session, s.
+    series : tuple of float
+        Those between series of measurements, all if the records state no series.
     swept : bool
         Whether there is a torsion sweep.
     error, input_torque, output_torque : float
@@ -68,6 +70,7 @@ class Scales:
     driven: bool = False
     temperature: float = 0.0
     changes: tuple[float, ...] = ()
+    series: tuple[float, ...] = ()
     swept: bool = False
     loads_differ: bool = False
 
@@ -103,6 +106,7 @@ def scales_of(data: Data, base: Fit) -> Scales:
         driven=bool(braking.max() > least and braking.min() < -least),
         temperature=_temperature(data),
         changes=_changes(when.elapsed),
+        series=_series(features),
         swept=bool(data.torsion),
         loads_differ=bool(np.ptp(when.output_torque) > least),
     )
@@ -121,6 +125,19 @@ def _changes(elapsed: NDArray[np.float64]) -> tuple[float, ...]:
     ordered = np.sort(elapsed)
     late = places_of_change(ordered)
     return tuple(((ordered[late - 1] + ordered[late]) / 2.0).tolist())
+
+
+def _series(features: Features) -> tuple[float, ...]:
+    """Return the times between stated series of measurements, or between all records."""
+    elapsed = features.conditions.elapsed
+    series = np.array([record.series for record in features.records])
+    changes = _changes(elapsed)
+    if np.all(series == series[0]):
+        return changes
+    ordered = series[np.argsort(elapsed, kind="stable")]
+    middle = np.sort(elapsed)
+    between = (middle[:-1] + middle[1:])[ordered[:-1] != ordered[1:]] / 2.0
+    return tuple(time for time in changes if time in between)
 
 
 def _size(features: Features, values: NDArray[np.float64], channel: int) -> float:
@@ -200,6 +217,7 @@ def port_sizes(
         duration=scales.duration,
         temperature=scales.temperature,
         changes=scales.changes,
+        series=scales.series,
         loads_differ=scales.loads_differ,
         readings=(scales.input_torque, scales.output_torque),
         largest_readings=(LARGEST * scales.input_torque, LARGEST * scales.output_torque),
