@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -29,6 +30,13 @@ class LeadResponse:
     motor_torque: Phasors
     coupling_torque: Phasors
     rate: Phasors
+
+    @classmethod
+    def joined(cls, parts: Sequence[LeadResponse], order: NDArray[np.int_]) -> LeadResponse:
+        """Return the cases of several, one after the other, in an order (n,) of their own."""
+        names = [attribute.name for attribute in fields(cls)]
+        columns = [np.concatenate([getattr(part, name) for part in parts]) for name in names]
+        return cls(*(column[order] for column in columns))
 
 
 def lead_response(

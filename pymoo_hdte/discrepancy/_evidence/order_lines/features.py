@@ -118,6 +118,7 @@ def measure(
             [abs(record.input_angle[-1] - record.input_angle[0]) for record in records]
         ),
     )
+    conditions = replace(conditions, lead=np.array([line.phasors[3] for line in lines]))
     values = np.array([stack(line.mean, line.phasors) for line in lines])
     stiffness = campaign.believed.stiffness
     covariance = np.array([_sensor_covariance(line, rig, stiffness) for line in lines])

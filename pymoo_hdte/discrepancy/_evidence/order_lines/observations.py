@@ -80,8 +80,28 @@ class Observations:
         """
         layout = Layout(self.base)
         start = layout.array("start") if self.reference is None else self.reference
-        known = self.features.covariance + self._repeatability(layout, start)
+        known = self._of_sensors(start) + self._repeatability(layout, start)
         return known + self._creep(float(start[layout.index("stiffness")]))
+
+    def _of_sensors(self, start: Vector) -> NDArray[np.float64]:
+        """Return the covariance by the noise of the sensors, (r, f, f).
+
+        Where the measured lead excites the drive, its noise also moves what is predicted of the
+        other channels.
+        """
+        features = self.features
+        response = self.prediction(start[None], self.reference_effects).response
+        if response is None:
+            return features.covariance
+        propagation = np.tile(np.eye(features.values.shape[1]), (len(features.values), 1, 1))
+        real, imaginary = features.places(3).T
+        followed = (response.torsion, response.motor_torque, response.coupling_torque)
+        for channel, by_lead in enumerate(followed):
+            rows, columns = features.places(channel).T
+            propagation[:, rows, real] = propagation[:, columns, imaginary] = -by_lead.real
+            propagation[:, rows, imaginary] = by_lead.imag
+            propagation[:, columns, real] = -by_lead.imag
+        return propagation @ features.covariance @ propagation.swapaxes(1, 2)
 
     @property
     def creep(self) -> float:

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from pymoo_hdte.discrepancy._evidence.order_lines.steady_states import (
     PREDICTION,
     Effort,
+    Lead,
     merged,
     steady_motions,
 )
@@ -29,8 +30,11 @@ from pymoo_hdte.drive import (
     SteadyMotion,
 )
 from pymoo_hdte.drive._effects import Session
+from pymoo_hdte.drive._solve.lead_response import LeadResponse, lead_response
 from pymoo_hdte.drive._solve.order_spectrum import sine_phasor
 
+LOOP = ("loop_gain", "loop_lag")
+"""Unknowns of the speed loop: the share by which it is stronger than stated, and its lag in s."""
 _SAME = 1e-8
 """Orders nearer to each other are one; those of a torus are sums of rounded numbers."""
 _UNRESOLVED = 0.1
@@ -59,6 +63,9 @@ class Conditions:
         default 0.
     fading : complex ndarray, shape (r, k, 1 + m), optional
         Contribution of what fades within a record, see `OrderLines`; by default nothing fades.
+    lead : complex ndarray, shape (r, m), optional
+        Measured lines of the input angle, rad, that excite the drive; by default it moves as the
+        speed loop lets it.
     """
 
     input_speed: NDArray[np.float64]
@@ -69,6 +76,7 @@ class Conditions:
     input_angle: NDArray[np.float64] | None = None
     travel: NDArray[np.float64] | None = None
     fading: NDArray[np.complex128] | None = None
+    lead: NDArray[np.complex128] | None = None
 
     def rows(self, rows: NDArray[np.int_]) -> Conditions:
         """Return the conditions of some of the records."""
@@ -84,13 +92,16 @@ class Conditions:
 class Prediction:
     """Means, shape (v, r, 4), and phasors, (v, r, 4, m), of `CHANNELS` for v vectors, r records.
 
-    SI. The mean of the output torque and of the input angle are conditions, not predictions.
+    SI. The mean of the output torque and of the input angle are conditions, not predictions. Where
+    the measured lead excites, that of the loop is predicted beside it (`_loop_lead`), and
+    ``response`` (v r rows) is how the other channels follow the lead.
     ``balance`` has the steady states, vectors outermost.
     """
 
     mean: NDArray[np.float64]
     phasors: NDArray[np.complex128]
     balance: SteadyMotion
+    response: LeadResponse | None = None
 
 
 def predict(
@@ -154,23 +165,70 @@ def _predict_group(
         coefficients = replace(coefficients, temperature=np.tile(conditions.temperature, count))
     nearby = None if start is None else start.rows(np.tile(np.arange(records), count))
     speed = np.tile(conditions.input_speed, count)
-    balance = steady_motions(coefficients, speed, load.ravel(), rig, nearby, effort)
+    lead = None
+    if conditions.lead is not None:
+        lead = Lead(np.array(orders, dtype=float), np.tile(conditions.lead, (count, 1)))
+    balance = steady_motions(coefficients, speed, load.ravel(), rig, nearby, effort, lead)
     output_torque = balance.coupling_torque
     if rig.output_torque_at == "brake":
         # Behind the load inertia there is only the torque of the load, which is constant.
         output_torque = output_torque * (np.arange(output_torque.shape[1]) == 0)
     channels = [
         balance.transmission_error,
-        balance.motor_torque + _motor_ripple(balance, coefficients),
+        balance.motor_torque,
         output_torque,
         balance.lead,
+        _motor_ripple(balance, coefficients) + np.zeros_like(balance.lead),
+        balance.slower,
     ]
     lines = _lines(balance, channels, orders, believed.ratio, conditions)
-    means = np.array([channel[:, 0].real for channel in channels])
+    response = None
+    if lead is not None:
+        response = lead_response(coefficients.at_loads(load.ravel()), balance.slopes, speed, orders)
+        if rig.output_torque_at == "brake":
+            response = replace(response, coupling_torque=np.zeros_like(response.rate))
+        _follow_lead(lines, response, lead, balance)
+        loop = {name: np.repeat(values[name], records) for name in LOOP}
+        lines[:, 3] = _loop_lead(lines, response, lead, rig, loop)
+    lines[:, 1] += lines[:, 4]
+    lines = lines[:, : len(CHANNELS)]
+    means = np.array([channel[:, 0].real for channel in channels[: len(CHANNELS)]])
     phasors = lines.reshape(count, records, len(CHANNELS), len(orders))
     mean = means.T.reshape(count, records, len(CHANNELS))
     _add_sensor_errors(believed.ratio, conditions, orders, values, present, mean, phasors)
-    return Prediction(mean, phasors, balance)
+    return Prediction(mean, phasors, balance, response)
+
+
+def _follow_lead(
+    lines: NDArray[np.complex128], response: LeadResponse, lead: Lead, balance: SteadyMotion
+) -> None:
+    """Add to lines (n, 6, m) what follows the lead at orders that the torus does not hold."""
+    beyond = [balance.torus.find(order) is None for order in lead.orders.tolist()]
+    phasors = np.where(beyond, lead.phasors, 0.0)
+    followed = (response.torsion, response.motor_torque, response.coupling_torque)
+    for channel, by_lead in enumerate(followed):
+        lines[:, channel] += by_lead * phasors
+    lines[:, 5] -= response.rate * phasors
+
+
+def _loop_lead(
+    lines: NDArray[np.complex128],
+    response: LeadResponse,
+    lead: Lead,
+    rig: Rig,
+    loop: dict[str, NDArray[np.float64]],
+) -> NDArray[np.complex128]:
+    """Return the lead (n, m), rad, at which the loop's torque would be the one that it takes.
+
+    One step of Newton's method from the measured lead: exact for a drive that is linear in it.
+    """
+    gain, lag = (1.0 + loop["loop_gain"])[:, None], loop["loop_lag"][:, None]
+    answer = gain / (1.0 + lag * response.rate)
+    commanded = answer * (rig.proportional * lines[:, 5] - rig.integral * lead.phasors)
+    stiffness = response.motor_torque + answer * (
+        rig.proportional * response.rate + rig.integral
+    )
+    return np.asarray(lead.phasors - (lines[:, 1] - commanded) / stiffness)
 
 
 def _in_order(
@@ -181,7 +239,11 @@ def _in_order(
     mean = np.concatenate([part.mean for part in parts])[order]
     phasors = np.concatenate([part.phasors for part in parts])[order]
     cases = [np.add.outer(records * rows, np.arange(records)).ravel() for rows in places]
-    return Prediction(mean, phasors, merged([part.balance for part in parts], cases))
+    balance = merged([part.balance for part in parts], cases)
+    responses = [part.response for part in parts if part.response is not None]
+    rows = np.argsort(np.concatenate(cases))
+    response = LeadResponse.joined(responses, rows) if responses else None
+    return Prediction(mean, phasors, balance, response)
 
 
 def coefficients_of(
@@ -224,7 +286,7 @@ def _lines(
     ratio: float,
     conditions: Conditions,
 ) -> NDArray[np.complex128]:
-    """Return the phasors of all channels at analysed orders, (n, 4, m), records innermost.
+    """Return the phasors of k channels at analysed orders, (n, k, m), records innermost.
 
     A case that has diverged is NaN in all its harmonics, and so at all orders.
     """
