@@ -31,6 +31,11 @@ class LeadResponse:
     coupling_torque: Phasors
     rate: Phasors
 
+    @property
+    def channels(self) -> Phasors:
+        """Transmission error, torque of the motor and of the coupling, shape (n, 3, m)."""
+        return np.stack([self.torsion, self.motor_torque, self.coupling_torque], axis=1)
+
     @classmethod
     def joined(cls, parts: Sequence[LeadResponse], order: NDArray[np.int_]) -> LeadResponse:
         """Return the cases of several, one after the other, in an order (n,) of their own."""

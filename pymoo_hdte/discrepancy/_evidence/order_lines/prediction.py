@@ -64,8 +64,11 @@ class Conditions:
     fading : complex ndarray, shape (r, k, 1 + m), optional
         Contribution of what fades within a record, see `OrderLines`; by default nothing fades.
     lead : complex ndarray, shape (r, m), optional
-        Measured lines of the input angle, rad, that excite the drive; by default it moves as the
-        speed loop lets it.
+        Measured lines of the input angle, rad, near which the input moves; by default it moves as
+        the speed loop lets it.
+    lead_share : ndarray, shape (r, m), optional
+        Weight of these lines against those of the loop, which together excite the drive; by default
+        1: the measured motion excites, whatever the loop does.
     """
 
     input_speed: NDArray[np.float64]
@@ -77,6 +80,7 @@ class Conditions:
     travel: NDArray[np.float64] | None = None
     fading: NDArray[np.complex128] | None = None
     lead: NDArray[np.complex128] | None = None
+    lead_share: NDArray[np.float64] | None = None
 
     def rows(self, rows: NDArray[np.int_]) -> Conditions:
         """Return the conditions of some of the records."""
@@ -190,6 +194,9 @@ def _predict_group(
         _follow_lead(lines, response, lead, balance)
         loop = {name: np.repeat(values[name], records) for name in LOOP}
         lines[:, 3] = _loop_lead(lines, response, lead, rig, loop)
+        if conditions.lead_share is not None:
+            rest = np.tile(1.0 - conditions.lead_share, (count, 1))
+            lines[:, :3] += response.channels * (rest * (lines[:, 3] - lead.phasors))[:, None]
     lines[:, 1] += lines[:, 4]
     lines = lines[:, : len(CHANNELS)]
     means = np.array([channel[:, 0].real for channel in channels[: len(CHANNELS)]])
@@ -205,9 +212,7 @@ def _follow_lead(
     """Add to lines (n, 6, m) what follows the lead at orders that the torus does not hold."""
     beyond = [balance.torus.find(order) is None for order in lead.orders.tolist()]
     phasors = np.where(beyond, lead.phasors, 0.0)
-    followed = (response.torsion, response.motor_torque, response.coupling_torque)
-    for channel, by_lead in enumerate(followed):
-        lines[:, channel] += by_lead * phasors
+    lines[:, :3] += response.channels * phasors[:, None]
     lines[:, 5] -= response.rate * phasors
 
 
