@@ -21,7 +21,7 @@ class WarmingFriction(Aperiodic):
     """T = -coefficient share (1 - exp(-elapsed / time)) speed.
 
     What a viscous friction loses in a session; its value at the start is the machine's own damping.
-    Where the time of the session is not known, it has lost nothing.
+    Where the time of the session is not known, the bench has warmed up.
 
     Attributes
     ----------
@@ -44,8 +44,8 @@ class WarmingFriction(Aperiodic):
 
     def respond(self, state: PortState) -> Response:
         """Return torque and tangents."""
-        elapsed = np.nan_to_num(np.asarray(state.elapsed), nan=0.0)
-        damping = self.coefficient * self.share * np.expm1(-elapsed / self.time)
+        lost = self.share * np.expm1(-np.asarray(state.elapsed) / self.time)
+        damping = self.coefficient * lost
         return Response(damping * state.speed, damping=damping)
 
 

@@ -63,8 +63,6 @@ class Coefficients:
         Eq. (9), 1 by the principle of virtual work; dimensionless.
     temperature : float or ndarray, shape (n,)
         Temperature of the drive in kelvin; NaN where it is not known.
-    elapsed : float or ndarray, shape (n,)
-        Time of the session, s; NaN where it is not known.
     load_rates : tuple of (int, float)
         What a load that is not rigidly on the output adds to its inertia: numbers k with sizes s,
         each a torque of s times the k-th time derivative of the output's acceleration, s in
@@ -107,7 +105,6 @@ class Coefficients:
     laws: tuple[tuple[str, Law], ...] = ()
     reaction: float = 0.0
     temperature: float | NDArray[np.float64] = np.nan
-    elapsed: float | NDArray[np.float64] = np.nan
     load_rates: tuple[tuple[int, float], ...] = ()
     coupled: tuple[tuple[float, float], ...] = ()
     load_errors: tuple[tuple[float, complex], ...] = ()

@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import chi2
 
 from pymoo_hdte.discrepancy._evidence.order_lines.prediction import Conditions, Prediction
 from pymoo_hdte.discrepancy._records.believed import Rig
@@ -24,6 +25,9 @@ from pymoo_hdte.discrepancy._records.records import RunningRecord
 from pymoo_hdte.discrepancy._records.residual_spectrum import residual_spectrum
 from pymoo_hdte.discrepancy._selection.rules import RULES, Rules
 
+_NEIGHBOURS = 4
+"""Multiples of 1/N on either side of a line that tell the noise there: a mean of sixteen squares,
+which is known to a quarter."""
 MEANS = (0, 1)
 """Channels whose mean is a feature; the others' means are conditions."""
 
@@ -43,6 +47,9 @@ class Features:
         Covariance of the sensors' noise only.
     shown : ndarray of bool, shape (r, m), optional
         Which lines each record shows; by default all.
+    wander : ndarray, shape (r, m), optional
+        Variance of the lines of the input angle by what the motor does beside its loop, rad2: see
+        `_wander`; by default none.
     """
 
     records: tuple[RunningRecord, ...]
@@ -51,6 +58,7 @@ class Features:
     values: NDArray[np.float64]
     covariance: NDArray[np.float64]
     shown: NDArray[np.bool_] | None = None
+    wander: NDArray[np.float64] | None = None
 
     def rows(self, rows: NDArray[np.int_]) -> Features:
         """Return the features of some of the records."""
@@ -61,6 +69,7 @@ class Features:
             self.values[rows],
             self.covariance[rows],
             None if self.shown is None else self.shown[rows],
+            None if self.wander is None else self.wander[rows],
         )
 
     def of_prediction(self, prediction: Prediction) -> NDArray[np.float64]:
@@ -118,14 +127,65 @@ def measure(
             [abs(record.input_angle[-1] - record.input_angle[0]) for record in records]
         ),
     )
+    wander = np.zeros(shown.shape)
+    for row, (record, line, of_record) in enumerate(zip(records, lines, shown, strict=True)):
+        wander[row, of_record] = _wander(record, campaign, line, of_record, rules)
+    noise = np.array([_line_variances(line) for line in lines])
+    conditions = replace(
+        conditions,
+        lead=np.array([line.phasors[3] for line in lines]),
+        lead_share=wander / (wander + noise),
+    )
     values = np.array([stack(line.mean, line.phasors) for line in lines])
     stiffness = campaign.believed.stiffness
     covariance = np.array([_sensor_covariance(line, rig, stiffness) for line in lines])
     # The load is the measured output torque, whose error also shifts the predicted input torque.
     covariance[:, 1, 1] += [_load_variance(record) / ratio**2 for record in records]
     return Features(
-        tuple(records), conditions, all_orders, values, covariance, None if shown.all() else shown
+        tuple(records),
+        conditions,
+        all_orders,
+        values,
+        covariance,
+        None if shown.all() else shown,
+        wander,
     )
+
+
+def _line_variances(line: OrderLines) -> NDArray[np.float64]:
+    """Return the variances of the lines of the input angle by its sensor, rad2, shape (m,)."""
+    variances = np.diag(line.covariance[3])[1:]
+    return np.asarray((variances[: len(line.orders)] + variances[len(line.orders) :]) / 2.0)
+
+
+def _wander(
+    record: RunningRecord,
+    campaign: Campaign,
+    line: OrderLines,
+    shown: NDArray[np.bool_],
+    rules: Rules,
+) -> NDArray[np.float64]:
+    """Return the variance of the shown lines of the input angle beside their noise, rad2.
+
+    Nobody holds a set speed exactly. What the input does between the lines, it does in them as
+    well: the neighbours tell how much. A set point that goes in steps has a speed whose power falls
+    as the square of the frequency, and an angle as its fourth power.
+    """
+    orders = line.orders[shown]
+    searched, amplitudes = residual_spectrum(
+        record, campaign.rig, campaign.believed.ratio, orders, rules.highest_order
+    )
+    power, variances = amplitudes[3] ** 2, _line_variances(line)[shown]
+    excess = np.zeros(len(orders))
+    for place, order in enumerate(orders):
+        middle = int(np.searchsorted(searched, order))
+        near = slice(max(middle - _NEIGHBOURS, 0), middle + _NEIGHBOURS)
+        count = len(searched[near])
+        # The power of each neighbour is exponential under noise, with mean 1.
+        chance = rules.unexpected_line_chance / len(orders)
+        if count and power[near].sum() > chi2.isf(chance, 2 * count) / 2.0:
+            excess[place] = np.mean((power[near] - 1.0) * (searched[near] / order) ** 4)
+    return np.maximum(excess, 0.0) * variances
 
 
 def _at_all_orders(

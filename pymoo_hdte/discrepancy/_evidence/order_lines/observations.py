@@ -94,8 +94,35 @@ class Observations:
         """
         layout = Layout(self.base)
         start = layout.array("start") if self.reference is None else self.reference
-        known = self.features.covariance + self._repeatability(layout, start)
+        known = self._of_sensors(start) + self._repeatability(layout, start)
         return known + self._creep(float(start[layout.index("stiffness")]))
+
+    def _of_sensors(self, start: Vector) -> NDArray[np.float64]:
+        """Return the covariance by the noise of the sensors, (r, f, f).
+
+        Where the measured lead excites the drive, its noise also moves what is predicted of the
+        other channels; where the loop's does, what the motor does beside its loop.
+        """
+        features = self.features
+        response = self.prediction(start[None], self.reference_effects).response
+        if response is None:
+            return features.covariance
+        share = features.conditions.lead_share
+        share = np.ones(response.rate.shape) if share is None else share
+        propagation = np.tile(np.eye(features.values.shape[1]), (len(features.values), 1, 1))
+        moved = np.zeros_like(propagation)
+        of_lead = features.places(3)
+        for channel, by_lead in enumerate(np.moveaxis(response.channels, 1, 0)):
+            places = features.places(channel)
+            _set_blocks(propagation, places, of_lead, -share * by_lead)
+            _set_blocks(moved, places, of_lead, (1.0 - share) * by_lead)
+        covariance = propagation @ features.covariance @ propagation.swapaxes(1, 2)
+        if features.wander is None:
+            return covariance
+        _set_blocks(moved, of_lead, of_lead, np.ones_like(share))
+        variances = np.zeros(features.values.shape)
+        variances[:, of_lead] = features.wander[..., None]
+        return covariance + (moved * variances[:, None]) @ moved.swapaxes(1, 2)
 
     @property
     def creep(self) -> float:
@@ -243,6 +270,19 @@ class Observations:
             solved, _ = dtrtrs(triangle.T, part, trans=True)
             white[..., record, :] = solved.T.reshape(differences[..., record, :].shape)
         return white.reshape(*differences.shape[:-2], -1)
+
+
+def _set_blocks(
+    matrices: NDArray[np.float64],
+    rows: NDArray[np.int_],
+    columns: NDArray[np.int_],
+    factors: NDArray[np.complex128] | NDArray[np.float64],
+) -> None:
+    """Let matrices (r, f, f) multiply lines by ``factors`` (r, m), from places (m, 2) to others."""
+    (real, imaginary), (of_real, of_imaginary) = rows.T, columns.T
+    matrices[:, real, of_real] = matrices[:, imaginary, of_imaginary] = factors.real
+    matrices[:, real, of_imaginary] = -factors.imag
+    matrices[:, imaginary, of_real] = factors.imag
 
 
 def cell_degrees_of_freedom(data: Observations) -> Values:

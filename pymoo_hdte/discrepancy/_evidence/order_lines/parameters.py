@@ -43,10 +43,14 @@ _UNITS = {
     "input_torque_zero": "N.m",
     "output_torque_gain": "1",
     "output_torque_zero": "N.m",
+    "loop_gain": "1",
+    "loop_lag": "s",
 }
 """SI units of the base parameters, by name; those of lines without their number."""
 ACTING_AT = {"input_damping": "input", "output_damping": "output"}
 """Ports at which base parameters act as friction, as a law there does."""
+_LOOP_GAIN = 0.1
+"""Makers state the torque constant of a motor, which is part of both gains, to 10 %."""
 _OF_LINES = ("error_amplitude", "error_phase")
 
 
@@ -142,7 +146,23 @@ def base_parameters(
         # it.
         size = max(float(getattr(rig, name)), 1e-9)
         parameters.append(Parameter(name, 0.0, -10.0 * size, 10.0 * size, size, prior=size))
-    return tuple(parameters)
+    return (*parameters, *_of_loop(believed, rig))
+
+
+def _of_loop(believed: BelievedDrive, rig: Rig) -> tuple[Parameter, Parameter]:
+    """Return the unknowns of the speed loop: nobody holds its torque to the stated gains exactly.
+
+    A loop that lags by the time constant of the speed that it controls has a phase margin of 33
+    degrees: the largest lag with which it is of use, taken as a standard deviation.
+    """
+    driven = believed.input_inertia + (
+        believed.output_inertia + believed.load_inertia
+    ) / believed.ratio**2
+    lag = driven / rig.proportional if rig.proportional else 1e-9
+    return (
+        Parameter("loop_gain", 0.0, -10.0 * _LOOP_GAIN, 10.0 * _LOOP_GAIN, _LOOP_GAIN, prior=_LOOP_GAIN),
+        Parameter("loop_lag", 0.0, -10.0 * lag, 10.0 * lag, lag, prior=lag),
+    )
 
 
 def _bounded(name: str, value: float, tolerance: float) -> Parameter:
