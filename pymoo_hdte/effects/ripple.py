@@ -130,10 +130,17 @@ def _is_of_shaft(order: float) -> bool:
 
 def _of_coupling(sizes: Sizes, line: Callable[[float, float, float], PeriodicTorque]) -> Guess:
     """Guess what a misaligned coupling does once and twice in its turn."""
-    family = sizes.family(1.0)
+    # Shafts that are apart make the first, those at an angle the second: either may be stronger.
+    family = Family(sizes.family(1.0).orders, harmonic=False)
     sentence = "A coupling at the {port} is out of line: a torque once and twice in its turn."
     return guess_of_lines(
-        family, "amplitude", sizes.largest, sizes.residual, line, sentence=sentence
+        family,
+        "amplitude",
+        sizes.largest,
+        sizes.residual,
+        line,
+        form=family.form,
+        sentence=sentence,
     )
 
 
