@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -24,17 +24,27 @@ class LeadResponse:
         Torque that the input takes, and between drive and load inertia, N.m/rad.
     rate : ndarray of complex
         Angular frequency of each order, times 1j, rad/s.
+    slow : ndarray, shape (n, 3, 2)
+        The first three for a slow motion: per rad/s of its speed and per rad/s2 of its
+        acceleration.
     """
 
     torsion: Phasors
     motor_torque: Phasors
     coupling_torque: Phasors
     rate: Phasors
+    slow: NDArray[np.float64]
 
     @property
     def channels(self) -> Phasors:
         """Transmission error, torque of the motor and of the coupling, shape (n, 3, m)."""
         return np.stack([self.torsion, self.motor_torque, self.coupling_torque], axis=1)
+
+    def without_load(self) -> LeadResponse:
+        """Return the response as a torque sensor behind the load inertia reads it."""
+        slow = self.slow.copy()
+        slow[:, 2] = 0.0
+        return replace(self, coupling_torque=np.zeros_like(self.rate), slow=slow)
 
     @classmethod
     def joined(cls, parts: Sequence[LeadResponse], order: NDArray[np.int_]) -> LeadResponse:
@@ -81,7 +91,24 @@ def lead_response(
     own = coefficients.input_inertia[:, None] * rate**2 + inputs * rate
     # The output follows by 1/N less the torsion.
     follows = 1.0 / coefficients.ratio - torsion
+    whole = np.reshape(coefficients.output_inertia, (-1, 1)) + sum(
+        mass for mass, _ in coefficients.coupled
+    )
+    outer = whole - np.reshape(coefficients.output_inertia, (-1, 1)) + np.reshape(
+        coefficients.load_inertia, (-1, 1)
+    )
+    by_rates = [
+        np.hstack([output, whole * np.ones_like(output)]) / (stiffness * coefficients.ratio),
+        np.hstack(
+            [
+                inputs + output / coefficients.ratio**2,
+                coefficients.input_inertia[:, None] + whole / coefficients.ratio**2,
+            ]
+        ),
+        np.hstack([np.zeros_like(output), outer * np.ones_like(output)]) / coefficients.ratio,
+    ]
     return LeadResponse(
+        slow=np.stack(by_rates, axis=1),
         torsion=torsion,
         motor_torque=own + mesh * torsion / coefficients.ratio,
         coupling_torque=beyond * rate**2 * follows,

@@ -20,7 +20,13 @@ from scipy.stats import chi2
 from pymoo_hdte.discrepancy._evidence.order_lines.prediction import Conditions, Prediction
 from pymoo_hdte.discrepancy._records.believed import Rig
 from pymoo_hdte.discrepancy._records.campaign import Campaign
-from pymoo_hdte.discrepancy._records.line_fit import CHANNELS, OrderLines, order_lines
+from pymoo_hdte.discrepancy._records.line_basis import mean_speed
+from pymoo_hdte.discrepancy._records.line_fit import (
+    CHANNELS,
+    OrderLines,
+    order_lines,
+    unsteady_lines,
+)
 from pymoo_hdte.discrepancy._records.records import RunningRecord
 from pymoo_hdte.discrepancy._records.residual_spectrum import residual_spectrum
 from pymoo_hdte.discrepancy._selection.rules import RULES, Rules
@@ -50,6 +56,9 @@ class Features:
     wander : ndarray, shape (r, m), optional
         Variance of the lines of the input angle by what the motor does beside its loop, rad2: see
         `_wander`; by default none.
+    ends : complex ndarray, shape (r, 2, m), optional
+        Lines of the input's acceleration by what is not known of its speed at either end of a
+        record, rad/s2: see `unsteady_lines`; by default none.
     """
 
     records: tuple[RunningRecord, ...]
@@ -59,6 +68,7 @@ class Features:
     covariance: NDArray[np.float64]
     shown: NDArray[np.bool_] | None = None
     wander: NDArray[np.float64] | None = None
+    ends: NDArray[np.complex128] | None = None
 
     def rows(self, rows: NDArray[np.int_]) -> Features:
         """Return the features of some of the records."""
@@ -70,6 +80,7 @@ class Features:
             self.covariance[rows],
             None if self.shown is None else self.shown[rows],
             None if self.wander is None else self.wander[rows],
+            None if self.ends is None else self.ends[rows],
         )
 
     def of_prediction(self, prediction: Prediction) -> NDArray[np.float64]:
@@ -109,11 +120,13 @@ def measure(
     ratio, rig = campaign.believed.ratio, campaign.rig
     all_orders = np.array(orders)
     shown = np.array([all_orders <= shown_order(record, rules) for record in records])
-    lines = [
-        _at_all_orders(
-            order_lines(record, rig, ratio, all_orders[of_record]), all_orders, of_record
-        )
+    measured = [
+        order_lines(record, rig, ratio, all_orders[of_record])
         for record, of_record in zip(records, shown, strict=True)
+    ]
+    lines = [
+        _at_all_orders(line, all_orders, of_record)
+        for line, of_record in zip(measured, shown, strict=True)
     ]
     conditions = Conditions(
         input_speed=np.array([line.slope[3] for line in lines]),
@@ -128,13 +141,18 @@ def measure(
         ),
     )
     wander = np.zeros(shown.shape)
-    for row, (record, line, of_record) in enumerate(zip(records, lines, shown, strict=True)):
-        wander[row, of_record] = _wander(record, campaign, line, of_record, rules)
+    unsteady, ends = np.zeros((2, len(records), 2, len(all_orders)), dtype=complex)
+    for row, (record, line, of_record) in enumerate(zip(records, measured, shown, strict=True)):
+        wander[row, of_record], intensity = _wander(record, campaign, line, rules)
+        if intensity:
+            rates = unsteady_lines(record, ratio, line, intensity)
+            unsteady[row][:, of_record], ends[row][:, of_record] = rates
     noise = np.array([_line_variances(line) for line in lines])
     conditions = replace(
         conditions,
         lead=np.array([line.phasors[3] for line in lines]),
         lead_share=wander / (wander + noise),
+        unsteady=unsteady,
     )
     values = np.array([stack(line.mean, line.phasors) for line in lines])
     stiffness = campaign.believed.stiffness
@@ -149,6 +167,7 @@ def measure(
         covariance,
         None if shown.all() else shown,
         wander,
+        ends,
     )
 
 
@@ -162,30 +181,36 @@ def _wander(
     record: RunningRecord,
     campaign: Campaign,
     line: OrderLines,
-    shown: NDArray[np.bool_],
     rules: Rules,
-) -> NDArray[np.float64]:
-    """Return the variance of the shown lines of the input angle beside their noise, rad2.
+) -> tuple[NDArray[np.float64], float]:
+    """Return the variance of the lines of the input angle beside their noise, rad2, shape (m,).
 
     Nobody holds a set speed exactly. What the input does between the lines, it does in them as
     well: the neighbours tell how much. A set point that goes in steps has a speed whose power falls
-    as the square of the frequency, and an angle as its fourth power.
+    as the square of the frequency, and an angle as its fourth power. The second value is the power
+    density of the acceleration, rad2/s3; both are 0 where nothing but noise is seen.
     """
-    orders = line.orders[shown]
+    orders = line.orders
     searched, amplitudes = residual_spectrum(
         record, campaign.rig, campaign.believed.ratio, orders, rules.highest_order
     )
-    power, variances = amplitudes[3] ** 2, _line_variances(line)[shown]
-    excess = np.zeros(len(orders))
+    power, variances = amplitudes[3] ** 2, _line_variances(line)
+    excess, seen = np.zeros(len(orders)), np.zeros(len(orders), dtype=bool)
     for place, order in enumerate(orders):
         middle = int(np.searchsorted(searched, order))
         near = slice(max(middle - _NEIGHBOURS, 0), middle + _NEIGHBOURS)
         count = len(searched[near])
+        if not count:
+            continue
         # The power of each neighbour is exponential under noise, with mean 1.
         chance = rules.unexpected_line_chance / len(orders)
-        if count and power[near].sum() > chi2.isf(chance, 2 * count) / 2.0:
-            excess[place] = np.mean((power[near] - 1.0) * (searched[near] / order) ** 4)
-    return np.maximum(excess, 0.0) * variances
+        seen[place] = power[near].sum() > chi2.isf(chance, 2 * count) / 2.0
+        excess[place] = np.mean((power[near] - 1.0) * (searched[near] / order) ** 4)
+    if not seen.any():
+        return np.zeros(len(orders)), 0.0
+    wander = np.maximum(excess, 0.0) * variances
+    by_line = wander * (orders * mean_speed(record)) ** 4 * np.ptp(record.time) / 2.0
+    return wander, float(by_line[seen].mean())
 
 
 def _at_all_orders(

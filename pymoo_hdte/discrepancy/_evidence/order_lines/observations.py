@@ -110,19 +110,31 @@ class Observations:
         share = features.conditions.lead_share
         share = np.ones(response.rate.shape) if share is None else share
         propagation = np.tile(np.eye(features.values.shape[1]), (len(features.values), 1, 1))
-        moved = np.zeros_like(propagation)
+        moved, as_slow = np.zeros_like(propagation), np.zeros_like(propagation)
         of_lead = features.places(3)
         for channel, by_lead in enumerate(np.moveaxis(response.channels, 1, 0)):
             places = features.places(channel)
             _set_blocks(propagation, places, of_lead, -share * by_lead)
             _set_blocks(moved, places, of_lead, (1.0 - share) * by_lead)
+            slow = response.slow[:, channel, :, None]
+            polynomial = slow[:, 0] * response.rate + slow[:, 1] * response.rate**2
+            _set_blocks(as_slow, places, of_lead, by_lead - polynomial)
         covariance = propagation @ features.covariance @ propagation.swapaxes(1, 2)
         if features.wander is None:
             return covariance
         _set_blocks(moved, of_lead, of_lead, np.ones_like(share))
         variances = np.zeros(features.values.shape)
         variances[:, of_lead] = features.wander[..., None]
-        return covariance + (moved * variances[:, None]) @ moved.swapaxes(1, 2)
+        # What wanders may be as fast as the line, or slow: the drive answers to either differently.
+        for factors in (moved, as_slow):
+            covariance = covariance + (factors * variances[:, None]) @ factors.swapaxes(1, 2)
+        if features.ends is None:
+            return covariance
+        by_ends = np.zeros((len(share), 2, variances.shape[1]))
+        for channel in range(3):
+            lines = response.slow[:, channel, 1, None, None] * features.ends
+            by_ends[..., features.places(channel)] = np.stack([lines.real, lines.imag], axis=-1)
+        return covariance + by_ends.swapaxes(1, 2) @ by_ends
 
     @property
     def creep(self) -> float:

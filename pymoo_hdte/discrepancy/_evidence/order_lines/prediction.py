@@ -70,6 +70,9 @@ class Conditions:
     lead_share : ndarray, shape (r, m), optional
         Weight of these lines against those of the loop, which together excite the drive; by default
         1: the measured motion excites, whatever the loop does.
+    unsteady : complex ndarray, shape (r, 2, m), optional
+        Lines of the input's speed and acceleration beyond those of a steady motion, rad/s and
+        rad/s2: see `unsteady_lines`; by default none.
     """
 
     input_speed: NDArray[np.float64]
@@ -82,6 +85,7 @@ class Conditions:
     fading: NDArray[np.complex128] | None = None
     lead: NDArray[np.complex128] | None = None
     lead_share: NDArray[np.float64] | None = None
+    unsteady: NDArray[np.complex128] | None = None
 
     def rows(self, rows: NDArray[np.int_]) -> Conditions:
         """Return the conditions of some of the records."""
@@ -199,8 +203,11 @@ def _predict_group(
     if lead is not None:
         response = lead_response(coefficients.at_loads(load.ravel()), balance.slopes, speed, orders)
         if rig.output_torque_at == "brake":
-            response = replace(response, coupling_torque=np.zeros_like(response.rate))
+            response = response.without_load()
         _follow_lead(lines, response, lead, balance)
+        if conditions.unsteady is not None:
+            added = np.einsum("nck,nkm->ncm", response.slow, np.tile(conditions.unsteady, (count, 1, 1)))
+            lines[:, :3] += added
         loop = {name: np.repeat(values[name], records) for name in LOOP}
         lines[:, 3] = _loop_lead(lines, response, lead, rig, loop)
         if conditions.lead_share is not None:
