@@ -155,14 +155,20 @@ def _of_loop(believed: BelievedDrive, rig: Rig) -> tuple[Parameter, Parameter]:
     A loop that lags by the time constant of the speed that it controls has a phase margin of 33
     degrees: the largest lag with which it is of use, taken as a standard deviation.
     """
-    driven = believed.input_inertia + (
-        believed.output_inertia + believed.load_inertia
-    ) / believed.ratio**2
-    lag = driven / rig.proportional if rig.proportional else 1e-9
-    return (
-        Parameter("loop_gain", 0.0, -10.0 * _LOOP_GAIN, 10.0 * _LOOP_GAIN, _LOOP_GAIN, prior=_LOOP_GAIN),
-        Parameter("loop_lag", 0.0, -10.0 * lag, 10.0 * lag, lag, prior=lag),
+    driven = (
+        believed.input_inertia
+        + (believed.output_inertia + believed.load_inertia) / believed.ratio**2
     )
+    lag = driven / rig.proportional if rig.proportional else 1e-9
+    # Farther away the loop would be none, and an effect in its place would show in nothing.
+    return (
+        _stated("loop_gain", _LOOP_GAIN, 3.0 * _LOOP_GAIN),
+        _stated("loop_lag", lag, 3.0 * lag),
+    )
+
+
+def _stated(name: str, size: float, reach: float) -> Parameter:
+    return Parameter(name, 0.0, -reach, reach, size, prior=size)
 
 
 def _bounded(name: str, value: float, tolerance: float) -> Parameter:
