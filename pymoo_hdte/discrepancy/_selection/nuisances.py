@@ -11,18 +11,20 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from pymoo_hdte.discrepancy._selection.candidate import Candidate
 from pymoo_hdte.discrepancy._selection.fitting import Fit, fit
 from pymoo_hdte.discrepancy._selection.hypothesis import Hypothesis
 from pymoo_hdte.discrepancy._selection.screening import Screened, beyond_parameters, reduced
 from pymoo_hdte.discrepancy._selection.search import Search
 
 
-def leading_nuisance(search: Search, beside: Hypothesis | None = None) -> Fit | None:
-    """Return a fit with the nuisance that explains most of what a set leaves; None without one.
+def leading_nuisances(search: Search, beside: Hypothesis | None = None) -> Fit | None:
+    """Return a fit with the nuisances that explain most of what a set leaves; None without any.
 
-    It has to do better than each effect that has been fitted in its place and, beside a set, than
-    each that could be added to it. Gains count in units of what is left, as if that were noise
-    (Birge, Physical Review 40, 1932), and each unknown costs its share of the BIC.
+    The first has to do better than each effect that has been fitted in its place and, beside a set,
+    than each that could be added to it. Others join it as long as they do better than effects to
+    first order. Gains count in units of what is left, as if that were noise (Birge, Physical Review
+    40, 1932), and each unknown costs its share of the BIC.
 
     Parameters
     ----------
@@ -60,7 +62,41 @@ def leading_nuisance(search: Search, beside: Hypothesis | None = None) -> Fit | 
         for rival in search.hypotheses
         if beside is None or set(rival.candidates) > set(beside.candidates)
     ]
-    return best if lead >= max(others, default=-np.inf) else None
+    if lead < max(others, default=-np.inf):
+        return None
+    return _with_others(search, best, [*search.nuisances, *search.screened])
+
+
+def _with_others(search: Search, fitted: Fit, screened: Sequence[Screened]) -> Fit:
+    """Return a fit with all further nuisances that lead, one after the other, to first order."""
+    logarithm = np.log(len(fitted.residuals))
+    while open_effects := _that_go_with(fitted.candidates, screened):
+        directions, residual = beyond_parameters(fitted)
+        effects = [reduced(effect, directions, residual) for effect in open_effects]
+        most = max(effect.reduction for effect in effects)
+        freedom = len(fitted.residuals) - len(fitted.values)
+        misfit = max((fitted.chi_square - most) / freedom, 1.0)
+        gains = [
+            effect.reduction / misfit - effect.candidate.unknowns * logarithm for effect in effects
+        ]
+        leading = effects[int(np.argmax(gains))]
+        if not leading.candidate.nuisance or max(gains) < search.data.rules.bic_gain:
+            break
+        trial = _with(search, fitted, leading)
+        gain = fitted.chi_square - trial.chi_square
+        if gain < trial.misfit * _cost(search, leading.candidate.unknowns):
+            break
+        fitted = trial
+    return fitted
+
+
+def _that_go_with(candidates: Sequence[Candidate], screened: Sequence[Screened]) -> list[Screened]:
+    return [
+        effect
+        for effect in screened
+        if effect.candidate.releases is None
+        and all(effect.candidate.goes_with(member) for member in candidates)
+    ]
 
 
 def _may_lead(search: Search, effect: Screened, beside: Hypothesis | None) -> bool:
@@ -86,12 +122,8 @@ def _ranked(
             directions, residual = beyond_parameters(beside.fit)
         else:
             directions, residual = unexplained.directions, unexplained.residual
-        effects = [
-            reduced(effect, directions, residual)
-            for effect in screened
-            if effect.candidate.releases is None
-            and all(effect.candidate.goes_with(member) for member in beside.candidates)
-        ]
+        open_effects = _that_go_with(beside.candidates, screened)
+        effects = [reduced(effect, directions, residual) for effect in open_effects]
     return sorted(effects, key=lambda effect: -effect.reduction)
 
 

@@ -33,7 +33,7 @@ from pymoo_hdte.discrepancy._selection.excess import HeldOutTest
 from pymoo_hdte.discrepancy._selection.fitted_sets import beyond_stated
 from pymoo_hdte.discrepancy._selection.fitting import Evidence, Fit, fit
 from pymoo_hdte.discrepancy._selection.hypothesis import Hypothesis, down_to_noise
-from pymoo_hdte.discrepancy._selection.nuisances import leading_nuisance
+from pymoo_hdte.discrepancy._selection.nuisances import leading_nuisances
 from pymoo_hdte.discrepancy._selection.reason import (
     HELD_OUT_ERROR_GROWS,
     NOT_VALIDATED,
@@ -83,9 +83,9 @@ class Verdict:
         Names of effects that are seen in what no fit holds, as ripple beyond the band of a motion.
     rivals_beyond : tuple of str
         What would explain as much and is in no fit, as the delay of an encoder.
-    nuisance : Fit or None
-        A fit whose last candidate is a nuisance of the bench that has to join the base first: see
-        `leading_nuisance`. The verdict without it says nothing then.
+    of_bench : Fit or None
+        A fit with nuisances of the bench that have to join the base first: see
+        `leading_nuisances`. The verdict without it says nothing then.
     """
 
     base: Fit
@@ -102,7 +102,7 @@ class Verdict:
     renewed: Evidence | None = None
     seen_beyond: tuple[str, ...] = ()
     rivals_beyond: tuple[str, ...] = ()
-    nuisance: Fit | None = None
+    of_bench: Fit | None = None
 
     @property
     def status(self) -> str:
@@ -210,7 +210,7 @@ def judge(
     """
     rules = data.rules
     degrees_of_freedom = len(base.residuals) - len(base.values)
-    of_bench = [] if known else [candidate for candidate in candidates if candidate.nuisance]
+    possible = [] if known else [candidate for candidate in candidates if candidate.nuisance]
     candidates = [candidate for candidate in candidates if not candidate.nuisance]
     candidates = [*candidates, *data.out_of_tolerance(base.at_bounds)]
     quiet = down_to_noise(base, degrees_of_freedom, rules) and not data.evident
@@ -218,16 +218,16 @@ def judge(
     quiet = quiet and not beyond_stated(base, rules).any()
     # Screening is slow, and known sets need none unless the base itself may be adequate.
     searched = [candidate for candidate in candidates if not candidate.instead_of]
-    every = screen(data, base, [*searched, *of_bench]) if quiet or not known else []
+    every = screen(data, base, [*searched, *possible]) if quiet or not known else []
     screened = [effect for effect in every if not effect.candidate.nuisance]
     nuisances = [effect for effect in every if effect.candidate.nuisance]
     gain = max((screening.reduction for screening in screened), default=0.0)
     if quiet and gain < rules.single_effect_gain:
         clean = probability.of_nothing(screened, len(base.residuals), rules)
-        nuisance = leading_nuisance(Search(data, base, searched, screened, nuisances=nuisances))
+        of_bench = leading_nuisances(Search(data, base, searched, screened, nuisances=nuisances))
         return Verdict(
             base, None, True, (), (), degrees_of_freedom, rules,
-            probability=clean, nuisance=nuisance,
+            probability=clean, of_bench=of_bench,
         )  # fmt: skip
     if not screened and not known:
         return Verdict(base, None, False, (), (), degrees_of_freedom, rules)
@@ -245,12 +245,12 @@ def judge(
         search.resume(known, go_on=True)
     else:
         search.singles()
-        if nuisance := leading_nuisance(search):
-            return _with_nuisance(search, nuisance)
+        if of_bench := leading_nuisances(search):
+            return _with_nuisances(search, of_bench)
         search = _renewed_search(search)
         leading = search.hypotheses[0]
-        if not search.enough(leading) and (nuisance := leading_nuisance(search, leading)):
-            return _with_nuisance(search, nuisance)
+        if not search.enough(leading) and (of_bench := leading_nuisances(search, leading)):
+            return _with_nuisances(search, of_bench)
     search.grow()
     search.leave_out_lacking()
     chosen = chosen_of(search)
@@ -261,16 +261,16 @@ def judge(
         chosen = chosen_of(search)
     if replaced(search, chosen, [candidate for candidate in candidates if candidate.instead_of]):
         chosen = chosen_of(search)
-    if not (known or search.enough(chosen)) and (nuisance := leading_nuisance(search, chosen)):
-        return _with_nuisance(search, nuisance)
+    if not (known or search.enough(chosen)) and (of_bench := leading_nuisances(search, chosen)):
+        return _with_nuisances(search, of_bench)
     verdict = _verdict(search, answer_of(search, chosen, search.screened))
     return verdict if search.data is data else replace(verdict, renewed=search.data)
 
 
-def _with_nuisance(search: Search, nuisance: Fit) -> Verdict:
-    """Return that nothing is certain before a nuisance has joined the base."""
+def _with_nuisances(search: Search, of_bench: Fit) -> Verdict:
+    """Return that nothing is certain before nuisances have joined the base."""
     freedom, rules = search.degrees_of_freedom, search.data.rules
-    return Verdict(search.base, None, False, (), (), freedom, rules, nuisance=nuisance)
+    return Verdict(search.base, None, False, (), (), freedom, rules, of_bench=of_bench)
 
 
 def _renewed_search(search: Search) -> Search:

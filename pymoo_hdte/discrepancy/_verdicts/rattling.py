@@ -81,14 +81,16 @@ def _judged_from(
 ) -> tuple[Data, list[Candidate], Verdict]:
     """Return data, with bench and noise as they were judged with, candidates and the verdict.
 
-    A nuisance that leads joins the bench, until none does.
+    Nuisances that lead join the bench, until none does.
     """
     verdict = judge(data, base, candidates)
-    while (leading := verdict.nuisance) is not None:
-        *_, (nuisance, place) = leading.places
-        begin = leading.values[place].tolist()
-        data = data.on_bench(nuisance, begin)
-        base = fit(data, start=np.append(leading.values[: leading.n_base], begin))
+    while (leading := verdict.of_bench) is not None:
+        begin = leading.values[: leading.n_base]
+        for nuisance, place in leading.places:
+            if nuisance.nuisance:
+                values = leading.values[place]
+                data, begin = data.on_bench(nuisance, values.tolist()), np.append(begin, values)
+        base = fit(data, start=begin)
         candidates = candidates_of(data, base)
         verdict = judge(data, base, candidates)
     renewed = verdict.renewed
