@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import ClassVar
@@ -13,7 +14,7 @@ from pymoo_hdte.effects.effect import Effect, register
 from pymoo_hdte.effects.guess import Guess, Sizes, guess_of_lines
 from pymoo_hdte.effects.law import Periodic, PortState, Response
 from pymoo_hdte.effects.portable import Formula
-from pymoo_hdte.effects.unknowns import Family, is_whole
+from pymoo_hdte.effects.unknowns import Family, is_among, is_whole
 
 
 @dataclass(frozen=True)
@@ -131,7 +132,7 @@ def _is_of_shaft(order: float) -> bool:
 def _of_coupling(sizes: Sizes, line: Callable[[float, float, float], PeriodicTorque]) -> Guess:
     """Guess what a misaligned coupling does once and twice in its turn."""
     # Shafts that are apart make the first, those at an angle the second: either may be stronger.
-    family = Family(sizes.family(1.0).orders, harmonic=False)
+    family = Family(sizes.family(1.0).orders[:2], harmonic=False)
     sentence = "A coupling at the {port} is out of line: a torque once and twice in its turn."
     return guess_of_lines(
         family,
@@ -162,6 +163,46 @@ def _of_brake(family: Family, sizes: Sizes) -> Guess:
     )
 
 
+def _cogging(sizes: Sizes) -> list[Guess]:
+    """Guess the cogging of a motor whose poles and slots both show a line.
+
+    It has the least common multiple of both and, as neither are quite even, the number of poles
+    and that of slots as well (Hendershot and Miller, Design of Brushless Permanent-Magnet Machines,
+    2010). One line alone does not tell a motor.
+    """
+    if sizes.slower != 1.0 or not sizes.coupling:
+        return []
+    guesses = []
+    for slots, poles in _MOTORS:
+        orders = [float(order) for order in (poles, slots, math.lcm(poles, slots))]
+        shown = tuple(order for order in orders if is_among(sizes.shown, order))
+        if sum(is_among((*sizes.seen, *sizes.clear), order) for order in shown) < _FEWEST:
+            continue
+        family = Family(shown, harmonic=False)
+        guesses.append(
+            guess_of_lines(
+                family,
+                "amplitude",
+                sizes.largest,
+                sizes.residual,
+                torque_line,
+                form=family.form,
+                sentence=f"The motor cogs: {poles} poles, {slots} slots.",
+            )
+        )
+    return guesses
+
+
+_MOTORS = tuple(
+    (slots, poles)
+    for slots in range(6, 25, 3)
+    for poles in range(4, 29, 2)
+    if poles != slots and 2 * slots <= 3 * poles <= 4 * slots
+)
+"""Slots and poles of motors with concentrated windings, of which nearly all of the flux is used."""
+_FEWEST = 2
+
+
 def _coupling(sizes: Sizes) -> list[Guess]:
     """Guess a coupling ahead of a gear; behind it, it is a ripple like any other."""
 
@@ -182,6 +223,20 @@ register(
         exact=True,
         forms="harmonics_of_torque",
         nuisance_at=("output", "load"),
+    )
+)
+
+
+register(
+    Effect(
+        "cogging",
+        PeriodicTorque,
+        ("input",),
+        {"order": "", "phase": "angle", "amplitude": "torque"},
+        "The motor cogs, order {order} of its position.",
+        _cogging,
+        exact=True,
+        nuisance_at=("input",),
     )
 )
 

@@ -14,7 +14,12 @@ import numpy as np
 from pymoo_hdte.discrepancy._selection.candidate import Candidate
 from pymoo_hdte.discrepancy._selection.fitting import Fit, fit
 from pymoo_hdte.discrepancy._selection.hypothesis import Hypothesis
-from pymoo_hdte.discrepancy._selection.screening import Screened, beyond_parameters, reduced
+from pymoo_hdte.discrepancy._selection.screening import (
+    Screened,
+    basis_of,
+    beyond_parameters,
+    reduced,
+)
 from pymoo_hdte.discrepancy._selection.search import Search
 
 
@@ -65,6 +70,42 @@ def leading_nuisances(search: Search, beside: Hypothesis | None = None) -> Fit |
     if lead < max(others, default=-np.inf):
         return None
     return _with_others(search, best, [*search.nuisances, *search.screened])
+
+
+def leading_group(search: Search) -> Fit | None:
+    """Return a fit with nuisances that remove most of the misfit at once; None without such ones.
+
+    To first order each leads all effects in its turn beside those before it, and no effect alone
+    comes near all of them. So no effect has to be fitted to know that the bench is at work.
+    """
+    rules, base = search.data.rules, search.base
+    directions, residual = beyond_parameters(base)
+    logarithm, freedom = np.log(len(residual)), len(residual) - len(base.values)
+    screened, group, begin = [*search.nuisances, *search.screened], list[Screened](), residual
+    while open_effects := _that_go_with([effect.candidate for effect in group], screened):
+        effects = [reduced(effect, directions, residual) for effect in open_effects]
+        most = max(effect.reduction for effect in effects)
+        misfit = max((float(residual @ residual) - most) / freedom, 1.0)
+        gains = [
+            effect.reduction / misfit - effect.candidate.unknowns * logarithm for effect in effects
+        ]
+        leading = effects[int(np.argmax(gains))]
+        if not leading.candidate.nuisance or max(gains) < rules.bic_gain:
+            break
+        group.append(leading)
+        directions = basis_of(np.column_stack([directions, leading.signatures.T]))
+        residual = begin - directions @ (directions.T @ begin)
+    removed = float(begin @ begin - residual @ residual)
+    excess = base.chi_square - freedom
+    rivals = [effect.reduction for effect in search.screened]
+    share = rules.explained_part_share
+    if not group or removed < share * excess or max(rivals, default=0.0) >= share * removed:
+        return None
+    candidates = tuple(effect.candidate for effect in group)
+    values = np.concatenate([base.values, *(effect.start for effect in group)])
+    together = fit(search.data, candidates, values, settled=rules.trial_gain)
+    cost = sum(_cost(search, candidate.unknowns) for candidate in candidates)
+    return together if base.chi_square - together.chi_square >= together.misfit * cost else None
 
 
 def _with_others(search: Search, fitted: Fit, screened: Sequence[Screened]) -> Fit:

@@ -33,7 +33,7 @@ from pymoo_hdte.discrepancy._selection.excess import HeldOutTest
 from pymoo_hdte.discrepancy._selection.fitted_sets import beyond_stated
 from pymoo_hdte.discrepancy._selection.fitting import Evidence, Fit, fit
 from pymoo_hdte.discrepancy._selection.hypothesis import Hypothesis, down_to_noise
-from pymoo_hdte.discrepancy._selection.nuisances import leading_nuisances
+from pymoo_hdte.discrepancy._selection.nuisances import leading_group, leading_nuisances
 from pymoo_hdte.discrepancy._selection.reason import (
     HELD_OUT_ERROR_GROWS,
     NOT_VALIDATED,
@@ -244,6 +244,8 @@ def judge(
         search = Search(data, base, searched, screened, forms)
         search.resume(known, go_on=True)
     else:
+        if of_bench := leading_group(search):
+            return _with_nuisances(search, of_bench)
         search.singles()
         if of_bench := leading_nuisances(search):
             return _with_nuisances(search, of_bench)

@@ -115,6 +115,9 @@ class DriveEffect:
 
     name: ClassVar[str]
     """Name of the effect, in model files and verdicts."""
+    only_reads: ClassVar[bool] = False
+    """Whether it is all in `reading_lines` and in the input torque of `torque_reading`, so that no
+    motion has to be found anew."""
 
     def apply(self, coefficients: Coefficients) -> Coefficients:
         """Return the coefficients with this effect added."""

@@ -380,6 +380,35 @@ def _torque_readings(effects: Sequence[DriveEffect], conditions: Conditions) -> 
     return added
 
 
+def with_readings(
+    prediction: Prediction,
+    effects: Sequence[DriveEffect],
+    conditions: Conditions,
+    orders: Sequence[float],
+    ratio: float,
+    input_gain: float,
+) -> Prediction:
+    """Return the prediction of one vector with effects that only change what is read."""
+    mean, phasors = prediction.mean.copy(), prediction.phasors.copy()
+    session = Session(orders, ratio, conditions.elapsed, conditions.bends)
+    _add_angle_readings(effects, session, mean, phasors)
+    mean[..., 1] += input_gain * _torque_readings(effects, conditions)[0]
+    return replace(prediction, mean=mean, phasors=phasors)
+
+
+def _add_angle_readings(
+    effects: Sequence[DriveEffect],
+    session: Session,
+    mean: NDArray[np.float64],
+    phasors: NDArray[np.complex128],
+) -> None:
+    for effect in effects:
+        added = effect.reading_lines(session)
+        if added is not None:
+            mean[..., 0] -= added[0]
+            phasors[..., 0, :] -= added[1]
+
+
 def _add_sensor_errors(
     ratio: float,
     conditions: Conditions,
@@ -392,11 +421,7 @@ def _add_sensor_errors(
     """Add the errors of the sensors in place: offset, drift, eccentricity, gains and zeros."""
     mean[..., 0] += values["offset"][:, None]
     session = Session(orders, ratio, conditions.elapsed, conditions.bends)
-    for effect in effects:
-        added = effect.reading_lines(session)
-        if added is not None:
-            mean[..., 0] -= added[0]
-            phasors[..., 0, :] -= added[1]
+    _add_angle_readings(effects, session, mean, phasors)
     for channel, name in ((1, "input_torque"), (2, "output_torque")):
         gain = 1.0 + values[f"{name}_gain"][:, None]
         mean[..., channel] = gain * mean[..., channel] + values[f"{name}_zero"][:, None]
