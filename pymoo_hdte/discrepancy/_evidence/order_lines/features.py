@@ -20,7 +20,6 @@ from scipy.stats import chi2
 from pymoo_hdte.discrepancy._evidence.order_lines.prediction import Conditions, Prediction
 from pymoo_hdte.discrepancy._records.believed import Rig
 from pymoo_hdte.discrepancy._records.campaign import Campaign
-from pymoo_hdte.discrepancy._records.line_basis import mean_speed
 from pymoo_hdte.discrepancy._records.line_fit import (
     CHANNELS,
     OrderLines,
@@ -143,9 +142,9 @@ def measure(
     wander = np.zeros(shown.shape)
     unsteady, ends = np.zeros((2, len(records), 2, len(all_orders)), dtype=complex)
     for row, (record, line, of_record) in enumerate(zip(records, measured, shown, strict=True)):
-        wander[row, of_record], intensity = _wander(record, campaign, line, rules)
-        if intensity:
-            rates = unsteady_lines(record, ratio, line, intensity)
+        wander[row, of_record] = _wander(record, campaign, line, rules)
+        if wander[row].any():
+            rates = unsteady_lines(record, ratio, line)
             unsteady[row][:, of_record], ends[row][:, of_record] = rates
     noise = np.array([_line_variances(line) for line in lines])
     conditions = replace(
@@ -182,13 +181,12 @@ def _wander(
     campaign: Campaign,
     line: OrderLines,
     rules: Rules,
-) -> tuple[NDArray[np.float64], float]:
+) -> NDArray[np.float64]:
     """Return the variance of the lines of the input angle beside their noise, rad2, shape (m,).
 
     Nobody holds a set speed exactly. What the input does between the lines, it does in them as
     well: the neighbours tell how much. A set point that goes in steps has a speed whose power falls
-    as the square of the frequency, and an angle as its fourth power. The second value is the power
-    density of the acceleration, rad2/s3; both are 0 where nothing but noise is seen.
+    as the square of the frequency, and an angle as its fourth power.
     """
     orders = line.orders
     searched, amplitudes = residual_spectrum(
@@ -206,11 +204,7 @@ def _wander(
         chance = rules.unexpected_line_chance / len(orders)
         seen[place] = power[near].sum() > chi2.isf(chance, 2 * count) / 2.0
         excess[place] = np.mean((power[near] - 1.0) * (searched[near] / order) ** 4)
-    if not seen.any():
-        return np.zeros(len(orders)), 0.0
-    wander = np.maximum(excess, 0.0) * variances
-    by_line = wander * (orders * mean_speed(record)) ** 4 * np.ptp(record.time) / 2.0
-    return wander, float(by_line[seen].mean())
+    return np.maximum(excess, 0.0) * variances if seen.any() else np.zeros(len(orders))
 
 
 def _at_all_orders(
