@@ -33,6 +33,10 @@ from pymoo_hdte.discrepancy._selection.rules import RULES, Rules
 _NEIGHBOURS = 4
 """Multiples of 1/N on either side of a line that tell the noise there: a mean of sixteen squares,
 which is known to a quarter."""
+_GUARD = 2
+"""Neighbours on either side that a line may leak into."""
+_WHOLE = 1e-6
+"""Distance from a whole order by rounding."""
 MEANS = (0, 1)
 """Channels whose mean is a feature; the others' means are conditions."""
 
@@ -280,6 +284,8 @@ def unexpected_lines(
     """Return the lines outside the features' orders at which each record exceeds the noise.
 
     Each record has a mapping of orders, in cycles per input turn, to powers summed over channels.
+    The input moves as it likes, so that what it alone does counts only as what a motor may do: in
+    whole cycles of its turn, and beyond what it does beside them.
     """
     lines = []
     for record in features.records:
@@ -288,10 +294,30 @@ def unexpected_lines(
         )
         power = amplitudes**2
         threshold = np.log(power.size * len(features.records) / rules.unexpected_line_chance)
-        beyond = np.flatnonzero(power.max(axis=0) > threshold)
+        of_motor = np.abs(orders - orders.round()) < _WHOLE
+        of_motor &= power[3] > threshold * _level(power[3], threshold)
+        beyond = np.flatnonzero((power[:3] > threshold).any(axis=0) | of_motor)
         sizes = power[:, beyond].sum(axis=0)
         lines.append(dict(zip(orders[beyond].round(9).tolist(), sizes.tolist(), strict=True)))
     return lines
+
+
+def _level(power: NDArray[np.float64], threshold: float) -> NDArray[np.float64]:
+    """Return by how much the noise exceeds the stated one around each line, shape (k,).
+
+    1 where the neighbours show no more than noise. A mean of n of them is not exact: a line exceeds
+    c times it by chance in (1 + c / n)^-n of all cases, not in exp(-c), so that it is the larger.
+    """
+    levels = np.ones(len(power))
+    for place in range(len(power)):
+        near = np.r_[
+            power[max(place - _GUARD - _NEIGHBOURS, 0) : max(place - _GUARD, 0)],
+            power[place + _GUARD + 1 : place + _GUARD + 1 + _NEIGHBOURS],
+        ]
+        if near.size and near.sum() > chi2.isf(np.exp(-threshold), 2 * near.size) / 2.0:
+            larger = near.size * np.expm1(threshold / near.size)
+            levels[place] = near.mean() * larger / threshold
+    return levels
 
 
 def unexpected_orders(
