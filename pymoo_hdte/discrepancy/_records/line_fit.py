@@ -206,9 +206,11 @@ def unsteady_lines(
     fit = LineFit.of(record, ratio, [*orders, *_doubles(orders, record, ratio)])
     time, beside = record.time, fit.whole_residual[:, 3]
     rows, count = max(len(time) // _KNOTS, 1), len(time)
-    means = [values[: count - count % rows].reshape(-1, rows).mean(1) for values in (time, beside)]
+    middles, means = (
+        values[: count - count % rows].reshape(-1, rows).mean(axis=1) for values in (time, beside)
+    )
     noise, step = lines.row_covariance[3, 3], 1.0 / record.sample_rate
-    course, intensity = _smoothed(*means, noise / rows)
+    course, intensity = _smoothed(middles, means, noise / rows)
     rates = [course, course.derivative(1), course.derivative(2)]
 
     def signals(part: slice) -> NDArray[np.float64]:
@@ -225,7 +227,8 @@ def unsteady_lines(
     # Of a motion under white noise of acceleration whose position is seen in white noise: the
     # steady variance of a Kalman filter's speed.
     variance = math.sqrt(2.0) * (noise * step) ** 0.25 * intensity**0.75
-    return beyond, shown[3:] * math.sqrt(variance) / step
+    ends = np.asarray(shown[3:] * math.sqrt(variance) / step, dtype=complex)
+    return np.asarray(beyond, dtype=complex), ends
 
 
 def _smoothed(

@@ -290,9 +290,7 @@ class AngleEquations:
 
     def _input_friction(self, motion: TorsionMotion, delivered: Values) -> Response:
         still = np.zeros_like(motion.angular_speed)
-        return self._laws(
-            "input", still, motion.angular_speed, delivered / self.coefficients.ratio
-        )
+        return self._laws("input", still, motion.angular_speed, delivered / self.coefficients.ratio)
 
     def slopes(self, motion: TorsionMotion) -> Values:
         """Return mean derivatives of torques, shape (n, 4).

@@ -94,8 +94,10 @@ def lead_response(
     whole = np.reshape(coefficients.output_inertia, (-1, 1)) + sum(
         mass for mass, _ in coefficients.coupled
     )
-    outer = whole - np.reshape(coefficients.output_inertia, (-1, 1)) + np.reshape(
-        coefficients.load_inertia, (-1, 1)
+    outer = (
+        whole
+        - np.reshape(coefficients.output_inertia, (-1, 1))
+        + np.reshape(coefficients.load_inertia, (-1, 1))
     )
     by_rates = [
         np.hstack([output, whole * np.ones_like(output)]) / (stiffness * coefficients.ratio),

@@ -141,28 +141,27 @@ def base_parameters(
     locked = _bounded("locked_stiffness", 1.0, believed.tolerance_of("stiffness"))
     # The prior only determines it where no sweep does.
     parameters.append(replace(locked, prior=locked.scale))
-    for name in READING[1:]:
-        # The stated limit of a sensor error is taken as a standard deviation, since sensors exceed
-        # it.
-        size = max(float(getattr(rig, name)), 1e-9)
-        parameters.append(Parameter(name, 0.0, -10.0 * size, 10.0 * size, size, prior=size))
+    # The stated limit of a sensor error is taken as a standard deviation, since sensors exceed it.
+    parameters += [_error(name, float(getattr(rig, name))) for name in READING[1:]]
     return (*parameters, *_of_loop(believed, rig))
 
 
 def _of_loop(believed: BelievedDrive, rig: Rig) -> tuple[Parameter, Parameter]:
-    """Return the unknowns of the speed loop: nobody holds its torque to the stated gains exactly.
+    """Return the unknowns of the speed loop, whose torque is never that of its gains exactly.
 
     A loop that lags by the time constant of the speed that it controls has a phase margin of 33
     degrees: the largest lag with which it is of use, taken as a standard deviation.
     """
-    driven = believed.input_inertia + (
-        believed.output_inertia + believed.load_inertia
-    ) / believed.ratio**2
-    lag = driven / rig.proportional if rig.proportional else 1e-9
-    return (
-        Parameter("loop_gain", 0.0, -10.0 * _LOOP_GAIN, 10.0 * _LOOP_GAIN, _LOOP_GAIN, prior=_LOOP_GAIN),
-        Parameter("loop_lag", 0.0, -10.0 * lag, 10.0 * lag, lag, prior=lag),
-    )
+    of_output = believed.output_inertia + believed.load_inertia
+    driven = believed.input_inertia + of_output / believed.ratio**2
+    lag = driven / rig.proportional if rig.proportional else 0.0
+    return _error("loop_gain", _LOOP_GAIN), _error("loop_lag", lag)
+
+
+def _error(name: str, deviation: float) -> Parameter:
+    """Return an unknown of mean zero."""
+    size = max(deviation, 1e-9)
+    return Parameter(name, 0.0, -10.0 * size, 10.0 * size, size, prior=size)
 
 
 def _bounded(name: str, value: float, tolerance: float) -> Parameter:

@@ -197,8 +197,8 @@ def _predict_group(
             response = response.without_load()
         _follow_lead(lines, response, lead, balance)
         if conditions.unsteady is not None:
-            added = np.einsum("nck,nkm->ncm", response.slow, np.tile(conditions.unsteady, (count, 1, 1)))
-            lines[:, :3] += added
+            unsteady = np.tile(conditions.unsteady, (count, 1, 1))
+            lines[:, :3] += np.einsum("nck,nkm->ncm", response.slow, unsteady)
         loop = {name: np.repeat(values[name], records) for name in LOOP}
         lines[:, 3] = _loop_lead(lines, response, lead, rig, loop)
         if conditions.lead_share is not None:
@@ -237,9 +237,7 @@ def _loop_lead(
     gain, lag = (1.0 + loop["loop_gain"])[:, None], loop["loop_lag"][:, None]
     answer = gain / (1.0 + lag * response.rate)
     commanded = answer * (rig.proportional * lines[:, 5] - rig.integral * lead.phasors)
-    stiffness = response.motor_torque + answer * (
-        rig.proportional * response.rate + rig.integral
-    )
+    stiffness = response.motor_torque + answer * (rig.proportional * response.rate + rig.integral)
     return np.asarray(lead.phasors - (lines[:, 1] - commanded) / stiffness)
 
 
