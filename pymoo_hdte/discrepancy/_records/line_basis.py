@@ -110,7 +110,7 @@ class LineFit:
         return self.projected(signals)
 
     def projected(self, signals: Callable[[slice], NDArray[np.float64]]) -> NDArray[np.float64]:
-        """Return the parts in the basis (p, k) of signals, which are given for some rows, (b, k)."""
+        """Return the parts (p, k) in the basis of signals, which are given for rows, (b, k)."""
         return np.sum([self.basis(part).T @ signals(part) for part in self.parts], axis=0)
 
     @property

@@ -20,7 +20,6 @@ from scipy.stats import chi2
 from pymoo_hdte.discrepancy._evidence.order_lines.prediction import Conditions, Prediction
 from pymoo_hdte.discrepancy._records.believed import Rig
 from pymoo_hdte.discrepancy._records.campaign import Campaign
-from pymoo_hdte.discrepancy._records.line_basis import mean_speed
 from pymoo_hdte.discrepancy._records.line_fit import (
     CHANNELS,
     OrderLines,
@@ -34,6 +33,10 @@ from pymoo_hdte.discrepancy._selection.rules import RULES, Rules
 _NEIGHBOURS = 4
 """Multiples of 1/N on either side of a line that tell the noise there: a mean of sixteen squares,
 which is known to a quarter."""
+_GUARD = 2
+"""Neighbours on either side that a line may leak into."""
+_WHOLE = 1e-6
+"""Distance from a whole order by rounding."""
 MEANS = (0, 1)
 """Channels whose mean is a feature; the others' means are conditions."""
 
@@ -143,9 +146,9 @@ def measure(
     wander = np.zeros(shown.shape)
     unsteady, ends = np.zeros((2, len(records), 2, len(all_orders)), dtype=complex)
     for row, (record, line, of_record) in enumerate(zip(records, measured, shown, strict=True)):
-        wander[row, of_record], intensity = _wander(record, campaign, line, rules)
-        if intensity:
-            rates = unsteady_lines(record, ratio, line, intensity)
+        wander[row, of_record] = _wander(record, campaign, line, rules)
+        if wander[row].any():
+            rates = unsteady_lines(record, ratio, line)
             unsteady[row][:, of_record], ends[row][:, of_record] = rates
     noise = np.array([_line_variances(line) for line in lines])
     conditions = replace(
@@ -182,13 +185,12 @@ def _wander(
     campaign: Campaign,
     line: OrderLines,
     rules: Rules,
-) -> tuple[NDArray[np.float64], float]:
+) -> NDArray[np.float64]:
     """Return the variance of the lines of the input angle beside their noise, rad2, shape (m,).
 
     Nobody holds a set speed exactly. What the input does between the lines, it does in them as
     well: the neighbours tell how much. A set point that goes in steps has a speed whose power falls
-    as the square of the frequency, and an angle as its fourth power. The second value is the power
-    density of the acceleration, rad2/s3; both are 0 where nothing but noise is seen.
+    as the square of the frequency, and an angle as its fourth power.
     """
     orders = line.orders
     searched, amplitudes = residual_spectrum(
@@ -206,11 +208,7 @@ def _wander(
         chance = rules.unexpected_line_chance / len(orders)
         seen[place] = power[near].sum() > chi2.isf(chance, 2 * count) / 2.0
         excess[place] = np.mean((power[near] - 1.0) * (searched[near] / order) ** 4)
-    if not seen.any():
-        return np.zeros(len(orders)), 0.0
-    wander = np.maximum(excess, 0.0) * variances
-    by_line = wander * (orders * mean_speed(record)) ** 4 * np.ptp(record.time) / 2.0
-    return wander, float(by_line[seen].mean())
+    return np.maximum(excess, 0.0) * variances if seen.any() else np.zeros(len(orders))
 
 
 def _at_all_orders(
@@ -286,6 +284,8 @@ def unexpected_lines(
     """Return the lines outside the features' orders at which each record exceeds the noise.
 
     Each record has a mapping of orders, in cycles per input turn, to powers summed over channels.
+    The input moves as it likes, so that what it alone does counts only as what a motor may do: in
+    whole cycles of its turn, and beyond what it does beside them.
     """
     lines = []
     for record in features.records:
@@ -294,10 +294,30 @@ def unexpected_lines(
         )
         power = amplitudes**2
         threshold = np.log(power.size * len(features.records) / rules.unexpected_line_chance)
-        beyond = np.flatnonzero(power.max(axis=0) > threshold)
+        of_motor = np.abs(orders - orders.round()) < _WHOLE
+        of_motor &= power[3] > threshold * _level(power[3], threshold)
+        beyond = np.flatnonzero((power[:3] > threshold).any(axis=0) | of_motor)
         sizes = power[:, beyond].sum(axis=0)
         lines.append(dict(zip(orders[beyond].round(9).tolist(), sizes.tolist(), strict=True)))
     return lines
+
+
+def _level(power: NDArray[np.float64], threshold: float) -> NDArray[np.float64]:
+    """Return by how much the noise exceeds the stated one around each line, shape (k,).
+
+    1 where the neighbours show no more than noise. A mean of n of them is not exact: a line exceeds
+    c times it by chance in (1 + c / n)^-n of all cases, not in exp(-c), so that it is the larger.
+    """
+    levels = np.ones(len(power))
+    for place in range(len(power)):
+        near = np.r_[
+            power[max(place - _GUARD - _NEIGHBOURS, 0) : max(place - _GUARD, 0)],
+            power[place + _GUARD + 1 : place + _GUARD + 1 + _NEIGHBOURS],
+        ]
+        if near.size and near.sum() > chi2.isf(np.exp(-threshold), 2 * near.size) / 2.0:
+            larger = near.size * np.expm1(threshold / near.size)
+            levels[place] = near.mean() * larger / threshold
+    return levels
 
 
 def unexpected_orders(

@@ -101,7 +101,8 @@ class Observations:
         """Return the covariance by the noise of the sensors, (r, f, f).
 
         Where the measured lead excites the drive, its noise also moves what is predicted of the
-        other channels; where the loop's does, what the motor does beside its loop.
+        other channels; where the loop's does, what the motor does beside its loop. This may be as
+        fast as a line, or slow; the drive answers to either differently.
         """
         features = self.features
         response = self.prediction(start[None], self.reference_effects).response
@@ -109,32 +110,27 @@ class Observations:
             return features.covariance
         share = features.conditions.lead_share
         share = np.ones(response.rate.shape) if share is None else share
-        propagation = np.tile(np.eye(features.values.shape[1]), (len(features.values), 1, 1))
-        moved, as_slow = np.zeros_like(propagation), np.zeros_like(propagation)
-        of_lead = features.places(3)
+        count, size = features.values.shape
+        by_noise, of_lead = np.tile(np.eye(size), (count, 1, 1)), features.places(3)
+        fast, slow = np.zeros((2, count, size, size))
+        _set_blocks(fast, of_lead, of_lead, np.ones_like(share))
+        by_ends = np.zeros((count, 2, size))
         for channel, by_lead in enumerate(np.moveaxis(response.channels, 1, 0)):
-            places = features.places(channel)
-            _set_blocks(propagation, places, of_lead, -share * by_lead)
-            _set_blocks(moved, places, of_lead, (1.0 - share) * by_lead)
-            slow = response.slow[:, channel, :, None]
-            polynomial = slow[:, 0] * response.rate + slow[:, 1] * response.rate**2
-            _set_blocks(as_slow, places, of_lead, by_lead - polynomial)
-        covariance = propagation @ features.covariance @ propagation.swapaxes(1, 2)
-        if features.wander is None:
-            return covariance
-        _set_blocks(moved, of_lead, of_lead, np.ones_like(share))
-        variances = np.zeros(features.values.shape)
-        variances[:, of_lead] = features.wander[..., None]
-        # What wanders may be as fast as the line, or slow: the drive answers to either differently.
-        for factors in (moved, as_slow):
-            covariance = covariance + (factors * variances[:, None]) @ factors.swapaxes(1, 2)
-        if features.ends is None:
-            return covariance
-        by_ends = np.zeros((len(share), 2, variances.shape[1]))
-        for channel in range(3):
-            lines = response.slow[:, channel, 1, None, None] * features.ends
-            by_ends[..., features.places(channel)] = np.stack([lines.real, lines.imag], axis=-1)
-        return covariance + by_ends.swapaxes(1, 2) @ by_ends
+            places, by_rates = features.places(channel), response.slow[:, channel, :, None]
+            as_slow = by_rates[:, 0] * response.rate + by_rates[:, 1] * response.rate**2
+            _set_blocks(by_noise, places, of_lead, -share * by_lead)
+            _set_blocks(fast, places, of_lead, (1.0 - share) * by_lead)
+            _set_blocks(slow, places, of_lead, by_lead - as_slow)
+            if features.ends is not None:
+                lines = by_rates[:, 1:] * features.ends
+                by_ends[..., places] = np.stack([lines.real, lines.imag], axis=-1)
+        covariance = by_noise @ features.covariance @ by_noise.swapaxes(1, 2)
+        if features.wander is not None:
+            deviations = np.zeros((count, 1, size))
+            deviations[:, 0, of_lead] = np.sqrt(features.wander)[..., None]
+            for moved in (fast * deviations, slow * deviations):
+                covariance += moved @ moved.swapaxes(1, 2)
+        return np.asarray(covariance + by_ends.swapaxes(1, 2) @ by_ends)
 
     @property
     def creep(self) -> float:

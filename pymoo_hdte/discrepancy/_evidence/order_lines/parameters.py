@@ -141,34 +141,28 @@ def base_parameters(
     locked = _bounded("locked_stiffness", 1.0, believed.tolerance_of("stiffness"))
     # The prior only determines it where no sweep does.
     parameters.append(replace(locked, prior=locked.scale))
-    for name in READING[1:]:
-        # The stated limit of a sensor error is taken as a standard deviation, since sensors exceed
-        # it.
-        size = max(float(getattr(rig, name)), 1e-9)
-        parameters.append(Parameter(name, 0.0, -10.0 * size, 10.0 * size, size, prior=size))
+    # The stated limit of a sensor error is taken as a standard deviation, since sensors exceed it.
+    parameters += [_error(name, float(getattr(rig, name))) for name in READING[1:]]
     return (*parameters, *_of_loop(believed, rig))
 
 
 def _of_loop(believed: BelievedDrive, rig: Rig) -> tuple[Parameter, Parameter]:
-    """Return the unknowns of the speed loop: nobody holds its torque to the stated gains exactly.
+    """Return the unknowns of the speed loop, whose torque is never that of its gains exactly.
 
     A loop that lags by the time constant of the speed that it controls has a phase margin of 33
     degrees: the largest lag with which it is of use, taken as a standard deviation.
     """
-    driven = (
-        believed.input_inertia
-        + (believed.output_inertia + believed.load_inertia) / believed.ratio**2
-    )
-    lag = driven / rig.proportional if rig.proportional else 1e-9
-    # Farther away the loop would be none, and an effect in its place would show in nothing.
-    return (
-        _stated("loop_gain", _LOOP_GAIN, 3.0 * _LOOP_GAIN),
-        _stated("loop_lag", lag, 3.0 * lag),
-    )
+    of_output = believed.output_inertia + believed.load_inertia
+    driven = believed.input_inertia + of_output / believed.ratio**2
+    lag = driven / rig.proportional if rig.proportional else 0.0
+    # Ten deviations away there would be no loop, and an effect beside it would show in nothing.
+    return _error("loop_gain", _LOOP_GAIN, 3.0), _error("loop_lag", lag, 3.0)
 
 
-def _stated(name: str, size: float, reach: float) -> Parameter:
-    return Parameter(name, 0.0, -reach, reach, size, prior=size)
+def _error(name: str, deviation: float, most: float = 10.0) -> Parameter:
+    """Return an unknown of mean zero, up to ``most`` deviations away."""
+    size = max(deviation, 1e-9)
+    return Parameter(name, 0.0, -most * size, most * size, size, prior=size)
 
 
 def _bounded(name: str, value: float, tolerance: float) -> Parameter:

@@ -206,10 +206,8 @@ def _predict_group(
             response = response.without_load()
         _follow_lead(lines, response, lead, balance)
         if conditions.unsteady is not None:
-            added = np.einsum(
-                "nck,nkm->ncm", response.slow, np.tile(conditions.unsteady, (count, 1, 1))
-            )
-            lines[:, :3] += added
+            unsteady = np.tile(conditions.unsteady, (count, 1, 1))
+            lines[:, :3] += np.einsum("nck,nkm->ncm", response.slow, unsteady)
         loop = {name: np.repeat(values[name], records) for name in LOOP}
         lines[:, 3] = _loop_lead(lines, response, lead, rig, loop)
         if conditions.lead_share is not None:
