@@ -78,6 +78,8 @@ class Sizes:
     coupling : bool
         Whether a coupling of a bench, which may be out of line, sits between the port and the
         sensor of its torque.
+    highest : float
+        Order below which records show every significant line; per turn of the reference shaft.
     braked : float
         Largest load, N.m, of a port where a brake holds it; 0 elsewhere.
     between : bool
@@ -107,6 +109,7 @@ class Sizes:
     shown: tuple[float, ...] = ()
     together: bool = False
     coupling: bool = False
+    highest: float = 0.0
     braked: float = 0.0
     between: bool = False
 

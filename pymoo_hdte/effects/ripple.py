@@ -164,21 +164,21 @@ def _of_brake(family: Family, sizes: Sizes) -> Guess:
 
 
 def _cogging(sizes: Sizes) -> list[Guess]:
-    """Guess the cogging of a motor whose poles and slots both show a line.
+    """Guess the cogging of a motor with poles and slots that show all lines that records could.
 
     It has the least common multiple of both and, as neither are quite even, the number of poles
     and that of slots as well (Hendershot and Miller, Design of Brushless Permanent-Magnet Machines,
-    2010). One line alone does not tell a motor.
+    2010).
     """
     if sizes.slower != 1.0 or not sizes.coupling:
         return []
     guesses = []
     for slots, poles in _MOTORS:
-        orders = [float(order) for order in (poles, slots, math.lcm(poles, slots))]
-        shown = tuple(order for order in orders if is_among(sizes.shown, order))
-        if sum(is_among((*sizes.seen, *sizes.clear), order) for order in shown) < _FEWEST:
+        orders = (float(poles), float(slots), float(math.lcm(poles, slots)))
+        lines = tuple(order for order in orders if order < sizes.highest)
+        if not lines or not all(is_among((*sizes.seen, *sizes.clear), order) for order in lines):
             continue
-        family = Family(shown, harmonic=False)
+        family = Family(lines, harmonic=False)
         guesses.append(
             guess_of_lines(
                 family,
@@ -200,7 +200,6 @@ _MOTORS = tuple(
     if poles != slots and 2 * slots <= 3 * poles <= 4 * slots
 )
 """Slots and poles of motors with concentrated windings, of which nearly all of the flux is used."""
-_FEWEST = 2
 
 
 def _coupling(sizes: Sizes) -> list[Guess]:

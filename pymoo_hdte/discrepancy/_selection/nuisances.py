@@ -49,12 +49,15 @@ def leading_nuisances(search: Search, beside: Hypothesis | None = None) -> Fit |
     trials = [_with(search, fitted, effect) for effect in promising]
     if not trials:
         return None
-    best = min(trials, key=lambda trial: trial.chi_square)
+    logarithm, misfit = np.log(len(fitted.residuals)), min(trial.misfit for trial in trials)
+    best = min(
+        trials,
+        key=lambda trial: trial.chi_square / misfit + _unknowns(trial) * logarithm,
+    )
     nuisance = best.candidates[-1]
     misfit, gain = best.misfit, fitted.chi_square - best.chi_square
-    if gain < misfit * _cost(search, nuisance.unknowns):
+    if not _is_worth(search, best, fitted):
         return None
-    logarithm = np.log(len(fitted.residuals))
     lead = gain / misfit - nuisance.unknowns * logarithm
     others = [
         effect.reduction / misfit - effect.candidate.unknowns * logarithm
@@ -69,7 +72,7 @@ def leading_nuisances(search: Search, beside: Hypothesis | None = None) -> Fit |
     ]
     if lead < max(others, default=-np.inf):
         return None
-    return _with_others(search, best, [*search.nuisances, *search.screened])
+    return _with_others(search, best)
 
 
 def leading_group(search: Search) -> Fit | None:
@@ -78,11 +81,33 @@ def leading_group(search: Search) -> Fit | None:
     To first order each leads all effects in its turn beside those before it, and no effect alone
     comes near all of them. So no effect has to be fitted to know that the bench is at work.
     """
-    rules, base = search.data.rules, search.base
-    directions, residual = beyond_parameters(base)
-    logarithm, freedom = np.log(len(residual)), len(residual) - len(base.values)
+    base, share = search.base, search.data.rules.explained_part_share
+    group, removed = _leading_in_turn(search, base)
+    excess = base.chi_square - (len(base.residuals) - len(base.values))
+    rivals = [effect.reduction for effect in search.screened]
+    if removed < share * excess or max(rivals, default=0.0) >= share * removed:
+        return None
+    together = _with(search, base, *group)
+    return together if _is_worth(search, together, base) else None
+
+
+def _with_others(search: Search, fitted: Fit) -> Fit:
+    """Return a fit with all further nuisances that lead to first order, if they are worth it."""
+    group, _ = _leading_in_turn(search, fitted)
+    together = _with(search, fitted, *group) if group else fitted
+    return together if group and _is_worth(search, together, fitted) else fitted
+
+
+def _leading_in_turn(search: Search, fitted: Fit) -> tuple[list[Screened], float]:
+    """Return nuisances that lead all effects to first order, and the chi-square that they remove.
+
+    Each does so beside a fit and the nuisances before it.
+    """
+    directions, residual = beyond_parameters(fitted)
+    logarithm, freedom = np.log(len(residual)), len(residual) - len(fitted.values)
     screened, group, begin = [*search.nuisances, *search.screened], list[Screened](), residual
-    while open_effects := _that_go_with([effect.candidate for effect in group], screened):
+    present = list(fitted.candidates)
+    while open_effects := _that_go_with(present, screened):
         effects = [reduced(effect, directions, residual) for effect in open_effects]
         most = max(effect.reduction for effect in effects)
         misfit = max((float(residual @ residual) - most) / freedom, 1.0)
@@ -90,45 +115,20 @@ def leading_group(search: Search) -> Fit | None:
             effect.reduction / misfit - effect.candidate.unknowns * logarithm for effect in effects
         ]
         leading = effects[int(np.argmax(gains))]
-        if not leading.candidate.nuisance or max(gains) < rules.bic_gain:
-            break
-        group.append(leading)
-        directions = basis_of(np.column_stack([directions, leading.signatures.T]))
-        residual = begin - directions @ (directions.T @ begin)
-    removed = float(begin @ begin - residual @ residual)
-    excess = base.chi_square - freedom
-    rivals = [effect.reduction for effect in search.screened]
-    share = rules.explained_part_share
-    if not group or removed < share * excess or max(rivals, default=0.0) >= share * removed:
-        return None
-    candidates = tuple(effect.candidate for effect in group)
-    values = np.concatenate([base.values, *(effect.start for effect in group)])
-    together = fit(search.data, candidates, values, settled=rules.trial_gain)
-    cost = sum(_cost(search, candidate.unknowns) for candidate in candidates)
-    return together if base.chi_square - together.chi_square >= together.misfit * cost else None
-
-
-def _with_others(search: Search, fitted: Fit, screened: Sequence[Screened]) -> Fit:
-    """Return a fit with all further nuisances that lead, one after the other, to first order."""
-    logarithm = np.log(len(fitted.residuals))
-    while open_effects := _that_go_with(fitted.candidates, screened):
-        directions, residual = beyond_parameters(fitted)
-        effects = [reduced(effect, directions, residual) for effect in open_effects]
-        most = max(effect.reduction for effect in effects)
-        freedom = len(fitted.residuals) - len(fitted.values)
-        misfit = max((fitted.chi_square - most) / freedom, 1.0)
-        gains = [
-            effect.reduction / misfit - effect.candidate.unknowns * logarithm for effect in effects
-        ]
-        leading = effects[int(np.argmax(gains))]
         if not leading.candidate.nuisance or max(gains) < search.data.rules.bic_gain:
             break
-        trial = _with(search, fitted, leading)
-        gain = fitted.chi_square - trial.chi_square
-        if gain < trial.misfit * _cost(search, leading.candidate.unknowns):
-            break
-        fitted = trial
-    return fitted
+        group.append(leading)
+        present.append(leading.candidate)
+        directions = basis_of(np.column_stack([directions, leading.signatures.T]))
+        residual = begin - directions @ (directions.T @ begin)
+    return group, float(begin @ begin - residual @ residual)
+
+
+def _is_worth(search: Search, fitted: Fit, before: Fit) -> bool:
+    """Tell whether the further candidates of a fit remove what their unknowns cost."""
+    further = fitted.candidates[len(before.candidates) :]
+    cost = sum(_cost(search, candidate.unknowns) for candidate in further)
+    return before.chi_square - fitted.chi_square >= fitted.misfit * cost
 
 
 def _that_go_with(candidates: Sequence[Candidate], screened: Sequence[Screened]) -> list[Screened]:
@@ -168,11 +168,11 @@ def _ranked(
     return sorted(effects, key=lambda effect: -effect.reduction)
 
 
-def _with(search: Search, fitted: Fit, effect: Screened) -> Fit:
-    """Return a fit with one more candidate, just enough to rank it."""
-    values = np.append(fitted.values, effect.start)
-    settled = search.data.rules.trial_gain
-    return fit(search.data, (*fitted.candidates, effect.candidate), values, settled=settled)
+def _with(search: Search, fitted: Fit, *effects: Screened) -> Fit:
+    """Return a fit with further candidates, just enough to rank it."""
+    values = np.concatenate([fitted.values, *(effect.start for effect in effects)])
+    candidates = (*fitted.candidates, *(effect.candidate for effect in effects))
+    return fit(search.data, candidates, values, settled=search.data.rules.trial_gain)
 
 
 def _cost(search: Search, unknowns: int) -> float:

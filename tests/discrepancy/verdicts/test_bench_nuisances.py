@@ -23,24 +23,24 @@ from pymoo_hdte.effects.gravity import Gravity
 from pymoo_hdte.effects.ripple import BrakeRipple, CouplingTorque, PeriodicTorque
 
 ORDERS = [1.0 / 101.0, 2.0 / 101.0, 3.0 / 101.0, 1.0, 2.0, 2.02, 3.0, 6.0]
-SPEEDS = (30.0, 200.0, 700.0, -700.0, 1400.0, 2000.0)
-DATA = known_data([(rpm, load) for rpm in SPEEDS for load in (0.0, 15.0, 40.0)], ORDERS)
+SPEEDS = (30.0, 700.0, -700.0, 2000.0)
+DATA = known_data([(rpm, load) for rpm in SPEEDS for load in (0.0, 40.0)], ORDERS)
 DAMPING = DATA.campaign.believed.input_damping
 ALONE = {
     "coupling_ripple": LawAtPort("coupling_ripple", "input", CouplingTorque(1.0, 0.8, 2e-3)),
     "torque_ripple": LawAtPort("torque_ripple", "output", PeriodicTorque(1.0, 0.8, 0.08)),
     "gravity": LawAtPort("gravity", "load", Gravity(0.08, 0.3)),
     "brake_ripple": LawAtPort("brake_ripple", "load", BrakeRipple(3.0, 0.5, 0.004)),
-    "warming": LawAtPort("warming", "input", WarmingFriction(DAMPING, 0.2, 600.0)),
-    "input_torque_drift": InputTorqueDrift(3e-3, 500.0),
-    "new_input_torque_zero": NewInputTorqueZero(3e-3, 850.0),
+    "warming": LawAtPort("warming", "input", WarmingFriction(DAMPING, 0.2, 250.0)),
+    "input_torque_drift": InputTorqueDrift(3e-3, 250.0),
+    "new_input_torque_zero": NewInputTorqueZero(3e-3, 350.0),
     "bench_resonance": BenchResonance(1e-6, 250.0, 0.05),
 }
 COULOMB = LawAtPort("coulomb_friction", "input", CoulombFriction(0.02))
 
 
 def candidates_of(data, base):
-    scales = replace(SCALES, changes=(450.0, 850.0, 1250.0), duration=1700.0, swept=False)
+    scales = replace(SCALES, changes=(150.0, 350.0, 550.0), duration=700.0, swept=False)
     orders = data.features.orders.tolist()
     seen = [1.0 / 101.0, 3.0 / 101.0, 1.0]
     sizes = port_sizes(data.campaign.believed, orders, seen, scales)

@@ -161,6 +161,7 @@ def port_sizes(
     seen: Sequence[float],
     scales: Scales,
     clear: Sequence[float] = (),
+    highest: float = 0.0,
 ) -> dict[str, DriveSizes]:
     """Return the sizes of each port.
 
@@ -174,6 +175,8 @@ def port_sizes(
     scales : Scales
     clear : sequence of float
         Orders of all significant lines, which may be harmonics of an effect.
+    highest : float
+        Order up to which lines are looked for.
     """
     at_output = max(scales.output_torque, believed.ratio * scales.input_torque)
     residual = {
@@ -208,6 +211,7 @@ def port_sizes(
         seen=tuple(sorted(seen)),
         clear=tuple(clear),
         shown=tuple(orders),
+        highest=highest,
         error=scales.error,
         largest_error=LARGEST * scales.error,
         # A line believed to have amplitude zero may be missing.
