@@ -132,6 +132,7 @@ def _size(
         most,
         values / scale,
         np.array([parameter.lower >= 0.0 for parameter in parameters]),
+        not further,
     )
 
 
@@ -140,7 +141,7 @@ def _released(parameter: Parameter, value: float, column: NDArray[np.float64]) -
     scale = parameter.scale
     most = max(parameter.upper - parameter.start, parameter.start - parameter.lower) / scale
     at = np.array([(value - parameter.start) / scale])
-    return Sized(f"parameter:{parameter.name}", column, 1.0, most, at, np.array([False]))
+    return Sized(f"parameter:{parameter.name}", column, 1.0, most, at, np.array([False]), True)
 
 
 _Prior = tuple[float, float, float, float, float]

@@ -24,7 +24,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
-from scipy.stats import chi2, norm
+from scipy.stats import chi2, ncx2, norm
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
@@ -82,6 +82,10 @@ class Sized:
         Values at which the hypothesis is linearised.
     positive : ndarray of bool, shape (m,)
         Coefficients that cannot be negative.
+    cut : bool
+        Whether the coefficients themselves, and not only their scale, are no smaller than the
+        least: what is smaller is nothing, and belongs to the hypothesis without it. For one
+        coefficient, or two of about the same curvature.
     """
 
     name: str
@@ -90,10 +94,11 @@ class Sized:
     most: float
     at: Vector
     positive: NDArray[np.bool_]
+    cut: bool = False
 
 
 VISIBLE = 4.0
-"""Chi-square beyond all free unknowns from which on something counts as visible: two standard
+"""Chi-square beyond all other unknowns from which on something counts as visible: two standard
 deviations of one unknown. What is smaller is nothing, as far as the data can tell."""
 
 
@@ -252,7 +257,7 @@ class _Integral:
         self.counts = np.array([len(rows) for rows in self.rows], dtype=float)
         self.factors = np.ones(n_channels)
         self._set_priors()
-        self.least = [self._least(place, part) for place, part in zip(self.places, sized, strict=True)]
+        self.least = [self._least(number) for number in range(len(sized))]
         self.log_scales = [
             np.linspace(np.log(least), np.log(max(part.most, least)), _GRID)
             if part.most > least
@@ -290,20 +295,29 @@ class _Integral:
         self.site_linear = np.concatenate([12.0 * middle / size**2, np.zeros(len(self.signed))])
         self.site_constant = np.zeros(len(self.sites))
 
-    def _least(self, place: slice, part: Sized) -> float:
-        """Return the least scale of a quantity, of `VISIBLE` chi-square where none is stated."""
-        if part.least > 0.0:
-            return part.least
-        gram = self.grams.sum(axis=0)
-        free = slice(0, self.n_free)
-        precision = self.precision[free].copy()
+    def _least(self, number: int) -> float:
+        """Return the least scale of a quantity: of `VISIBLE` chi-square where none is stated.
+
+        Beyond all free unknowns, and all other quantities of which the least is not stated, up to
+        their largest scale.
+        """
+        sized = self.hypothesis.sized
+        if sized[number].least > 0.0:
+            return sized[number].least
+        precision = self.precision.copy()
         precision[self.boxed] += self.site_precision[: len(self.boxed)]
-        inner = gram[free, free] + np.diag(precision)
-        across = gram[free, place]
-        curvature = gram[place, place]
-        if self.n_free:
-            curvature = curvature - across.T @ np.linalg.solve(inner, across)
-        units = self.units[place]
+        others = [np.arange(self.n_free)]
+        for other, (place, part) in enumerate(zip(self.places, sized, strict=True)):
+            if other != number and part.least <= 0.0:
+                precision[place] = 1.0 / (part.most * self.units[place]) ** 2
+                others.append(np.arange(place.start, place.stop))
+        gram, place = self.grams.sum(axis=0), self.places[number]
+        rows = np.concatenate(others)
+        curvature, units = gram[place, place], self.units[place]
+        if len(rows):
+            across = gram[rows, place]
+            inner = gram[np.ix_(rows, rows)] + np.diag(precision[rows])
+            curvature = curvature - across.T @ _inverse(inner) @ across
         largest = float(np.linalg.eigvalsh(curvature * np.outer(units, units)).max())
         return np.sqrt(VISIBLE / largest) if largest > 0.0 else np.inf
 
@@ -436,7 +450,10 @@ class _Integral:
         values, vectors = np.linalg.eigh(block * np.outer(units, units))
         values = np.maximum(values, 0.0)
         projected = (vectors.T @ (along * units)) ** 2
-        whole, largest, at = _mean_over_scales(grid, values, projected)
+        part = self.hypothesis.sized[number]
+        cut = self.least[number] if part.cut else 0.0
+        one_sided = bool(part.positive.all())
+        whole, largest, at = _mean_over_scales(grid, values, projected, cut, one_sided)
         self.scales[number] = np.exp(at)
         self.corrections[number] = whole - largest
 
@@ -481,19 +498,46 @@ class _Integral:
         return float(np.sum(-0.5 * (log / spread) ** 2 - np.log(spread) - 0.5 * np.log(curvature)))
 
 
-def _mean_over_scales(grid: Vector, values: Vector, projected: Vector) -> tuple[float, float, float]:
+def _mean_over_scales(
+    grid: Vector,
+    values: Vector,
+    projected: Vector,
+    cut: float = 0.0,
+    one_sided: bool = False,
+) -> tuple[float, float, float]:
     """Return ln of the mean likelihood ratio over logarithms of a scale, its largest, and where.
 
     The ratio is that to a scale of 0, for curvatures ``values`` of the likelihood along orthogonal
-    directions, and squares of its slopes along them.
+    directions, and squares of its slopes along them. With a ``cut`` coefficients are at least that
+    large together: the mean is times the probability of this afterwards, over that beforehand.
     """
     square = np.exp(2.0 * grid)[:, None]
     ln = 0.5 * np.sum(
         square * projected / (1.0 + square * values) - np.log1p(square * values), axis=1
     )
     best = int(np.argmax(ln))
-    mean = np.trapezoid(np.exp(ln - ln[best]), grid) / (grid[-1] - grid[0])
+    shares = np.exp(ln - ln[best])
+    if cut > 0.0:
+        variance = square / (1.0 + square * values)
+        away = np.sqrt(np.sum(projected * variance**2, axis=1))
+        spread = np.sqrt(variance.mean(axis=1))
+        before = _chance_beyond(cut, 0.0 * spread, np.exp(grid), len(values), one_sided)
+        after = _chance_beyond(cut, away, spread, len(values), one_sided)
+        shares, divisor = shares * after, np.trapezoid(before, grid)
+    else:
+        divisor = grid[-1] - grid[0]
+    mean = max(float(np.trapezoid(shares, grid) / divisor), 1e-300)
     return float(ln[best] + np.log(mean)), float(ln[best]), float(grid[best])
+
+
+def _chance_beyond(cut: float, away: Vector, spread: Vector, m: int, one_sided: bool) -> Vector:
+    """Return the chance that m normal values, of a mean this far away, are beyond a distance."""
+    if m == 1:
+        other = np.where(away > 0.0, 0.0, 1.0) if one_sided else 1.0
+        return np.asarray(
+            norm.cdf((away - cut) / spread) + other * norm.cdf((-away - cut) / spread)
+        )
+    return np.asarray(ncx2.sf((cut / spread) ** 2, m, np.maximum((away / spread) ** 2, 1e-12)))
 
 
 def _inverse(matrix: Matrix) -> Matrix:

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from pymoo_hdte.discrepancy._evidence.order_lines.corrections import Correction
 from pymoo_hdte.discrepancy._evidence.order_lines.evidence import Data, _ranges_of
 from pymoo_hdte.discrepancy._evidence.order_lines.features import MEANS
+from pymoo_hdte.discrepancy._evidence.order_lines.forms import _load as load_series_of
 from pymoo_hdte.discrepancy._records.line_fit import CHANNELS
 from pymoo_hdte.discrepancy._selection.candidate import Candidate
 from pymoo_hdte.discrepancy._selection.fitting import Fit, Response
@@ -276,6 +277,9 @@ class LawErrors:
                 ]
                 columns = [self._by_row[:, :k] * part[: self.n_rows, None] for part in parts]
                 yield self._place(f"torque of order {order:.4g} at {port}", np.hstack(columns), 2 * n_records)
+        columns = np.column_stack([response((effect,)) for effect in load_series_of(None, ranges)])
+        shown = np.count_nonzero(self.channels < len(CHANNELS))
+        yield self._place("what hangs at the output", columns[: features.values.size], shown)
         start = features.values.size
         for points in self.data.torsion:
             torque = points.torque
