@@ -40,6 +40,7 @@ def linearise(
     channels: NDArray[np.int_],
     errors: Modulations,
     noise: float = float(np.log(2.0)),
+    shares: Vector | None = None,
 ) -> Linearised:
     """Return a fit as a linearised hypothesis.
 
@@ -50,7 +51,7 @@ def linearise(
         Channel of each residual of the data. Those of priors come after them.
     errors : callable
         Relative errors of the laws: see `Modulations`.
-    noise : float
+    noise, shares
         As of `Linearised`.
     """
     n, columns = len(channels), fitted.jacobian[: len(channels)]
@@ -85,7 +86,7 @@ def linearise(
     of_free = np.column_stack(free) if free else np.empty((n, 0))
     stated = (np.array(values) for values in zip(*priors, strict=True))
     return Linearised(
-        fitted.residuals[:n], channels, Free(of_free, *stated), tuple(sized), noise
+        fitted.residuals[:n], channels, Free(of_free, *stated), tuple(sized), noise, shares
     )
 
 

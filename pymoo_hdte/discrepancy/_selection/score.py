@@ -117,6 +117,8 @@ class Linearised:
     noise : float
         Standard deviation of the logarithm of a factor: ln 2 where the noise is stated. With 0
         factors are 1.
+    shares : ndarray, shape (n,), optional
+        Independent values that each residual counts for, at most 1: less where they are correlated.
     """
 
     residuals: Vector
@@ -124,6 +126,7 @@ class Linearised:
     free: Free
     sized: tuple[Sized, ...] = ()
     noise: float = float(np.log(2.0))
+    shares: Vector | None = None
 
     def beside(self, *sized: Sized) -> Linearised:
         """Return it with further quantities of unknown size."""
@@ -253,8 +256,11 @@ class _Integral:
         n_channels = int(hypothesis.channels.max(initial=-1)) + 1
         self.rows = [np.flatnonzero(hypothesis.channels == k) for k in range(n_channels)]
         whole = np.column_stack([self.columns, residuals])
+        shares = np.ones(len(residuals)) if hypothesis.shares is None else hypothesis.shares
+        self.weights = np.sqrt(shares)
+        whole *= self.weights[:, None]
         self.grams = np.array([whole[rows].T @ whole[rows] for rows in self.rows])
-        self.counts = np.array([len(rows) for rows in self.rows], dtype=float)
+        self.counts = np.array([np.sum(shares[rows]) for rows in self.rows])
         self.factors = np.ones(n_channels)
         self._set_priors()
         self.least = [self._least(number) for number in range(len(sized))]
@@ -342,7 +348,7 @@ class _Integral:
         self._integrate_bounds()
         ln = self._ln() + float(self.corrections.sum()) + of_factors
         mean, covariance = self._posterior()
-        by_row = self.factors[self.hypothesis.channels]
+        by_row = self.factors[self.hypothesis.channels] / self.weights
         left = (self.shift + self.columns @ mean) / by_row
         scaled = self.columns / by_row[:, None]
         followed = np.einsum("ij,jk,ik->i", scaled, covariance, scaled)
@@ -352,7 +358,7 @@ class _Integral:
             invisible,
             self.factors.copy(),
             left,
-            np.clip(1.0 - followed, 0.0, 1.0),
+            np.clip(self.weights**2 - followed, 0.0, 1.0),
             self.hypothesis.noise,
         )
 
@@ -460,7 +466,7 @@ class _Integral:
     def gains(self, places: Sequence[Sized]) -> Vector:
         """Return by how much each further quantity alone would raise the logarithm, (n_places,)."""
         mean, covariance = self._posterior()
-        by_row = self.factors[self.hypothesis.channels]
+        by_row = self.factors[self.hypothesis.channels] / self.weights
         scaled = self.columns / by_row[:, None]
         left = (self.shift + self.columns @ mean) / by_row
         gains = np.empty(len(places))

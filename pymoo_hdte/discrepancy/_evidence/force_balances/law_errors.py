@@ -1,0 +1,159 @@
+"""Relative errors of laws in force balances, and what no law of the library holds.
+
+Both are Gaussian processes over the motion at a port: over its position, over its speed, over its
+load and over the time. What a real machine leaves is coloured, so that residuals count as fewer
+independent values than there are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pymoo_hdte.discrepancy._evidence.force_balances.evidence import MeasuredData
+from pymoo_hdte.discrepancy._selection.candidate import Candidate
+from pymoo_hdte.discrepancy._selection.fitting import Fit
+from pymoo_hdte.discrepancy._selection.linearised import linearise
+from pymoo_hdte.discrepancy._selection.score import Linearised, Sized
+from pymoo_hdte.mechanism.port_motion import law_force
+
+Matrix = NDArray[np.float64]
+
+NOISE = float(np.log(10.0))
+"""Standard deviation of the logarithm of the noise, which nobody states of a balance."""
+_LENGTH, _EDGE, _TERMS = 0.5, 1.5, 8
+"""Length of a process over -1 to 1, where its sines end, and how many span it: as of a drive."""
+_SMOOTHED = 9
+"""Bins over which a spectrum is smoothed, to see how coloured it is."""
+
+
+@dataclass(frozen=True, eq=False)
+class BalanceErrors:
+    """Hypotheses of a mechanism as the score takes them.
+
+    Attributes
+    ----------
+    data : MeasuredData
+    base : Fit
+        Without effects.
+    best : Fit
+        Of the least residuals: how coloured these are tells how many of them are independent.
+    """
+
+    data: MeasuredData
+    base: Fit
+    best: Fit
+
+    @property
+    def channels(self) -> NDArray[np.int_]:
+        """Balance of each residual."""
+        return self.data._part
+
+    @property
+    def groups(self) -> list[NDArray[np.int_]]:
+        """Rows of each record and of each balance."""
+        return [
+            np.flatnonzero(labels == label)
+            for labels in (self.data._record, self.data._part)
+            for label in np.unique(labels)
+        ]
+
+    @cached_property
+    def shares(self) -> Matrix:
+        """Independent values that each residual counts for, shape (n,)."""
+        shares = np.ones(len(self.channels))
+        window = np.ones(_SMOOTHED) / _SMOOTHED
+        for record in np.unique(self.data._record):
+            for part in np.unique(self.data._part):
+                rows = np.flatnonzero((self.data._record == record) & (self.data._part == part))
+                if len(rows) < _SMOOTHED:
+                    continue
+                power = np.convolve(self.best.residuals[rows] ** 2, window, "same")
+                shares[rows] = np.sum(power) ** 2 / (len(rows) * np.sum(power**2))
+        return shares
+
+    def linearised(self, fitted: Fit) -> Linearised:
+        """Return a fit as a hypothesis."""
+
+        def errors(candidate: Candidate, place: slice) -> Matrix | None:
+            if candidate.releases is not None or not candidate.parameters:
+                return None
+            values = [float(value) for value in fitted.values[place]]
+            columns = [
+                self._column(effect.port, lambda motion, law=effect.law: law_force(
+                    law, motion, self.data.mechanism.port(effect.port).stiffness.value
+                ), over, number)
+                for effect in candidate.build(values)
+                for over in ("position", "speed")
+                for number in range(1, _TERMS + 1)
+            ]  # fmt: skip
+            return np.column_stack(columns)
+
+        return linearise(fitted, self.channels, errors, NOISE, self.shares)
+
+    def _column(self, port: str, force, over: str, number: int) -> Matrix:  # type: ignore[no-untyped-def]
+        """Return whitened balances of a force times one function over something, shape (n,)."""
+        parts = []
+        reach = self._reach(port, over)
+        for balance, deviation in zip(self.data.spectra, self.data.deviation, strict=True):
+            motion = balance.ports[port]
+            argument = self._argument(motion, balance, over) / reach
+            signal = force(motion) * _sine(number, argument)
+            parts.append((balance.of_port(port, signal) / deviation)[balance.kept])
+        return np.concatenate(parts)
+
+    @staticmethod
+    def _argument(motion, balance, over: str) -> Matrix:  # type: ignore[no-untyped-def]
+        if over == "time":
+            return np.linspace(-1.0, 1.0, len(motion.position))
+        values = getattr(motion, over)
+        return values - np.mean(values) if over == "position" else values
+
+    def _reach(self, port: str, over: str) -> float:
+        peaks = [
+            float(np.abs(self._argument(balance.ports[port], balance, over)).max())
+            for balance in self.data.spectra
+        ]
+        return max(*peaks, 1e-12)
+
+    @cached_property
+    def outside(self) -> tuple[Sized, ...]:
+        """What no law holds: a process over something at each port."""
+        return tuple(self._outside())
+
+    def _outside(self) -> Iterator[Sized]:
+        for port in self.data.mechanism.ports:
+            overs = ["position", "speed", "time"]
+            if all(balance.ports[port.name].load is not None for balance in self.data.spectra):
+                overs.append("load")
+            for over in overs:
+                columns = np.column_stack(
+                    [
+                        self._column(port.name, lambda motion: np.ones_like(motion.position), over, k)
+                        for k in range(1, _TERMS + 1)
+                    ]
+                )
+                columns = columns * np.sqrt(self.shares)[:, None]
+                size = max(float(np.sum(columns**2)), 1e-24)
+                independent = float(np.sum(self.shares))
+                most = np.sqrt(max(float(self.shares @ self.base.residuals**2), 4.0 * independent) / size)
+                none = np.zeros(_TERMS)
+                columns = columns / np.sqrt(self.shares)[:, None]
+                yield Sized(
+                    f"outside: {over} at {port.name}",
+                    columns,
+                    float(np.sqrt(_TERMS / size)),
+                    float(most),
+                    none,
+                    none > 0.0,
+                )
+
+
+def _sine(number: int, place: Matrix) -> Matrix:
+    rate = np.pi * number / (2.0 * _EDGE)
+    density = np.sqrt(2.0 * np.pi) * _LENGTH * np.exp(-0.5 * (rate * _LENGTH) ** 2)
+    return np.asarray(np.sqrt(density / _EDGE) * np.sin(rate * (place + _EDGE)))
