@@ -8,7 +8,7 @@ decide what is said of it; one check asks whether the likeliest explanation is p
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -46,8 +46,6 @@ class Explanation:
         Whether something outside of the library is there as well.
     worst_chance : float
         As of `Score`.
-    parameters_only : bool
-        Whether nothing but values out of tolerance are in the set.
     """
 
     label: str
@@ -55,7 +53,6 @@ class Explanation:
     ln: float
     outside: bool = False
     worst_chance: float = 1.0
-    parameters_only: bool = False
 
 
 @dataclass(frozen=True)
@@ -109,46 +106,51 @@ def log_prior(names: Sequence[Name], forms: Sequence[int], outside: bool) -> flo
 def decide(explanations: Sequence[Explanation], priors: Sequence[float]) -> Decision:
     """Return what is said of explanations with their logarithms of prior odds.
 
-    The first explanation of equal probability counts as the likelier one.
+    - ``"adequate"``: nothing is missing, and that is sure.
+    - ``"named"``, ``"parameter"``: one set is sure, and that nothing is outside of the library.
+    - ``"class"``: one of a few sets is sure, and something outside is less likely than not.
+    - ``"partial"``: some names are sure, and no more than these.
+    - ``"unlisted"``: else.
     """
     weights = np.array([item.ln for item in explanations]) + np.asarray(priors)
     shares = np.exp(weights - logsumexp(weights))
     best = explanations[int(np.argmax(shares))]
     possible = best.worst_chance >= IMPOSSIBLE
-    outside = float(sum(share for item, share in _pairs(explanations, shares) if item.outside))
-    of_names = Counter[Name]()
-    of_sets = Counter[frozenset[Name]]()
-    for item, share in _pairs(explanations, shares):
+    outside = float(shares[[item.outside for item in explanations]].sum())
+    of_names, of_sets, of_nothing = Counter[Name](), Counter[frozenset[Name]](), 0.0
+    for item, share in zip(explanations, shares.tolist(), strict=True):
         of_names.update(dict.fromkeys(item.names, share))
-        if not item.outside:
-            of_sets[item.names] += share
+        of_sets[item.names] += share
+        of_nothing += share * (not item.names and not item.outside)
     ranked = sorted(of_sets, key=lambda names: -of_sets[names])
-    marginal = dict(of_names.most_common())
-    certain = frozenset(name for name, share in marginal.items() if share >= SURE)
+    certain = frozenset(name for name, share in of_names.items() if share >= SURE)
 
     def said(status: str, members: Sequence[frozenset[Name]], probability: float) -> Decision:
+        marginal = dict(of_names.most_common())
         return Decision(status, tuple(members), probability, outside, possible, marginal)
 
-    if possible and of_sets[frozenset()] >= SURE:
-        return said("adequate", [], of_sets[frozenset()])
-    if possible and outside <= 1.0 - SURE:
-        if ranked and ranked[0] and of_sets[ranked[0]] >= SURE:
-            only = all(name == "parameter" for name, _ in ranked[0])
-            return said("parameter" if only else "named", ranked[:1], of_sets[ranked[0]])
-    total, members = 0.0, list[frozenset[Name]]()
-    for names in ranked[:MOST_IN_CLASS]:
-        members.append(names)
+    if possible and of_nothing >= SURE:
+        return said("adequate", [], of_nothing)
+    members = _fewest(ranked, of_sets)
+    sure = possible and bool(members) and frozenset() not in members
+    if sure and len(members) == 1 and outside <= 1.0 - SURE:
+        only = all(name == "parameter" for name, _ in members[0])
+        return said("parameter" if only else "named", members, of_sets[members[0]])
+    if sure and len(members) > 1 and outside < 0.5:
+        # It claims that one of these is missing, not that nothing else is.
+        return said("class", members, sum(of_sets[names] for names in members))
+    if certain:
+        return said("partial", [certain], min(of_names[name] for name in certain))
+    return said("unlisted", ranked[:1], 1.0 - of_nothing)
+
+
+def _fewest(
+    ranked: Sequence[frozenset[Name]], of_sets: Mapping[frozenset[Name], float]
+) -> list[frozenset[Name]]:
+    """Return the fewest sets that are sure together, the likeliest first; none of too many."""
+    total = 0.0
+    for number, names in enumerate(ranked[:MOST_IN_CLASS]):
         total += of_sets[names]
         if total >= SURE:
-            break
-    if possible and total >= SURE and frozenset() not in members:
-        return said("class", members, total)
-    if certain:
-        return said("partial", [certain], min(marginal[name] for name in certain))
-    return said("unlisted", ranked[:1], 1.0 - of_sets[frozenset()])
-
-
-def _pairs(
-    explanations: Sequence[Explanation], shares: Sequence[float]
-) -> list[tuple[Explanation, float]]:
-    return [(item, float(share)) for item, share in zip(explanations, shares, strict=True)]
+            return list(ranked[: number + 1])
+    return []
