@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import time
 from collections import Counter
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 from pymoo_hdte.discrepancy._evidence.force_balances.evidence import MeasuredData
 from pymoo_hdte.discrepancy._evidence.force_balances.law_errors import BalanceErrors
+from pymoo_hdte.discrepancy._evidence.order_lines.features import measure
 from pymoo_hdte.discrepancy._evidence.order_lines.law_errors import LawErrors
 from pymoo_hdte.discrepancy._selection.candidate import Candidate
 from pymoo_hdte.discrepancy._selection.decision import Decision, Explanation, decide, log_prior
-from pymoo_hdte.discrepancy._selection.fitting import Fit
+from pymoo_hdte.discrepancy._selection.fitting import Fit, fit
 from pymoo_hdte.discrepancy._selection.hypothesis import Hypothesis, fit_all
 from pymoo_hdte.discrepancy._selection.score import Linearised, score, score_with_outside
 from pymoo_hdte.discrepancy._selection.screening import screen, varied
@@ -53,16 +54,26 @@ class Comparison:
     seconds: float
 
 
-def errors_of(data: Any, verdict: Verdict) -> LawErrors | BalanceErrors:
-    """Return what tells the score about the data of a verdict."""
+def errors_of(data: Any, fits: Mapping[Hypothesis | None, Fit]) -> LawErrors | BalanceErrors:
+    """Return what tells the score about the data of fits, of which that of nothing is the base."""
     if isinstance(data, MeasuredData):
-        fits = [hypothesis.fit for hypothesis in _sets(verdict) if hypothesis is not None]
-        best = min([verdict.base, *fits], key=lambda fitted: fitted.chi_square)
-        return BalanceErrors(data, verdict.base, best)
-    return LawErrors(data, verdict.base)
+        best = min(fits.values(), key=lambda fitted: fitted.chi_square)
+        return BalanceErrors(data, fits[None], best)
+    return LawErrors(data, fits[None])
 
 
-def compare(data: Any, verdict: Verdict, candidates: Sequence[Candidate]) -> Comparison:
+def with_held_out(data: Any) -> Any:
+    """Return the data of a drive with the records kept out of fits; other data as they are."""
+    if isinstance(data, MeasuredData) or (held_out := data.held_out) is None:
+        return data
+    records = (*data.features.records, *held_out.features.records)
+    orders = data.features.orders.tolist()
+    return replace(data, features=measure(data.campaign, records, orders, data.rules))
+
+
+def compare(
+    data: Any, verdict: Verdict, candidates: Sequence[Candidate], held_out: bool = False
+) -> Comparison:
     """Return the score's decision on the sets that a verdict compared.
 
     Parameters
@@ -72,18 +83,25 @@ def compare(data: Any, verdict: Verdict, candidates: Sequence[Candidate]) -> Com
     verdict : Verdict
     candidates : sequence of Candidate
         All that were searched for, among which the prior of a name is shared.
+    held_out : bool
+        Whether records kept out of the fits count as well: the likelihood of all records is that of
+        those that were fitted, times the predictive density of the others.
     """
     started = time.process_time()
-    errors = errors_of(data, verdict)
-    counts = Counter(candidate.name for candidate in candidates)
-    counts["parameter"] = sum(parameter.name != "offset" for parameter in data.base)
     every = _sets(verdict)
     if len(every) == 1:
         every += _singles(data, verdict.base, candidates)
-    sets = sorted(every, key=lambda item: _fit(verdict, item).evidence)[:MOST_SETS]
+    fits = {item: verdict.base if item is None else item.fit for item in every}
+    if held_out:
+        data = with_held_out(data)
+        fits = {item: fit(data, f.candidates, f.values, steps=0) for item, f in fits.items()}
+    errors = errors_of(data, fits)
+    counts = Counter(candidate.name for candidate in candidates)
+    counts["parameter"] = sum(parameter.name != "offset" for parameter in data.base)
+    sets = sorted(every, key=lambda item: fits[item].evidence)[:MOST_SETS]
     found = list[tuple[Hypothesis | None, Linearised, Scored]]()
     for item in {*sets, None}:
-        fitted = _fit(verdict, item)
+        fitted = fits[item]
         linearised = errors.linearised(fitted)
         result = score(linearised)
         if not result.invisible:
@@ -93,12 +111,10 @@ def compare(data: Any, verdict: Verdict, candidates: Sequence[Candidate]) -> Com
     for number, (item, linearised, _) in enumerate(found):
         if number < MOST_OUTSIDE or item is None:
             result, places = score_with_outside(linearised, errors.outside)
-            fitted = _fit(verdict, item)
+            fitted = fits[item]
             scored.append(_scored(item, fitted, result, counts, errors.groups, True, places))
     scored.sort(key=lambda entry: -(entry.explanation.ln + entry.prior))
-    decision = decide(
-        [entry.explanation for entry in scored], [entry.prior for entry in scored]
-    )
+    decision = decide([entry.explanation for entry in scored], [entry.prior for entry in scored])
     return Comparison(decision, tuple(scored), time.process_time() - started)
 
 
@@ -112,10 +128,6 @@ def _singles(data: Any, base: Fit, candidates: Sequence[Candidate]) -> list[Hypo
 def _sets(verdict: Verdict) -> list[Hypothesis | None]:
     chosen = [] if verdict.chosen is None else [verdict.chosen]
     return [None, *chosen, *verdict.alternatives]
-
-
-def _fit(verdict: Verdict, item: Hypothesis | None) -> Fit:
-    return verdict.base if item is None else item.fit
 
 
 def _scored(

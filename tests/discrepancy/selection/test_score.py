@@ -95,9 +95,7 @@ def test_correlated_bounds_are_integrated_together(rng):
     values = np.linspace(-0.7, 1.2, 200)
     grid = np.stack(np.meshgrid(values, values, indexing="ij"), axis=-1).reshape(-1, 2)
     likelihood = np.exp(np.sum(norm.logpdf(residuals + grid @ columns.T), axis=1))
-    prior = [
-        flat(a, lower[0], upper[0], 0.05) * flat(b, lower[1], upper[1], 0.05) for a, b in grid
-    ]
+    prior = [flat(a, lower[0], upper[0], 0.05) * flat(b, lower[1], upper[1], 0.05) for a, b in grid]
     wanted = np.log(np.sum(likelihood * prior) * (values[1] - values[0]) ** 2)
     found = score(hypothesis(residuals, free(columns, lower, upper, [0.05, 0.05]))).ln
     assert found == pytest.approx(wanted, abs=0.02)
@@ -126,9 +124,7 @@ def test_an_unknown_scale_is_integrated(rng, positive):
 
 
 def test_two_scales_are_integrated(rng):
-    residuals, first, second = (
-        rng.normal(size=shape) for shape in ((N,), (N, 4), (N, 2))
-    )
+    residuals, first, second = (rng.normal(size=shape) for shape in ((N,), (N, 4), (N, 2)))
     logs = np.linspace(np.log(1e-2), np.log(30.0), 60)
     ln = np.array(
         [
@@ -189,7 +185,7 @@ def test_what_would_be_invisible_is_told(rng):
     column = rng.normal(size=(N, 1))
     scale = np.sqrt(VISIBLE) / np.linalg.norm(column)
     for most, invisible in ((0.9 * scale, True), (1.1 * scale, False)):
-        part = sized(column, 0.0, most)
+        part = sized(column, 0.0, most, cut=True)
         found = score(hypothesis(rng.normal(size=N), free(np.empty((N, 0))), part))
         assert bool(found.invisible) is invisible
 
@@ -222,7 +218,9 @@ def test_twice_as_many_functions_of_a_form_change_no_odds(rng):
 
 def test_something_outside_is_found_where_it_is(rng):
     places = [
-        Sized(f"place {k}", np.eye(40)[:, 4 * k : 4 * k + 4], 1.0, 100.0, np.zeros(4), np.zeros(4) > 0)
+        Sized(
+            f"place {k}", np.eye(40)[:, 4 * k : 4 * k + 4], 1.0, 100.0, np.zeros(4), np.zeros(4) > 0
+        )
         for k in range(10)
     ]
     residuals = rng.normal(size=40)
@@ -271,7 +269,8 @@ def test_said_probabilities_are_the_shares_that_are_right():
     for low, high in ((0.0, 0.05), (0.05, 0.3), (0.3, 0.7), (0.7, 0.95), (0.95, 1.0)):
         bin_ = (said >= low) & (said <= high)
         expected, count = said[bin_].mean(), int(bin_.sum())
-        chances = binom.cdf(right[bin_].sum(), count, expected), binom.sf(
-            right[bin_].sum() - 1, count, expected
+        chances = (
+            binom.cdf(right[bin_].sum(), count, expected),
+            binom.sf(right[bin_].sum() - 1, count, expected),
         )
         assert min(chances) > 0.001, (low, high, expected, right[bin_].mean(), count)

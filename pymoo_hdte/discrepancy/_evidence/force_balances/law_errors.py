@@ -133,14 +133,18 @@ class BalanceErrors:
             for over in overs:
                 columns = np.column_stack(
                     [
-                        self._column(port.name, lambda motion: np.ones_like(motion.position), over, k)
+                        self._column(
+                            port.name, lambda motion: np.ones_like(motion.position), over, k
+                        )
                         for k in range(1, _TERMS + 1)
                     ]
                 )
                 columns = columns * np.sqrt(self.shares)[:, None]
                 size = max(float(np.sum(columns**2)), 1e-24)
                 independent = float(np.sum(self.shares))
-                most = np.sqrt(max(float(self.shares @ self.base.residuals**2), 4.0 * independent) / size)
+                most = np.sqrt(
+                    max(float(self.shares @ self.base.residuals**2), 4.0 * independent) / size
+                )
                 none = np.zeros(_TERMS)
                 columns = columns / np.sqrt(self.shares)[:, None]
                 yield Sized(

@@ -276,7 +276,9 @@ class LawErrors:
                     for phase in (0.0, np.pi / 2.0)
                 ]
                 columns = [self._by_row[:, :k] * part[: self.n_rows, None] for part in parts]
-                yield self._place(f"torque of order {order:.4g} at {port}", np.hstack(columns), 2 * n_records)
+                yield self._place(
+                    f"torque of order {order:.4g} at {port}", np.hstack(columns), 2 * n_records
+                )
         columns = np.column_stack([response((effect,)) for effect in load_series_of(None, ranges)])
         shown = np.count_nonzero(self.channels < len(CHANNELS))
         yield self._place("what hangs at the output", columns[: features.values.size], shown)
@@ -317,6 +319,9 @@ class LawErrors:
         """Return what may be at a place: from as large as the noise of its rows to the misfit."""
         whole, m = self._whole(columns), columns.shape[1]
         size = max(float(np.sum(whole**2)), 1e-24)
-        least, most = np.sqrt(n_rows / size), np.sqrt(max(self.base.chi_square, 4.0 * n_rows) / size)
+        least, most = (
+            np.sqrt(n_rows / size),
+            np.sqrt(max(self.base.chi_square, 4.0 * n_rows) / size),
+        )
         none = np.zeros(m)
         return Sized(f"outside: {name}", whole, float(least), float(most), none, none > 0.0)
