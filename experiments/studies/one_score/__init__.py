@@ -1,1 +1,1 @@
-"""Whether one score of probability decides as well as the verdict's rules do: a pilot beside them."""
+"""Whether one score of probability decides as well as the rules of the verdict: a pilot."""

@@ -1,4 +1,4 @@
-"""The score's decision on the fits that a search made, beside the verdict that was given on them."""
+"""The decision of the score on the fits of a search, beside the verdict that was given on them."""
 
 from __future__ import annotations
 

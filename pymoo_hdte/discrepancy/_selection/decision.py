@@ -126,7 +126,7 @@ def decide(explanations: Sequence[Explanation], priors: Sequence[float]) -> Deci
     certain = frozenset(name for name, share in of_names.items() if share >= SURE)
 
     def said(status: str, members: Sequence[frozenset[Name]], probability: float) -> Decision:
-        marginal = dict(of_names.most_common())
+        marginal = {name: float(share) for name, share in of_names.most_common()}
         return Decision(status, tuple(members), probability, outside, possible, marginal)
 
     if possible and of_nothing >= SURE:

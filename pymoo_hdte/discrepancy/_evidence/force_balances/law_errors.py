@@ -19,7 +19,8 @@ from pymoo_hdte.discrepancy._selection.candidate import Candidate
 from pymoo_hdte.discrepancy._selection.fitting import Fit
 from pymoo_hdte.discrepancy._selection.linearised import linearise
 from pymoo_hdte.discrepancy._selection.score import Linearised, Sized
-from pymoo_hdte.mechanism.port_motion import law_force
+from pymoo_hdte.effects.law import Law
+from pymoo_hdte.mechanism.port_motion import PortMotion, law_force
 
 Matrix = NDArray[np.float64]
 
@@ -84,38 +85,31 @@ class BalanceErrors:
                 return None
             values = [float(value) for value in fitted.values[place]]
             columns = [
-                self._column(effect.port, lambda motion, law=effect.law: law_force(
-                    law, motion, self.data.mechanism.port(effect.port).stiffness.value
-                ), over, number)
+                self._column(effect.port, over, number, effect.law)
                 for effect in candidate.build(values)
                 for over in ("position", "speed")
                 for number in range(1, _TERMS + 1)
-            ]  # fmt: skip
+            ]
             return np.column_stack(columns)
 
         return linearise(fitted, self.channels, errors, NOISE, self.shares)
 
-    def _column(self, port: str, force, over: str, number: int) -> Matrix:  # type: ignore[no-untyped-def]
-        """Return whitened balances of a force times one function over something, shape (n,)."""
+    def _column(self, port: str, over: str, number: int, law: Law | None = None) -> Matrix:
+        """Return whitened balances of a function over something, times a law's force, (n,)."""
         parts = []
         reach = self._reach(port, over)
+        stiffness = self.data.mechanism.port(port).stiffness.value
         for balance, deviation in zip(self.data.spectra, self.data.deviation, strict=True):
             motion = balance.ports[port]
-            argument = self._argument(motion, balance, over) / reach
-            signal = force(motion) * _sine(number, argument)
+            signal = _sine(number, _argument(motion, over) / reach)
+            if law is not None:
+                signal = signal * law_force(law, motion, stiffness)
             parts.append((balance.of_port(port, signal) / deviation)[balance.kept])
         return np.concatenate(parts)
 
-    @staticmethod
-    def _argument(motion, balance, over: str) -> Matrix:  # type: ignore[no-untyped-def]
-        if over == "time":
-            return np.linspace(-1.0, 1.0, len(motion.position))
-        values = getattr(motion, over)
-        return values - np.mean(values) if over == "position" else values
-
     def _reach(self, port: str, over: str) -> float:
         peaks = [
-            float(np.abs(self._argument(balance.ports[port], balance, over)).max())
+            float(np.abs(_argument(balance.ports[port], over)).max())
             for balance in self.data.spectra
         ]
         return max(*peaks, 1e-12)
@@ -132,12 +126,7 @@ class BalanceErrors:
                 overs.append("load")
             for over in overs:
                 columns = np.column_stack(
-                    [
-                        self._column(
-                            port.name, lambda motion: np.ones_like(motion.position), over, k
-                        )
-                        for k in range(1, _TERMS + 1)
-                    ]
+                    [self._column(port.name, over, number) for number in range(1, _TERMS + 1)]
                 )
                 columns = columns * np.sqrt(self.shares)[:, None]
                 size = max(float(np.sum(columns**2)), 1e-24)
@@ -155,6 +144,14 @@ class BalanceErrors:
                     none,
                     none > 0.0,
                 )
+
+
+def _argument(motion: PortMotion, over: str) -> Matrix:
+    """Return what a process is over, (n,): the position counts from its mean."""
+    if over == "time":
+        return np.linspace(-1.0, 1.0, len(motion.position))
+    values = np.asarray(getattr(motion, over))
+    return values - np.mean(values) if over == "position" else values
 
 
 def _sine(number: int, place: Matrix) -> Matrix:
