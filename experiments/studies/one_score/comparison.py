@@ -148,6 +148,7 @@ def _scored(
         result.ln,
         outside,
         result.worst_chance(groups),
+        bool(members) and all(candidate.releases is not None for candidate in members),
     )
     prior = log_prior(names, forms, outside)
     return Scored(explanation, prior, fitted.chi_square, tuple(places))

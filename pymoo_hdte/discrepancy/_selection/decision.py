@@ -46,6 +46,8 @@ class Explanation:
         Whether something outside of the library is there as well.
     worst_chance : float
         As of `Score`.
+    values_only : bool
+        Whether the set is of values out of tolerance, and of no effects.
     """
 
     label: str
@@ -53,6 +55,7 @@ class Explanation:
     ln: float
     outside: bool = False
     worst_chance: float = 1.0
+    values_only: bool = False
 
 
 @dataclass(frozen=True)
@@ -134,7 +137,10 @@ def decide(explanations: Sequence[Explanation], priors: Sequence[float]) -> Deci
     members = _fewest(ranked, of_sets)
     sure = possible and bool(members) and frozenset() not in members
     if sure and len(members) == 1 and outside <= 1.0 - SURE:
-        only = all(name == "parameter" for name, _ in members[0])
+        same = [item for item in explanations if item.names == members[0]]
+        only = max(same, key=lambda item: item.ln).values_only
+        # One value that an effect covers is that effect.
+        only = only and any(name == "parameter" for name, _ in members[0])
         return said("parameter" if only else "named", members, of_sets[members[0]])
     if sure and len(members) > 1 and outside < 0.5:
         # It claims that one of these is missing, not that nothing else is.

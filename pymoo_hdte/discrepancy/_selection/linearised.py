@@ -72,6 +72,8 @@ def linearise(
                 sized.append(
                     _size(candidate, parameters, columns[:, at], fitted.values[at], further)
                 )
+            elif _is_ratio(parameters[0]):
+                sized.append(_ratio(candidate, parameters[0], columns[:, at], fitted.values[at]))
             else:
                 (k,) = at
                 prior, unit = _shape(parameters[0], float(fitted.values[k]))
@@ -93,11 +95,14 @@ def linearise(
 def amplitudes(candidate: Candidate, values: Vector) -> list[tuple[list[int], float]]:
     """Return the places of each size of a candidate, and its fitted amplitude in its scales.
 
-    Parts of a line share their amplitude.
+    Parts of a line share their amplitude. A factor counts by how far it is from 1.
     """
     found = []
     for rows in _groups(candidate.parameters):
-        if _is_size(candidate.parameters[rows[0]]):
+        if _is_ratio(first := candidate.parameters[rows[0]]):
+            value = float(values[rows[0]])
+            found.append((rows, value / first.scale * abs(float(np.log(value)))))
+        elif _is_size(first):
             scales = np.array([candidate.parameters[row].scale for row in rows])
             found.append((rows, float(np.linalg.norm(values[rows] / scales))))
     return found
@@ -115,6 +120,26 @@ def _groups(parameters: Sequence[Parameter]) -> list[list[int]]:
 
 def _is_size(parameter: Parameter) -> bool:
     return parameter.lower <= 0.0 <= parameter.upper
+
+
+def _is_ratio(parameter: Parameter) -> bool:
+    """Tell whether it is a factor, with which nothing changes at 1."""
+    return parameter.lower > 0.0 and abs(parameter.lower * parameter.upper - 1.0) < 1e-9
+
+
+def _ratio(
+    candidate: Candidate, parameter: Parameter, column: NDArray[np.float64], value: Vector
+) -> Sized:
+    """Return a factor as a size by its logarithm."""
+    return Sized(
+        f"{candidate.label} {parameter.name}",
+        column * value / parameter.scale,
+        0.0,
+        float(np.log(parameter.upper)),
+        np.log(value),
+        np.array([False]),
+        True,
+    )
 
 
 def _size(

@@ -22,7 +22,14 @@ NOTHING = frozenset()
 def said(*shares, worst_chance=1.0):
     """Return what is said of (names, outside, posterior share)."""
     explanations = [
-        Explanation("+".join(sorted(dict(names))), names, np.log(share), outside, worst_chance)
+        Explanation(
+            "+".join(sorted(dict(names))),
+            names,
+            np.log(share),
+            outside,
+            worst_chance,
+            "parameter" in dict(names),
+        )
         for names, outside, share in shares
     ]
     return decide(explanations, [0.0] * len(explanations))

@@ -24,7 +24,7 @@ from pymoo_hdte.discrepancy._selection.candidate import Candidate
 from pymoo_hdte.discrepancy._selection.fitting import Fit, Response
 from pymoo_hdte.discrepancy._selection.linearised import amplitudes, linearise
 from pymoo_hdte.discrepancy._selection.score import Linearised, Sized
-from pymoo_hdte.drive import LawAtPort
+from pymoo_hdte.drive import DriveEffect, LawAtPort
 from pymoo_hdte.effects.hysteresis import MaxwellSlip
 from pymoo_hdte.effects.law import Behaviour, Law, PortState
 from pymoo_hdte.effects.law import Response as Torque
@@ -33,13 +33,17 @@ from pymoo_hdte.effects.ripple import PeriodicTorque
 Matrix = NDArray[np.float64]
 
 LENGTH = 1.0
-"""Length over which a relative error changes, where the argument runs from -1 to 1: half of it."""
+"""Length over which a relative error changes, where the argument runs from -1 to 1: half of it.
+
+Its process has one derivative (Matern, 3/2): one with all of them, known at some records, would be
+known at the others to a ten-thousandth, which no error of a law is.
+"""
 _TORSION_LENGTH = 0.5
 """The same for the torsion, over which laws bend several times."""
 _TERMS, _EDGE = 8, 1.5
 """Sines that span a process over the torsion, and where they end (Solin and Sarkka, Statistics and
 Computing 30, 2020); twice as many change no logarithm of odds by 1."""
-_SMALLEST = 1e-4
+_SMALLEST = 1e-9
 """Least share of the variance of a process for which a direction counts."""
 REPEATABLE = (0.03, 30.0)
 """Range of what a record's mean is off by, in standard deviations of its noise."""
@@ -151,8 +155,8 @@ class LawErrors:
         half = max(float(np.ptp(speed)) / 2.0, 0.5)
         load = when.output_torque / max(float(np.abs(when.output_torque).max()), 1e-12)
         places = np.column_stack([(speed - speed.mean()) / half, load, np.sign(when.input_speed)])
-        apart = np.sum((places[:, None] - places[None]) ** 2, axis=2) / LENGTH**2
-        values, vectors = np.linalg.eigh(np.exp(-0.5 * apart))
+        apart = np.sqrt(3.0 * np.sum((places[:, None] - places[None]) ** 2, axis=2)) / LENGTH
+        values, vectors = np.linalg.eigh((1.0 + apart) * np.exp(-apart))
         kept = values > _SMALLEST * values.max()
         return np.asarray(vectors[:, kept] * np.sqrt(values[kept]))
 
@@ -266,19 +270,19 @@ class LawErrors:
                 values[block, :, row] = self._noise[row] * self.conditions.T
             yield self._place(name, self.data.whiten(values).T, len(rows) * n_records)
         yield from self._responses()
-        response = self.data.response(self.base)
         ranges = _ranges_of(self.data)
         for port, size in (("input", ranges.torque / ranges.ratio), ("output", ranges.torque)):
             for order in features.orders:
                 at_port = float(order) * ranges.slower(port)
                 parts = [
-                    response((Correction(port, PeriodicTorque(at_port, phase, 1e-3 * size)),))
+                    self._running(Correction(port, PeriodicTorque(at_port, phase, _STEP * size)))
                     for phase in (0.0, np.pi / 2.0)
                 ]
-                columns = [self._by_row[:, :k] * part[: self.n_rows, None] for part in parts]
+                columns = [self._by_row[: part.size, :k] * part[:, None] for part in parts]
                 yield self._place(
                     f"torque of order {order:.4g} at {port}", np.hstack(columns), 2 * n_records
                 )
+        response = self.data.response(self.base)
         columns = np.column_stack([response((effect,)) for effect in load_series_of(None, ranges)])
         shown = np.count_nonzero(self.channels < len(CHANNELS))
         yield self._place("what hangs at the output", columns[: features.values.size], shown)
@@ -293,11 +297,23 @@ class LawErrors:
             start = stop
             yield self._place("torsion sweep", block, len(points.angle))
 
+    def _running(self, effect: DriveEffect) -> Matrix:
+        """Return how a further effect changes the running records of the base, (n_running,).
+
+        To all digits of a prediction, as it may be far larger than the noise.
+        """
+        base = self.base.values[None, : len(self.data.base)]
+        change = self.data.predict(base, (effect,)) - self._unchanged
+        return np.nan_to_num(self.data.whiten(change)[0])
+
+    @cached_property
+    def _unchanged(self) -> Matrix:
+        return self.data.predict(self.base.values[None, : len(self.data.base)], ())
+
     def _responses(self) -> Iterator[Sized]:
         """Yield relative errors of the response of each channel, smooth over the frequency."""
         features = self.data.features
-        predicted = self.data.predict(self.base.values[None, : len(self.data.base)], ())[0]
-        predicted = np.nan_to_num(predicted)
+        predicted = np.nan_to_num(self._unchanged[0])
         speed = np.abs(features.conditions.input_speed)
         frequency = np.log(np.outer(speed, features.orders))
         place = 2.0 * (frequency - frequency.min()) / np.ptp(frequency) - 1.0
