@@ -8,8 +8,9 @@ independent values than there are.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +29,10 @@ NOISE = float(np.log(10.0))
 """Standard deviation of the logarithm of the noise, which nobody states of a balance."""
 _LENGTH, _EDGE, _TERMS = 0.5, 1.5, 8
 """Length of a process over -1 to 1, where its sines end, and how many span it: as of a drive."""
+TURNS = (1e-3, 1.0)
+"""Range of the force around a turn that is not known, as a share of what holds a port at rest."""
+_STILL = 0.02
+"""Share of the largest speed below which a port counts as still."""
 _SMOOTHED = 9
 """Bins over which a spectrum is smoothed, to see how coloured it is."""
 
@@ -48,6 +53,7 @@ class BalanceErrors:
     data: MeasuredData
     base: Fit
     best: Fit
+    _of_turns: dict[str, Matrix] = field(default_factory=dict)
 
     @property
     def channels(self) -> NDArray[np.int_]:
@@ -92,7 +98,42 @@ class BalanceErrors:
             ]
             return np.column_stack(columns)
 
-        return linearise(fitted, self.channels, errors, NOISE, self.shares)
+        hypothesis = linearise(fitted, self.channels, errors, NOISE, self.shares)
+        return hypothesis.beside(*self._turning(fitted))
+
+    def _turning(self, fitted: Fit) -> Iterator[Sized]:
+        """Yield what dry friction may do where a port turns, starts or stops.
+
+        When it does is known to a part of the time over which the motion is smoothed only.
+        """
+        for effect in fitted.effects:
+            if not (effect.law.breakaway and (columns := self._turns(effect.port)).size):
+                continue
+            none = np.zeros(columns.shape[1])
+            name = f"turns of {effect.name}:{effect.port}"
+            force = effect.law.breakaway * columns
+            yield Sized(name, force, *TURNS, none, none > 0.0)
+
+    def _turns(self, port: str) -> Matrix:
+        """Return whitened balances of a unit force around each turn of a port, (n, 2 n_turns)."""
+        if port not in self._of_turns:
+            self._of_turns[port] = np.column_stack(
+                [np.empty((len(self.channels), 0)), *self._pulses(port)]
+            )
+        return self._of_turns[port]
+
+    def _pulses(self, port: str) -> Iterator[Matrix]:
+        ends = np.cumsum([0, *(int(balance.kept.sum()) for balance in self.data.spectra)])
+        for number, balance in enumerate(self.data.spectra):
+            speed, step = balance.ports[port].speed, float(balance.time[1] - balance.time[0])
+            smoothed = 1.0 / (balance.cutoff * step)
+            for turn in _turns_of(speed, _STILL * float(np.abs(speed).max()), 2.0 * smoothed):
+                place = (np.arange(len(speed)) - turn) / (smoothed / 4.0)
+                for pulse in (np.exp(-0.5 * place**2), place * np.exp(-0.5 * place**2)):
+                    column = np.zeros(len(self.channels))
+                    force = balance.of_port(port, pulse) / self.data.deviation[number]
+                    column[ends[number] : ends[number + 1]] = force[balance.kept]
+                    yield column
 
     def _column(self, port: str, over: str, number: int, law: Law | None = None) -> Matrix:
         """Return whitened balances of a function over something, times a law's force, (n,)."""
@@ -144,6 +185,20 @@ class BalanceErrors:
                     none,
                     none > 0.0,
                 )
+
+
+def _turns_of(speed: Matrix, still: float, long: float) -> list[float]:
+    """Return the rows, perhaps between two, at which a motion turns, stops or starts.
+
+    A rest of more than ``long`` rows has two of them, its end and its beginning.
+    """
+    turns, moving = list[float](), np.flatnonzero(np.abs(speed) >= still)
+    for before, after in pairwise(moving.tolist()):
+        if after - before > long:
+            turns += [before, after]
+        elif speed[before] * speed[after] < 0.0:
+            turns.append((before + after) / 2.0)
+    return turns
 
 
 def _argument(motion: PortMotion, over: str) -> Matrix:
