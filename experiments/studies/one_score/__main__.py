@@ -33,9 +33,8 @@ def main() -> None:
         table = csv.DictWriter(file, COLUMNS, lineterminator="\n")
         table.writeheader()
         for case in options.cases or sorted(truth):
-            if "effects" in truth[case]:
-                table.writerow(_row(case, options.campaigns / case, truth[case], options.held_out))
-                file.flush()
+            table.writerow(_row(case, options.campaigns / case, truth[case], options.held_out))
+            file.flush()
 
 
 def _row(case: str, folder: Path, truth: dict[str, Any], held_out: bool) -> dict[str, Any]:
@@ -46,7 +45,7 @@ def _row(case: str, folder: Path, truth: dict[str, Any], held_out: bool) -> dict
     campaign = (folder / "campaign.toml").is_file()
     measured = read_campaign(folder) if campaign else read_rig(folder)
     started = time.process_time()
-    finding = analyse(measured).finding
+    finding: Any = analyse(measured).finding
     seconds = time.process_time() - started
     found = compare(finding.data, finding.verdict, searched, held_out)
     return row_of(case, truth, finding.verdict, found, seconds)

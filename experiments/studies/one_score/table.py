@@ -66,11 +66,35 @@ def answer(truth: Mapping[str, Any], said: Said) -> str:
     return "wrong" if status == "parameter" else "missed"
 
 
+def answer_of_log(truth: Mapping[str, Any], said: Said) -> str:
+    """Return "right", "honest" or "wrong" for a log of a real machine.
+
+    ``any`` and ``all`` are names of which one, or each, is there; ``also`` those that may be.
+    """
+    status, members = said
+    names = {name for name, _ in members[0]} if members else set()
+    some, every = set(truth.get("any", [])), set(truth.get("all", []))
+    found = (not some or bool(names & some)) and every <= names
+    sure = status in ("named", "parameter")
+    if truth.get("ends"):
+        return "right"
+    if (
+        "absent" not in truth
+        and sure
+        and not (found and names <= some | every | set(truth.get("also", [])))
+    ):
+        return "wrong"
+    return (
+        "right" if (some | every) and found and status not in ("unlisted", "adequate") else "honest"
+    )
+
+
 def row_of(
     case: str, truth: Mapping[str, Any], verdict: Verdict, found: Comparison, seconds: float
 ) -> dict[str, Any]:
     """Return a row of the table."""
     today, now = said_today(verdict), said_by(found.decision)
+    judge = answer if "effects" in truth else answer_of_log
     top = found.scored[0]
     other = next(
         (entry for entry in found.scored[1:] if entry.explanation.names != top.explanation.names),
@@ -81,13 +105,13 @@ def row_of(
             COLUMNS,
             (
                 case,
-                "+".join(truth["effects"]) or ("parameters" if truth.get("parameters") else "-"),
+                _truth(truth),
                 today[0],
                 _words(today[1]),
-                answer(truth, today),
+                judge(truth, today),
                 now[0],
                 _words(now[1]),
-                answer(truth, now),
+                judge(truth, now),
                 f"{found.decision.probability:.3f}",
                 f"{found.decision.outside:.3f}",
                 other.explanation.label if other else "-",
@@ -108,7 +132,8 @@ def without_truth(truth: Mapping[str, Any], found: Comparison) -> str:
     To the first effect only: sets with it are left out. A name that is then said without
     qualification, and is not of the truth, is a false one.
     """
-    wanted = [name for name in truth["effects"] if name != "unlisted"]
+    wanted = [*truth.get("effects", []), *truth.get("any", []), *truth.get("all", [])]
+    wanted = [name for name in wanted if name != "unlisted"]
     wanted += [truth["name_if_listed"]] if "name_if_listed" in truth else []
     rest = [
         entry
@@ -120,6 +145,14 @@ def without_truth(truth: Mapping[str, Any], found: Comparison) -> str:
     decision = decide([entry.explanation for entry in rest], [entry.prior for entry in rest])
     status, members = said_by(decision)
     return f"{status} {_words(members)}".strip()
+
+
+def _truth(truth: Mapping[str, Any]) -> str:
+    if truth.get("parameters"):
+        return "parameters"
+    if "effects" in truth:
+        return "+".join(truth["effects"]) or "-"
+    return "+".join(truth.get("all", [])) or "|".join(truth.get("any", [])) or "not known"
 
 
 def _ln(entry: Any) -> float:
