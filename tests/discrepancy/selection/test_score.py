@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scipy.integrate import quad
-from scipy.stats import binom, multivariate_normal, norm
+from scipy.stats import binom, kstest, multivariate_normal, norm
 
+from pymoo_hdte.discrepancy._selection.process import TERMS, sine_of
 from pymoo_hdte.discrepancy._selection.score import (
     VISIBLE,
     Free,
@@ -190,17 +191,11 @@ def test_what_would_be_invisible_is_told(rng):
         assert bool(found.invisible) is invisible
 
 
-def process(places, terms):
-    """Return a Gaussian process over places within -1 to 1 by that many of its sines."""
-    rates = np.pi * np.arange(1, terms + 1) / 3.0
-    sizes = np.sqrt(np.sqrt(2.0 * np.pi) * 0.5 * np.exp(-0.5 * (0.5 * rates) ** 2) / 1.5)
-    return sizes * np.sin(np.outer(places + 1.5, rates))
-
-
 def test_twice_as_many_functions_of_a_form_change_no_odds(rng):
     """The spectrum of a smooth process ends, so that further functions have no size left."""
     places = np.linspace(-1.0, 1.0, 200)
     law = 300.0 * np.ones(200)
+    sines = np.column_stack([sine_of(k, places)[0] for k in range(1, 2 * TERMS + 1)])
     for error in (0.0, 0.02, 0.2):
         left = law * error * np.sin(3.0 * places) + rng.normal(size=200)
         lns = [
@@ -208,10 +203,10 @@ def test_twice_as_many_functions_of_a_form_change_no_odds(rng):
                 hypothesis(
                     left,
                     free(law[:, None] / 300.0, [-50.0], [50.0], [5.0]),
-                    sized(law[:, None] * process(places, terms), 1e-3, 0.3),
+                    sized(law[:, None] * sines[:, :terms], 1e-3, 0.3),
                 )
             ).ln
-            for terms in (8, 16)
+            for terms in (TERMS, 2 * TERMS)
         ]
         assert abs(lns[1] - lns[0]) < 1.0
 
@@ -274,3 +269,32 @@ def test_said_probabilities_are_the_shares_that_are_right():
             binom.sf(right[bin_].sum() - 1, count, expected),
         )
         assert min(chances) > 0.001, (low, high, expected, right[bin_].mean(), count)
+
+
+def test_records_kept_out_count_by_their_predictive_density(rng):
+    """The likelihood of all records over that of those fitted, with the same unknown form."""
+    base, form = rng.normal(size=(20, 2)), rng.normal(size=(20, 3))
+    residuals = rng.normal(size=20)
+    covariance = np.eye(20) + base @ base.T + 0.5**2 * form @ form.T
+    fitted, kept_out = slice(0, 14), slice(14, 20)
+    gain = covariance[kept_out, fitted] @ np.linalg.inv(covariance[fitted, fitted])
+    wanted = multivariate_normal.logpdf(
+        residuals[kept_out],
+        gain @ residuals[fitted],
+        covariance[kept_out, kept_out] - gain @ covariance[fitted, kept_out],
+    )
+
+    def ln(rows):
+        unknowns = free(base[rows], deviation=[1.0, 1.0])
+        return score(hypothesis(residuals[rows], unknowns, sized(form[rows], 0.5, 0.5))).ln
+
+    assert ln(slice(None)) - ln(fitted) == pytest.approx(wanted, abs=1e-9)
+
+
+def test_a_chance_beyond_is_that_of_the_residuals(rng):
+    """Without unknowns the chance of a record is that of its chi-square, even from 0 to 1."""
+    chances = []
+    for _ in range(200):
+        found = score(hypothesis(rng.normal(size=30), free(np.empty((30, 0)))))
+        chances.append(found.worst_chance([np.arange(30)]))
+    assert kstest(chances, "uniform").pvalue > 1e-3

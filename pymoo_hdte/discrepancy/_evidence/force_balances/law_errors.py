@@ -19,6 +19,7 @@ from pymoo_hdte.discrepancy._evidence.force_balances.evidence import MeasuredDat
 from pymoo_hdte.discrepancy._selection.candidate import Candidate
 from pymoo_hdte.discrepancy._selection.fitting import Fit
 from pymoo_hdte.discrepancy._selection.linearised import linearise
+from pymoo_hdte.discrepancy._selection.process import TERMS, sine_of
 from pymoo_hdte.discrepancy._selection.score import Linearised, Sized
 from pymoo_hdte.effects.law import Law
 from pymoo_hdte.mechanism.port_motion import PortMotion, law_force
@@ -27,8 +28,6 @@ Matrix = NDArray[np.float64]
 
 NOISE = float(np.log(10.0))
 """Standard deviation of the logarithm of the noise, which nobody states of a balance."""
-_LENGTH, _EDGE, _TERMS = 0.5, 1.5, 8
-"""Length of a process over -1 to 1, where its sines end, and how many span it: as of a drive."""
 TURNS = (1e-3, 1.0)
 """Range of the force around a turn that is not known, as a share of what holds a port at rest."""
 _STILL = 0.02
@@ -94,7 +93,7 @@ class BalanceErrors:
                 self._column(effect.port, over, number, effect.law)
                 for effect in candidate.build(values)
                 for over in ("position", "speed")
-                for number in range(1, _TERMS + 1)
+                for number in range(1, TERMS + 1)
             ]
             return np.column_stack(columns)
 
@@ -142,7 +141,7 @@ class BalanceErrors:
         stiffness = self.data.mechanism.port(port).stiffness.value
         for balance, deviation in zip(self.data.spectra, self.data.deviation, strict=True):
             motion = balance.ports[port]
-            signal = _sine(number, _argument(motion, over) / reach)
+            signal = sine_of(number, _argument(motion, over) / reach)[0]
             if law is not None:
                 signal = signal * law_force(law, motion, stiffness)
             parts.append((balance.of_port(port, signal) / deviation)[balance.kept])
@@ -167,7 +166,7 @@ class BalanceErrors:
                 overs.append("load")
             for over in overs:
                 columns = np.column_stack(
-                    [self._column(port.name, over, number) for number in range(1, _TERMS + 1)]
+                    [self._column(port.name, over, number) for number in range(1, TERMS + 1)]
                 )
                 columns = columns * np.sqrt(self.shares)[:, None]
                 size = max(float(np.sum(columns**2)), 1e-24)
@@ -175,12 +174,12 @@ class BalanceErrors:
                 most = np.sqrt(
                     max(float(self.shares @ self.base.residuals**2), 4.0 * independent) / size
                 )
-                none = np.zeros(_TERMS)
+                none = np.zeros(TERMS)
                 columns = columns / np.sqrt(self.shares)[:, None]
                 yield Sized(
                     f"outside: {over} at {port.name}",
                     columns,
-                    float(np.sqrt(_TERMS / size)),
+                    float(np.sqrt(TERMS / size)),
                     float(most),
                     none,
                     none > 0.0,
@@ -207,9 +206,3 @@ def _argument(motion: PortMotion, over: str) -> Matrix:
         return np.linspace(-1.0, 1.0, len(motion.position))
     values = np.asarray(getattr(motion, over))
     return values - np.mean(values) if over == "position" else values
-
-
-def _sine(number: int, place: Matrix) -> Matrix:
-    rate = np.pi * number / (2.0 * _EDGE)
-    density = np.sqrt(2.0 * np.pi) * _LENGTH * np.exp(-0.5 * (rate * _LENGTH) ** 2)
-    return np.asarray(np.sqrt(density / _EDGE) * np.sin(rate * (place + _EDGE)))

@@ -23,6 +23,7 @@ from pymoo_hdte.discrepancy._records.line_fit import CHANNELS
 from pymoo_hdte.discrepancy._selection.candidate import Candidate
 from pymoo_hdte.discrepancy._selection.fitting import Fit, Response
 from pymoo_hdte.discrepancy._selection.linearised import amplitudes, linearise
+from pymoo_hdte.discrepancy._selection.process import TERMS, sine_of, sines_of
 from pymoo_hdte.discrepancy._selection.score import Linearised, Sized
 from pymoo_hdte.drive import DriveEffect, LawAtPort
 from pymoo_hdte.effects.hysteresis import MaxwellSlip
@@ -38,11 +39,6 @@ LENGTH = 1.0
 Its process has one derivative (Matern, 3/2): one with all of them, known at some records, would be
 known at the others to a ten-thousandth, which no error of a law is.
 """
-_TORSION_LENGTH = 0.5
-"""The same for the torsion, over which laws bend several times."""
-_TERMS, _EDGE = 8, 1.5
-"""Sines that span a process over the torsion, and where they end (Solin and Sarkka, Statistics and
-Computing 30, 2020); twice as many change no logarithm of odds by 1."""
 _SMALLEST = 1e-9
 """Least share of the variance of a process for which a direction counts."""
 REPEATABLE = (0.03, 30.0)
@@ -92,16 +88,6 @@ class ScaledLaw(Behaviour):
         """Return the law with the input locked, times the same function."""
         locked = self.law.with_input_locked()
         return None if locked is None else ScaledLaw(locked, self.travel, self.number, self.size)
-
-
-def sine_of(number: int, place: Matrix) -> tuple[Matrix, Matrix]:
-    """Return a sine of a process over -1 to 1 at places, times its deviation, and its slope."""
-    rate = np.pi * number / (2.0 * _EDGE)
-    density = np.sqrt(2.0 * np.pi) * _TORSION_LENGTH * np.exp(-0.5 * (rate * _TORSION_LENGTH) ** 2)
-    size = np.sqrt(density / _EDGE)
-    inside = np.clip(place, -_EDGE, _EDGE)
-    angle = rate * (inside + _EDGE)
-    return size * np.sin(angle), size * rate * np.cos(angle) * (inside == place)
 
 
 @dataclass(frozen=True, eq=False)
@@ -232,19 +218,19 @@ class LawErrors:
                 continue
             changes = [
                 response((Correction("mesh", ScaledLaw(effect.law, ranges.travel, k, _STEP)),))
-                for k in range(1, _TERMS + 1)
+                for k in range(1, TERMS + 1)
             ]
             yield np.column_stack(changes)[: self.n_rows] / _STEP
 
     def _springs(self, ranges: Any, response: Response, force: float) -> Matrix:
         """Return what springs do that slip elsewhere, each of a share of the force, (n, m)."""
-        shares = np.geomspace(0.01, 1.0, _TERMS)
+        shares = np.geomspace(0.01, 1.0, TERMS)
         size = max(_STEP * force, 1e-12)
         changes = [
             response((Correction("mesh", MaxwellSlip(size, share * ranges.travel, 1e-3)),))
             for share in shares
         ]
-        return np.column_stack(changes)[: self.n_rows] / (_STEP * np.sqrt(_TERMS))
+        return np.column_stack(changes)[: self.n_rows] / (_STEP * np.sqrt(TERMS))
 
     @cached_property
     def outside(self) -> tuple[Sized, ...]:
@@ -290,9 +276,9 @@ class LawErrors:
         for points in self.data.torsion:
             torque = points.torque
             place = torque / max(float(np.abs(torque).max()), 1e-12)
-            sines = np.column_stack([sine_of(number, place)[0] for number in range(1, _TERMS + 1)])
+            sines = sines_of(place)
             stop = start + len(points.angle) - 1
-            block = np.zeros((self.n_rows, _TERMS))
+            block = np.zeros((self.n_rows, TERMS))
             block[start:stop] = points.whitening @ sines * np.median(points.deviation)
             start = stop
             yield self._place("torsion sweep", block, len(points.angle))
