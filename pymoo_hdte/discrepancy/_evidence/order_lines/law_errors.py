@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from pymoo_hdte.discrepancy._evidence.order_lines.corrections import Correction
 from pymoo_hdte.discrepancy._evidence.order_lines.evidence import Data, _ranges_of
 from pymoo_hdte.discrepancy._evidence.order_lines.features import MEANS
-from pymoo_hdte.discrepancy._evidence.order_lines.forms import _load as load_series_of
+from pymoo_hdte.discrepancy._evidence.order_lines.forms import load_series
 from pymoo_hdte.discrepancy._records.line_fit import CHANNELS
 from pymoo_hdte.discrepancy._selection.candidate import Candidate
 from pymoo_hdte.discrepancy._selection.fitting import Fit, Response
@@ -269,19 +269,19 @@ class LawErrors:
                     f"torque of order {order:.4g} at {port}", np.hstack(columns), 2 * n_records
                 )
         response = self.data.response(self.base)
-        columns = np.column_stack([response((effect,)) for effect in load_series_of(None, ranges)])
-        shown = np.count_nonzero(self.channels < len(CHANNELS))
-        yield self._place("what hangs at the output", columns[: features.values.size], shown)
+        hanging = np.column_stack([response((effect,)) for effect in load_series(ranges)])
+        running = features.values.size
+        yield self._place("what hangs at the output", hanging[:running], running)
         start = features.values.size
         for points in self.data.torsion:
             torque = points.torque
             place = torque / max(float(np.abs(torque).max()), 1e-12)
             sines = sines_of(place)
             stop = start + len(points.angle) - 1
-            block = np.zeros((self.n_rows, TERMS))
-            block[start:stop] = points.whitening @ sines * np.median(points.deviation)
+            swept = np.zeros((self.n_rows, TERMS))
+            swept[start:stop] = points.whitening @ sines * np.median(points.deviation)
             start = stop
-            yield self._place("torsion sweep", block, len(points.angle))
+            yield self._place("torsion sweep", swept, len(points.angle))
 
     def _running(self, effect: DriveEffect) -> Matrix:
         """Return how a further effect changes the running records of the base, (n_running,).
