@@ -19,6 +19,7 @@ from pymoo_hdte.problems._simulator.statistics import (
 )
 from pymoo_hdte.problems.catalogue import robust_benchmarks
 from pymoo_hdte.problems.family import robust_dte_family
+from pymoo_hdte.problems.named import get_problem
 from pymoo_hdte.problems.operating_conditions import (
     OperatingCondition,
     hs_20_100_duty_cycle,
@@ -61,6 +62,7 @@ __all__ = [
     "UntrustedSurrogate",
     "WorstCase",
     "failure_probability",
+    "get_problem",
     "hs_20_100_duty_cycle",
     "load_conditions",
     "robust_benchmarks",
