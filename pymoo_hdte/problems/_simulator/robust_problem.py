@@ -77,7 +77,7 @@ def robust_problem(
     accept: str = "accurate",
     data: tuple[Any, Any] | None = None,
     replicates: int | None = None,
-    surrogate: str = "auto",
+    surrogate: str = "polynomial",
 ) -> SimulatorProblem:
     """Return the robust design problem of a simulator.
 
@@ -158,9 +158,11 @@ def robust_problem(
         there and has 2 by default. What it scatters by itself is part of standard deviations and,
         as a normal deviation, of quantiles and probabilities; a `WorstCase` is that of the mean.
         A point at which one of its runs fails has failed.
-    surrogate : {"auto", "polynomial"}
+    surrogate : {"polynomial", "auto"}
         With ``"auto"``, a polynomial of the response's logarithm or logit, or a normal process
-        (needs scikit-learn, extra ``process``), is taken where it predicts runs left out better.
+        (needs scikit-learn, extra ``process``), is taken where it predicts runs left out better. It
+        takes fewer runs for responses over decades, and for kinks, and seconds more of computing;
+        its stated errors have been held against true ones less often.
 
     Returns
     -------

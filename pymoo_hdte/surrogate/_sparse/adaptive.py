@@ -142,7 +142,7 @@ class _SurrogateBuild:
         random_state: np.random.Generator,
         given: tuple[Array, Array] | None = None,
         is_random: bool = False,
-        others: bool = True,
+        others: bool = False,
     ) -> None:
         self.axes, self.function, self.is_random = axes, function, is_random
         self._given = (np.empty((0, len(axes))), np.empty((0, 0))) if given is None else given
@@ -389,7 +389,7 @@ def fit_adaptively(
     error_of: Callable[[AdaptiveFit], float] = lambda fit: fit.largest_error,
     given: tuple[Array, Array] | None = None,
     is_random: bool = False,
-    others: bool = True,
+    others: bool = False,
 ) -> AdaptiveFit:
     """Grow a surrogate until mean and standard deviation are accurate, or the budget is spent.
 
