@@ -14,7 +14,7 @@ TESTS = Path(__file__).parents[1]
 LOWEST_FIRST = (
     *("checks", "_lazy", "units", "_compilation", "_one_thread", "_interrupts", "_io", "effects"),
     *("_reports", "drive._solve", "drive._effects", "drive", "mechanism"),
-    *("surrogate", "surrogate._sparse"),
+    *("surrogate", "surrogate._sparse", "surrogate._rare"),
     "validation",
     "identification",
     *(
