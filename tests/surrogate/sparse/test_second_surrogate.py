@@ -39,6 +39,7 @@ def built(surrogate):
     )
 
 
+@pytest.mark.nightly
 def test_a_power_law_takes_fewer_runs_by_its_logarithm_and_has_its_moments():
     by_logarithm, plain = built("auto"), built("polynomial")
     assert by_logarithm.n_runs < 0.7 * plain.n_runs
