@@ -83,5 +83,6 @@ register(
         _weight,
         forms="harmonics_of_torque",
         behind_gear=True,
+        nuisance_at=("load",),
     )
 )

@@ -55,6 +55,8 @@ class PortState:
         port of another mechanism, what its ``load`` says.
     temperature : ndarray or float
         Temperature of the machine in kelvin; NaN where it is not known.
+    elapsed : ndarray or float
+        Time of the session, s; infinite where it is not known.
     recurs : bool
         Whether the second half of a ``path`` is the first again, and so on for ever: a law that
         forgets gradually has then come to repeat itself, too.
@@ -69,6 +71,7 @@ class PortState:
     load: Values | None = None
     temperature: Values | float = np.nan
     recurs: bool = False
+    elapsed: Values | float = np.inf
 
     def known_load(self, effect: str, place: str) -> Values:
         """Return the load, N.m, for an effect that depends on it and may be at a place of a drive.

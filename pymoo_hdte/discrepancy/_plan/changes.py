@@ -107,7 +107,11 @@ def _candidates(data: Data, limits: PlanLimits, rated_torque: float) -> list[Can
     )
     seen = stated_orders(limits.effects, believed.ratio)
     sizes = port_sizes(believed, features.orders.tolist(), seen, scales)
-    return drive_candidates(sizes, believed.effects)
+    return [
+        candidate
+        for candidate in drive_candidates(sizes, believed.effects)
+        if not candidate.nuisance
+    ]
 
 
 def stated_orders(effects: Sequence[DriveEffect], ratio: float) -> list[float]:

@@ -48,6 +48,9 @@ class DriveSizes(Sizes):
         Times of the session between series of measurements, s: as stated, else ``changes``.
     loads_differ : bool
         Whether the records are taken under different loads.
+    readings, largest_readings : tuple of float
+        Typical and largest error of a reading of the input's and the output's torque that may be
+        missing, N.m.
     """
 
     error: float = 0.0
@@ -59,6 +62,8 @@ class DriveSizes(Sizes):
     changes: tuple[float, ...] = ()
     series: tuple[float, ...] = ()
     loads_differ: bool = False
+    readings: tuple[float, float] = (0.0, 0.0)
+    largest_readings: tuple[float, float] = (0.0, 0.0)
 
     def further(self) -> Self:
         """Return the sizes without the orders of believed lines of the error."""
@@ -110,6 +115,9 @@ class DriveEffect:
 
     name: ClassVar[str]
     """Name of the effect, in model files and verdicts."""
+    only_reads: ClassVar[bool] = False
+    """Whether it is all in `reading_lines` and in the input torque of `torque_reading`, so that no
+    motion has to be found anew."""
 
     def apply(self, coefficients: Coefficients) -> Coefficients:
         """Return the coefficients with this effect added."""
@@ -150,6 +158,36 @@ class DriveEffect:
             rad.
         lines : complex ndarray, shape (r, m)
             rad.
+        """
+        return None
+
+    def torque_reading(self, elapsed: Values) -> Values | None:
+        """Return what is added to the readings of input and output torque, or None for nothing.
+
+        Parameters
+        ----------
+        elapsed : ndarray, shape (n,)
+            Time of the session, s.
+
+        Returns
+        -------
+        ndarray, shape (2, n), or None
+            N.m.
+        """
+        return None
+
+    def turned_back(self, frequency: Values) -> Lines | None:
+        """Return by how much less the output angle is read for a torque there, or None for nothing.
+
+        Parameters
+        ----------
+        frequency : ndarray, shape (...)
+            rad/s; negative where the drive turns backward.
+
+        Returns
+        -------
+        ndarray of complex, shape (...), or None
+            rad/(N.m).
         """
         return None
 

@@ -9,6 +9,9 @@ th_in'' = E' and th_d'' = 2 E th_d'' + E' th_d' (primes on the right: by alpha),
     T = k d + c w d' + f_mesh,    th_d = th_s + d
 
 The mean of 1/w is that of the wanted speed, whose sign w has: a drive may turn either way.
+
+Where the motion of the input is prescribed, by its lead(alpha) = alpha - Omega t, E is known from
+w = Omega / (1 - lead'), and the first equation gives the motor's torque (inverse dynamics).
 """
 
 from __future__ import annotations
@@ -23,13 +26,14 @@ from numpy.typing import NDArray
 
 from pymoo_hdte.drive._solve.coefficients import Coefficients
 from pymoo_hdte.drive._solve.recursion import Recollection
-from pymoo_hdte.drive._solve.steady_motion import Phasors, SpeedLoop
+from pymoo_hdte.drive._solve.steady_motion import CONSTANT_TORQUE, Phasors, SpeedLoop
 from pymoo_hdte.drive._solve.torus import Torus
 from pymoo_hdte.effects.law import Memory, PortState, Response
 
 _STATIC_STEPS = 8
 _BY_ROW = (
-    "speed", "load", "output_inertia", "output_damping", "static", "_static_error", "_static_slope",
+    "speed", "load", "output_inertia", "output_damping", "static", "energy", "_static_error",
+    "_static_slope",
     "_stiffness", "_backward", "_share_of_mesh", "rate", "input_operator",
 )  # fmt: skip
 """Attributes of `AngleEquations` with a row per case; the last three are computed on demand."""
@@ -37,6 +41,8 @@ _BY_ROW = (
 Values = NDArray[np.float64]
 
 _NO_LAW = Response(np.zeros((1, 1)))
+_SLOWEST = 1e-3
+"""Least relative change of time with the angle: an input that turned back has no speed over it."""
 
 
 @dataclass(frozen=True)
@@ -65,7 +71,15 @@ class TorsionMotion:
 
 
 class AngleEquations:
-    """The equations of n rows, each at a speed (rad/s, either sign) and a load (N.m) of its own."""
+    """The equations of n rows, each at a speed (rad/s, either sign) and a load (N.m) of its own.
+
+    Attributes
+    ----------
+    prescribed : bool
+        Whether the motion of the input is given, so that the motor follows no loop.
+    energy : complex ndarray, shape (n, n_harmonics)
+        E as prescribed, otherwise that of the mean speed, from which to begin.
+    """
 
     def __init__(
         self,
@@ -74,7 +88,10 @@ class AngleEquations:
         load: Values,
         motor: SpeedLoop,
         torus: Torus,
+        lead: Phasors | None = None,
     ) -> None:
+        self.prescribed = lead is not None
+        motor = CONSTANT_TORQUE if self.prescribed else motor
         self.coefficients, self.motor, self.torus = coefficients, motor, torus
         self.speed, self.load = speed[:, None], load[:, None]
         self.output_inertia, self.output_damping = (
@@ -88,6 +105,12 @@ class AngleEquations:
             place, conjugate = torus.place(float(order))
             self.static[:, place] += phasor.conj() if conjugate else phasor
         self._static_error = torus.signal(self.static)
+        self.energy = np.zeros_like(self.static)
+        if lead is None:
+            self.energy[:, :1] = self.speed**2 / 2.0
+        else:
+            longer = np.maximum(1.0 - torus.signal(torus.derivative(lead)), _SLOWEST)
+            self.energy = torus.phasors((self.speed / longer) ** 2 / 2.0)
         self._static_slope = torus.signal(torus.derivative(self.static))
         angle = 2.0 * torus.phase(1.0) + coefficients.stiffness_phase
         varying = 1.0 + coefficients.stiffness_depth * np.cos(angle)
@@ -209,7 +232,10 @@ class AngleEquations:
         load = self.load if port in ("mesh", "load") else load
         warmth = np.reshape(self.coefficients.temperature, (-1, 1))
         around = (self._path, self._back)
-        state = PortState(position, speed, phase, stiffness, *around, load, warmth, recurs=True)
+        elapsed = np.reshape(self.coefficients.elapsed, (-1, 1))
+        state = PortState(
+            position, speed, phase, stiffness, *around, load, warmth, recurs=True, elapsed=elapsed
+        )
         return reduce(added, (law.respond(state) for law in laws))
 
     def _path(self, values: Values) -> Values:
@@ -290,10 +316,7 @@ class AngleEquations:
 
     def _of_input(self, motion: TorsionMotion, delivered: Values) -> Values:
         """Return the residual of the first equation on the grid, without the lead's share."""
-        coefficients = self.coefficients
-        still = np.zeros_like(motion.angular_speed)
-        passed_on = delivered / coefficients.ratio
-        friction = self._laws("input", still, motion.angular_speed, passed_on)
+        coefficients, friction = self.coefficients, self._input_friction(motion, delivered)
         return np.asarray(
             coefficients.input_inertia[:, None] * motion.energy_slope
             + coefficients.input_damping[:, None] * motion.angular_speed
@@ -301,6 +324,25 @@ class AngleEquations:
             + motion.mesh_torque * self._share_of_mesh
             - self.motor.proportional * (self.speed - motion.angular_speed)
         )
+
+    def _input_friction(self, motion: TorsionMotion, delivered: Values) -> Response:
+        still = np.zeros_like(motion.angular_speed)
+        return self._laws("input", still, motion.angular_speed, delivered / self.coefficients.ratio)
+
+    def slopes(self, motion: TorsionMotion) -> Values:
+        """Return mean derivatives of torques, shape (n, 4).
+
+        Of the mesh by torsion (N.m/rad) and by its rate, of friction at the output and at the input
+        by speed (N.m.s/rad), bearings included.
+        """
+        friction = np.asarray(self._input_friction(motion, self.delivered(motion)).damping)
+        parts = (
+            mean(motion.mesh_slope),
+            mean(motion.mesh_damping),
+            self.output_damping + mean(motion.output_loss),
+            self.coefficients.input_damping[:, None] + mean(friction),
+        )
+        return np.hstack([np.broadcast_to(part, self.speed.shape) for part in parts])
 
     @cached_property
     def _share_of_mesh(self) -> Values:
@@ -339,6 +381,8 @@ class AngleEquations:
         coupling = coupling + damping / (self.speed * self.coefficients.ratio)
         share = 1.0 + coupling / self.input_operator
         share[:, 0] = 1.0
+        if self.prescribed:
+            share[:] = 1.0
         return output / share, coupling, share
 
     @cached_property

@@ -119,6 +119,11 @@ class SteadyMotion:
         Input angle ahead of the mean speed's, alpha - Omega t, rad; its mean is 0.
     energy : ndarray of complex, shape (n, n_harmonics)
         Half the square of the input speed, rad2/s2.
+    slower : ndarray of complex, shape (n, n_harmonics)
+        Mean speed of the input less its speed, rad/s.
+    slopes : ndarray, shape (n, 4)
+        Mean derivatives of torques: of the mesh by torsion (N.m/rad) and by its rate, of friction
+        at the output and at the input by speed (N.m.s/rad).
     converged : ndarray of bool, shape (n,)
         Whether the balance of the case was found; if not, its other values mean nothing.
     tangents : Tangents, optional
@@ -140,6 +145,8 @@ class SteadyMotion:
     brake_torque: Phasors
     lead: Phasors
     energy: Phasors
+    slower: Phasors
+    slopes: NDArray[np.float64]
     converged: NDArray[np.bool_]
     tangents: Tangents | None = field(default=None, kw_only=True, repr=False, compare=False)
 
@@ -166,6 +173,6 @@ class SteadyMotion:
 
 BY_CASE = (
     "transmission_error", "torsion", "motor_torque", "coupling_torque", "brake_torque", "lead",
-    "energy", "converged",
+    "energy", "slower", "slopes", "converged",
 )  # fmt: skip
 """Fields of `SteadyMotion` with a row a case, in their order."""

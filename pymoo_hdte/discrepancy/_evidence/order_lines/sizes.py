@@ -161,6 +161,7 @@ def port_sizes(
     seen: Sequence[float],
     scales: Scales,
     clear: Sequence[float] = (),
+    highest: float = 0.0,
 ) -> dict[str, DriveSizes]:
     """Return the sizes of each port.
 
@@ -174,6 +175,8 @@ def port_sizes(
     scales : Scales
     clear : sequence of float
         Orders of all significant lines, which may be harmonics of an effect.
+    highest : float
+        Order up to which lines are looked for.
     """
     at_output = max(scales.output_torque, believed.ratio * scales.input_torque)
     residual = {
@@ -208,6 +211,7 @@ def port_sizes(
         seen=tuple(sorted(seen)),
         clear=tuple(clear),
         shown=tuple(orders),
+        highest=highest,
         error=scales.error,
         largest_error=LARGEST * scales.error,
         # A line believed to have amplitude zero may be missing.
@@ -219,6 +223,8 @@ def port_sizes(
         changes=scales.changes,
         series=scales.series,
         loads_differ=scales.loads_differ,
+        readings=(scales.input_torque, scales.output_torque),
+        largest_readings=(LARGEST * scales.input_torque, LARGEST * scales.output_torque),
     )
     slower = {port: 1.0 if port in ("input", "mesh") else believed.ratio for port in residual}
     return {
@@ -235,6 +241,8 @@ def port_sizes(
             # The output turns as far as the mesh is twisted.
             swept=scales.swept and port in ("output", "mesh"),
             turns=port == "load",
+            coupling=port in ("input", "output", "load"),
+            braked=scales.torque if port == "load" else 0.0,
             slower=slower[port],
             expected=_SHAFTS[port],
         )
