@@ -10,6 +10,7 @@ import pytest
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy import MechanismModel
 from pymoo_hdte.drive._effects import LoadDamping
+from pymoo_hdte.drive._effects.warming import WarmingFriction
 from pymoo_hdte.effects.bouc_wen import BoucWen
 from pymoo_hdte.effects.friction import (
     CoulombFriction,
@@ -28,7 +29,7 @@ from pymoo_hdte.effects.linear import (
 )
 from pymoo_hdte.effects.load_friction import LoadFriction
 from pymoo_hdte.effects.load_sharing import UnevenSharing
-from pymoo_hdte.effects.ripple import PeriodicTorque
+from pymoo_hdte.effects.ripple import BrakeRipple, CouplingTorque, PeriodicTorque
 from pymoo_hdte.effects.shear_thinning import ShearThinningDrag
 from pymoo_hdte.effects.stiffness import DeadZone, HardeningStiffness, PeriodicClearance, SoftWindup
 from pymoo_hdte.export import to_modelica, to_mujoco, to_python, to_urdf
@@ -67,6 +68,10 @@ LAWS = {
     "backlash": DeadZone(0.05),
     "clearance_variation": PeriodicClearance(2.0, 0.3, 0.05, 0.08),
     "uneven_load_sharing": UnevenSharing(1.0, 0.3, 0.05, 0.08),
+    "brake_ripple": BrakeRipple(3.0, 0.4, 0.02),
+    "coupling_ripple": CouplingTorque(1.0, 0.4, 0.2),
+    "cogging": PeriodicTorque(6.0, 0.3, 0.1),
+    "warming": WarmingFriction(0.3, 0.2, 600.0),
 }
 """One law of each effect that a mechanism may have."""
 INERTIA, STIFFNESS, DAMPING, GAIN = 0.5, 4.0, 3.0, 7.6
