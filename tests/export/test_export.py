@@ -77,6 +77,12 @@ LAWS = {
 INERTIA, STIFFNESS, DAMPING, GAIN = 0.5, 4.0, 3.0, 7.6
 
 
+def name_of(law):
+    """Name of a law; several effects may share one type."""
+    same = [name for name, known in LAWS.items() if known == law]
+    return (same or [name for name, known in LAWS.items() if type(known) is type(law)])[0]
+
+
 def joint(*laws, **of_mechanism):
     """Return a joint with a motor, a spring and these laws."""
     load = {"brake": 1.0}
@@ -88,8 +94,7 @@ def joint(*laws, **of_mechanism):
     ]
     kinds = {"angles": ["joint"]} | of_mechanism
     mechanism = Mechanism({"joint": BelievedValue(INERTIA)}, [port], inputs, **kinds)
-    names = {type(law): name for name, law in LAWS.items()}
-    effects = tuple(LawAt(names[type(law)], "bearing", law) for law in laws)
+    effects = tuple(LawAt(name_of(law), "bearing", law) for law in laws)
     return MechanismModel("A joint, revised", mechanism, effects)
 
 
@@ -379,8 +384,7 @@ def test_mujoco_moves_as_our_simulation(share):
         Input("current", {"joint": 1.0}, BelievedValue(7.6)),
     )
     port = Port("bearing", {"joint": share}, damping=BelievedValue(3.0))
-    names = {type(law): name for name, law in LAWS.items()}
-    effects = tuple(LawAt(names[type(law)], "bearing", law) for law in laws)
+    effects = tuple(LawAt(name_of(law), "bearing", law) for law in laws)
     model = MechanismModel("m", Mechanism(inertias, [port], [driven], angles=["joint"]), effects)
     record = Record("r", "train", TIME, {"joint": np.zeros_like(TIME), "current": PUSH})
     course = simulate_mechanism(model.mechanism, record, effects, start={"joint": (0.3, 0.0)})
