@@ -136,7 +136,7 @@ def test_page_lists_the_library():
     of_drives = {
         *("clearance_variation", "shear_thinning_drag", "bouc_wen_hysteresis"),
         *("load_dependent_damping", "uneven_load_sharing"),
-        *("brake_ripple", "cogging", "coupling_ripple"),
+        *("brake_ripple", "cogging", "coupling_ripple", "warming"),
     }
     assert sorted(listed) == sorted({effect.name for effect in law_effects()} - of_drives)
 
