@@ -15,6 +15,7 @@ from pymoo_hdte.problems._simulator.statistics import (
 )
 from pymoo_hdte.problems.catalogue import robust_benchmarks
 from pymoo_hdte.problems.family import robust_dte_family
+from pymoo_hdte.problems.named import get_problem
 from pymoo_hdte.problems.operating_conditions import (
     OperatingCondition,
     hs_20_100_duty_cycle,
@@ -49,6 +50,7 @@ __all__ = [
     "Std",
     "UntrustedSurrogate",
     "WorstCase",
+    "get_problem",
     "hs_20_100_duty_cycle",
     "load_conditions",
     "robust_benchmarks",
