@@ -7,7 +7,6 @@ import re
 import runpy
 import shlex
 import sys
-from decimal import Decimal
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -15,6 +14,7 @@ import numpy as np
 import pytest
 from kept_results import kept, put_files
 from places import DOCS
+from printed_text import assert_shows, last_digit
 
 from pymoo_hdte.cli import command_line as cli
 from pymoo_hdte.mechanism.effects import law_effects
@@ -22,8 +22,6 @@ from pymoo_hdte.mechanism.effects import law_effects
 PAGE = (DOCS / "bring_your_own_rig.md").read_text(encoding="utf-8")
 SCRIPT = DOCS / "examples" / "own_joint.py"
 FOLDER = "my_joint"
-CUT = "..."
-"""End of a line of the page that leaves out the rest of what is printed."""
 
 
 def blocks(language):
@@ -95,17 +93,6 @@ def size_of(effect):
     return effect["parameters"][size]
 
 
-def numbers_and_words(line):
-    """Return the numbers of a line as texts, and the line without them and without its spacing."""
-    number = r"(?<![\w.])-?\d+(?:\.\d+)?(?:e[+-]?\d+)?(?![\w.]*\w)"
-    return re.findall(number, line), " ".join(re.sub(number, " # ", line).split())
-
-
-def last_digit(number):
-    """Return what one more in its last digit adds to a number."""
-    return float(Decimal(1).scaleb(Decimal(number).as_tuple().exponent))
-
-
 def test_a_folder_with_files_is_left_alone(joint):
     before = {path: path.stat().st_mtime_ns for path in joint[0].rglob("*")}
     with pytest.raises(SystemExit, match="is not empty"):
@@ -116,24 +103,7 @@ def test_a_folder_with_files_is_left_alone(joint):
 def test_page_shows_what_its_commands_print(joint):
     outputs = [text for text in joint[1] if text]
     for block, output in zip(blocks("text"), outputs, strict=True):
-        shown, printed = (text.strip().split("\n") for text in (block, output))
-        assert len(shown) == len(printed)
-        for here, there in zip(shown, printed, strict=True):
-            if here.endswith(CUT):
-                assert there.startswith(here.removesuffix(CUT))
-                continue
-            (values, words), (truths, said) = numbers_and_words(here), numbers_and_words(there)
-            assert words == said
-            for value, true in zip(values, truths, strict=True):
-                # Another machine may round the last digit otherwise.
-                assert abs(float(value) - float(true)) <= 1.01 * last_digit(true), here
-
-
-def test_lines_are_compared_by_their_numbers():
-    values, words = numbers_and_words("order_2, 95 %: 1.66e-05 to  -3.5, K1 is 2.")
-    assert values == ["95", "1.66e-05", "-3.5", "2"]
-    assert words == "order_2, # %: # to # , K1 is # ."
-    assert [last_digit(value) for value in values] == pytest.approx([1.0, 1e-7, 0.1, 1.0])
+        assert_shows(block, output)
 
 
 def test_raw_log_of_a_joint_shows_gravity_friction_and_ripple(joint, truth):

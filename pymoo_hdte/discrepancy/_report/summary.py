@@ -10,6 +10,7 @@ import numpy as np
 
 from pymoo_hdte._reports.html import digits, number
 from pymoo_hdte.discrepancy._report.tables import EffectRow, effect_rows
+from pymoo_hdte.discrepancy._report.words import bench_in_words
 
 MOST_LINES = 10
 
@@ -26,6 +27,8 @@ def summary(document: Mapping[str, Any], page: str) -> str:
     """
     torsion = document.get("torsion", {})
     top = [f"Verdict: {document['status']}. {document['sentence']}"]
+    if bench := bench_in_words(document.get("nuisances", ())):
+        top.append(bench)
     bottom = [
         *_probability(document.get("probability")),
         *_prediction_errors(document["held_out"]),

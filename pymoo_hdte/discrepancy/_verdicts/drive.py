@@ -200,8 +200,8 @@ def _candidates(data: Data, base: Fit) -> list[Candidate]:
     highest = highest_order(data.campaign, data.rules)
     seen = [order for order in clear if order <= highest][: data.rules.most_order_lines]
     believed, orders = data.campaign.believed, features.orders.tolist()
-    sizes = port_sizes(believed, orders, seen, scales_of(data, base), clear)
-    return drive_candidates(sizes, believed.effects)
+    sizes = port_sizes(believed, orders, seen, scales_of(data, base), clear, highest)
+    return drive_candidates(sizes, believed.effects, data.bench.nuisances)
 
 
 def highest_order(campaign: Campaign, rules: Rules) -> float:

@@ -31,6 +31,7 @@ from pymoo_hdte.drive._solve.steady_motion import (
     Tangents,
 )
 from pymoo_hdte.drive._solve.torus import Torus, shared_torus
+from pymoo_hdte.effects.law import OUTPUT_SHAFT
 
 HIGHEST = 8
 """Least number of harmonics of the input turn that are kept."""
@@ -51,9 +52,9 @@ _SHRINKS = 0.1
 def torus_of(coefficients: Coefficients) -> Torus:
     """Return a torus that holds all excited orders with room for their combinations."""
     excited = [float(order) for order in coefficients.error_orders]
-    excited += [order for order, _ in coefficients.load_errors]
+    excited += coefficients.further_orders
     for port, law in coefficients.laws:
-        scale = 1.0 / coefficients.ratio if port == "output" else 1.0
+        scale = 1.0 / coefficients.ratio if port in OUTPUT_SHAFT else 1.0
         excited += [scale * order for order in law.orders]
     fundamentals = fundamental_orders(excited)
     needed = largest_multiples(fundamentals, excited)
@@ -222,6 +223,7 @@ class _Solver:
         """
         equations, open_rows = self.equations, np.arange(len(self.torsion))
         size = np.abs(self.torsion[:, :1]) + np.abs(equations.static).sum(axis=1)[:, None] + 1e-9
+        size = size + equations.torsion_by_load()
         at = Place(equations, self.torsion, self.energy)
         before, least = np.full(len(open_rows), np.inf), np.full(len(open_rows), np.inf)
         distance, waited = at.distance[:, 0], np.zeros(len(open_rows), dtype=int)
@@ -282,10 +284,14 @@ class _Solver:
         motion = equations.motion(self.torsion, self.energy)
         inertia = np.reshape(equations.coefficients.load_inertia, (-1, 1))
         coupling = (
-            equations.load + inertia * motion.output_acceleration + equations.of_loose_loads(motion)
+            equations.load
+            + inertia * motion.output_acceleration
+            + equations.of_loose_loads(motion)
+            + motion.of_load
         )
+        brake = equations.brake_torque(motion)
         slower = equations.speed - motion.angular_speed
-        missing, _, lead, others = equations.residuals(motion, slower, coupling)
+        missing, _, lead, others = equations.residuals(motion, slower, coupling, brake)
         motor_torque = missing
         if not equations.prescribed:
             # The motor's torque is that of its loop, with a constant.
@@ -298,6 +304,7 @@ class _Solver:
             torsion=self.torsion,
             motor_torque=motor_torque,
             coupling_torque=others[1],
+            brake_torque=others[2],
             lead=lead,
             energy=motion.energy,
             slower=others[0],

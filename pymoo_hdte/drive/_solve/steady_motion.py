@@ -113,8 +113,8 @@ class SteadyMotion:
         Whose ``orders`` the phasors belong to.
     transmission_error, torsion : ndarray of complex, shape (n, n_harmonics)
         theta_d and d, rad.
-    motor_torque, coupling_torque : ndarray of complex, shape (n, n_harmonics)
-        Torque on the input, and between drive and load inertia, N.m.
+    motor_torque, coupling_torque, brake_torque : ndarray of complex, shape (n, n_harmonics)
+        Torque on the input, between drive and load inertia, and between that and the brake, N.m.
     lead : ndarray of complex, shape (n, n_harmonics)
         Input angle ahead of the mean speed's, alpha - Omega t, rad; its mean is 0.
     energy : ndarray of complex, shape (n, n_harmonics)
@@ -142,6 +142,7 @@ class SteadyMotion:
     torsion: Phasors
     motor_torque: Phasors
     coupling_torque: Phasors
+    brake_torque: Phasors
     lead: Phasors
     energy: Phasors
     slower: Phasors
@@ -171,7 +172,7 @@ class SteadyMotion:
 
 
 BY_CASE = (
-    "transmission_error", "torsion", "motor_torque", "coupling_torque", "lead", "energy",
-    "slower", "slopes", "converged",
+    "transmission_error", "torsion", "motor_torque", "coupling_torque", "brake_torque", "lead",
+    "energy", "slower", "slopes", "converged",
 )  # fmt: skip
 """Fields of `SteadyMotion` with a row a case, in their order."""

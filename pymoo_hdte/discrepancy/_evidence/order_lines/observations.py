@@ -10,11 +10,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg.lapack import dtrtrs
 
+from pymoo_hdte.discrepancy._evidence.order_lines.bench import IDEAL, Bench
 from pymoo_hdte.discrepancy._evidence.order_lines.features import (
     MEANS,
     Features,
@@ -29,7 +31,7 @@ from pymoo_hdte.discrepancy._evidence.order_lines.torsion_curve import TorsionPo
 from pymoo_hdte.discrepancy._records.campaign import Campaign
 from pymoo_hdte.discrepancy._records.known_values import of_equal_numbers
 from pymoo_hdte.discrepancy._records.line_fit import CHANNELS
-from pymoo_hdte.discrepancy._selection.candidate import Layout
+from pymoo_hdte.discrepancy._selection.candidate import Candidate, Layout
 from pymoo_hdte.drive import DriveEffect, LawAtPort, SteadyMotion, mean_torsion
 from pymoo_hdte.effects.unknowns import Parameter
 
@@ -57,6 +59,8 @@ class Observations:
     reference_effects : tuple of DriveEffect
         Effects included in this response: they may move a resonance, which amplifies the
         repeatability.
+    bench : Bench
+        Nuisances that are fitted with the base, whose unknowns are the last of ``base``.
     """
 
     campaign: Campaign
@@ -65,6 +69,16 @@ class Observations:
     torsion: tuple[TorsionPoints, ...] = ()
     reference: Vector | None = None
     reference_effects: tuple[DriveEffect, ...] = ()
+    bench: Bench = IDEAL
+
+    def on_bench(self, nuisance: Candidate, begin: Sequence[float]) -> Self:
+        """Return the observations on a bench with one more nuisance, whose fits begin at values."""
+        bench = self.bench.with_nuisance(nuisance, begin)
+        own = len(self.base) - len(self.bench.parameters)
+        reference = None if self.reference is None else np.append(self.reference, begin)
+        return replace(
+            self, bench=bench, base=(*self.base[:own], *bench.parameters), reference=reference
+        )
 
     @cached_property
     def whiteners(self) -> NDArray[np.float64]:
@@ -186,7 +200,9 @@ class Observations:
         features = self.features
         orders = features.orders.tolist()
         conditions = features.conditions
-        return predict(believed, rig, conditions, orders, values, effects, start, effort)
+        return predict(
+            believed, rig, conditions, orders, values, effects, start, effort, self.bench
+        )
 
     def _values_by_name(self, vectors: Vector) -> dict[str, Vector]:
         return {p.name: column for p, column in zip(self.base, vectors.T, strict=True)}

@@ -155,13 +155,14 @@ def _of_loop(believed: BelievedDrive, rig: Rig) -> tuple[Parameter, Parameter]:
     of_output = believed.output_inertia + believed.load_inertia
     driven = believed.input_inertia + of_output / believed.ratio**2
     lag = driven / rig.proportional if rig.proportional else 0.0
-    return _error("loop_gain", _LOOP_GAIN), _error("loop_lag", lag)
+    # Ten deviations away there would be no loop, and an effect beside it would show in nothing.
+    return _error("loop_gain", _LOOP_GAIN, 3.0), _error("loop_lag", lag, 3.0)
 
 
-def _error(name: str, deviation: float) -> Parameter:
-    """Return an unknown of mean zero."""
+def _error(name: str, deviation: float, most: float = 10.0) -> Parameter:
+    """Return an unknown of mean zero, up to ``most`` deviations away."""
     size = max(deviation, 1e-9)
-    return Parameter(name, 0.0, -10.0 * size, 10.0 * size, size, prior=size)
+    return Parameter(name, 0.0, -most * size, most * size, size, prior=size)
 
 
 def _bounded(name: str, value: float, tolerance: float) -> Parameter:

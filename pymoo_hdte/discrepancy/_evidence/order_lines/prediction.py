@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from pymoo_hdte.discrepancy._evidence.order_lines.bench import IDEAL, Bench
 from pymoo_hdte.discrepancy._evidence.order_lines.steady_states import (
     PREDICTION,
     Effort,
@@ -22,7 +23,6 @@ from pymoo_hdte.discrepancy._evidence.order_lines.steady_states import (
     steady_motions,
 )
 from pymoo_hdte.discrepancy._records.believed import MECHANICAL, BelievedDrive, Rig
-from pymoo_hdte.discrepancy._records.known_values import of_equal_numbers
 from pymoo_hdte.discrepancy._records.line_fit import CHANNELS
 from pymoo_hdte.drive import (
     Coefficients,
@@ -32,6 +32,7 @@ from pymoo_hdte.drive import (
 from pymoo_hdte.drive._effects import Session
 from pymoo_hdte.drive._solve.lead_response import LeadResponse, lead_response
 from pymoo_hdte.drive._solve.order_spectrum import sine_phasor
+from pymoo_hdte.effects.law import Values
 
 LOOP = ("loop_gain", "loop_lag")
 """Unknowns of the speed loop: the share by which it is stronger than stated, and its lag in s."""
@@ -121,6 +122,7 @@ def predict(
     effects: Sequence[DriveEffect] = (),
     start: SteadyMotion | None = None,
     effort: Effort = PREDICTION,
+    bench: Bench = IDEAL,
 ) -> Prediction:
     """Return the predicted readings of the sensors.
 
@@ -140,9 +142,11 @@ def predict(
         Steady states of the records for nearby values, to begin from.
     effort : Effort
         How far the steady states are searched for.
+    bench : Bench
+        Nuisances, whose unknowns are among the values.
     """
     parts = []
-    groups = of_equal_numbers(believed.effects, values)
+    groups = bench.groups(believed.effects, values)
     for rows, known in groups:
         group = {name: column[rows] for name, column in values.items()}
         present = (*known, *effects)
@@ -167,8 +171,11 @@ def _predict_group(
     """Return the prediction of vectors that share all effects ``present``."""
     count, records = len(values["offset"]), len(conditions)
     gain = 1.0 + values["output_torque_gain"][:, None]
-    load = (conditions.output_torque - values["output_torque_zero"][:, None]) / gain
+    of_torques = _torque_readings(present, conditions)
+    load = conditions.output_torque - of_torques[1] - values["output_torque_zero"][:, None]
+    load = load / gain
     coefficients = coefficients_of(believed, values, present, records)
+    coefficients = replace(coefficients, elapsed=np.tile(conditions.elapsed, count))
     if conditions.temperature is not None:
         coefficients = replace(coefficients, temperature=np.tile(conditions.temperature, count))
     nearby = None if start is None else start.rows(np.tile(np.arange(records), count))
@@ -177,12 +184,14 @@ def _predict_group(
     if conditions.lead is not None:
         lead = Lead(np.array(orders, dtype=float), np.tile(conditions.lead, (count, 1)))
     balance = steady_motions(coefficients, speed, load.ravel(), rig, nearby, effort, lead)
-    output_torque = balance.coupling_torque
-    if rig.output_torque_at == "brake":
-        # Behind the load inertia there is only the torque of the load, which is constant.
-        output_torque = output_torque * (np.arange(output_torque.shape[1]) == 0)
+    at_brake = rig.output_torque_at == "brake"
+    output_torque = balance.brake_torque if at_brake else balance.coupling_torque
+    error = balance.transmission_error
+    for effect in present:
+        turned = effect.turned_back(balance.torus.orders * speed[:, None])
+        error = error if turned is None else error + turned * balance.coupling_torque
     channels = [
-        balance.transmission_error,
+        error,
         balance.motor_torque,
         output_torque,
         balance.lead,
@@ -209,6 +218,7 @@ def _predict_group(
     means = np.array([channel[:, 0].real for channel in channels[: len(CHANNELS)]])
     phasors = lines.reshape(count, records, len(CHANNELS), len(orders))
     mean = means.T.reshape(count, records, len(CHANNELS))
+    mean[..., 1:3] += of_torques.T
     _add_sensor_errors(believed.ratio, conditions, orders, values, present, mean, phasors)
     return Prediction(mean, phasors, balance, response)
 
@@ -359,6 +369,44 @@ def _motor_ripple(balance: SteadyMotion, coefficients: Coefficients) -> NDArray[
     return total
 
 
+def _torque_readings(effects: Sequence[DriveEffect], conditions: Conditions) -> Values:
+    """Return what effects add to the readings of both torques in each record, N.m, shape (2, r)."""
+    added = np.zeros((2, len(conditions)))
+    for effect in effects:
+        reading = effect.torque_reading(conditions.elapsed)
+        added += 0.0 if reading is None else reading
+    return added
+
+
+def with_readings(
+    prediction: Prediction,
+    effects: Sequence[DriveEffect],
+    conditions: Conditions,
+    orders: Sequence[float],
+    ratio: float,
+    input_gain: float,
+) -> Prediction:
+    """Return the prediction of one vector with effects that only change what is read."""
+    mean, phasors = prediction.mean.copy(), prediction.phasors.copy()
+    session = Session(orders, ratio, conditions.elapsed, conditions.bends)
+    _add_angle_readings(effects, session, mean, phasors)
+    mean[..., 1] += input_gain * _torque_readings(effects, conditions)[0]
+    return replace(prediction, mean=mean, phasors=phasors)
+
+
+def _add_angle_readings(
+    effects: Sequence[DriveEffect],
+    session: Session,
+    mean: NDArray[np.float64],
+    phasors: NDArray[np.complex128],
+) -> None:
+    for effect in effects:
+        added = effect.reading_lines(session)
+        if added is not None:
+            mean[..., 0] -= added[0]
+            phasors[..., 0, :] -= added[1]
+
+
 def _add_sensor_errors(
     ratio: float,
     conditions: Conditions,
@@ -371,11 +419,7 @@ def _add_sensor_errors(
     """Add the errors of the sensors in place: offset, drift, eccentricity, gains and zeros."""
     mean[..., 0] += values["offset"][:, None]
     session = Session(orders, ratio, conditions.elapsed, conditions.bends)
-    for effect in effects:
-        added = effect.reading_lines(session)
-        if added is not None:
-            mean[..., 0] -= added[0]
-            phasors[..., 0, :] -= added[1]
+    _add_angle_readings(effects, session, mean, phasors)
     for channel, name in ((1, "input_torque"), (2, "output_torque")):
         gain = 1.0 + values[f"{name}_gain"][:, None]
         mean[..., channel] = gain * mean[..., channel] + values[f"{name}_zero"][:, None]
