@@ -54,8 +54,8 @@ class Sizes:
     driven : bool
         Whether the load opposes the motion in some records and drives it in others.
     swept : bool
-        Whether a slow load moves it to and fro at one place, as the output of a drive whose input
-        is locked.
+        Whether a slow load moves it to and fro at one place, as output and mesh of a drive whose
+        input is locked.
     temperature : float
         Mean of the records, K, where their temperatures spread enough to show what depends on them;
         0 elsewhere.

@@ -162,6 +162,7 @@ def test_a_file_of_version_1_still_holds_its_model():
         "bouc_wen_hysteresis",
         "gravity",
         "changed_static_error",
+        "uneven_load_sharing",
     }
     known = {one.name for one in drive_effects() if not one.is_of_bench}
     assert {effect.name for effect in loaded.effects} == known - later

@@ -29,7 +29,7 @@ from pymoo_hdte.discrepancy._selection.rules import Rules
 from pymoo_hdte.discrepancy._selection.verdict import Verdict
 from pymoo_hdte.discrepancy._verdicts.drive_finding import DriveFinding
 from pymoo_hdte.discrepancy._verdicts.stated_sensors import scale_error, shares_scale
-from pymoo_hdte.effects.unknowns import HARMONIC_NAMES, Parameter, line_with_variance
+from pymoo_hdte.effects.unknowns import Parameter, line_with_variance, number_of
 
 SCHEMA_VERSION = 1
 """Version of ``verdict.json``: raised when a field is removed or changes name, type or meaning."""
@@ -304,7 +304,7 @@ def _line(
     """Return amplitude and phase of a line, with intervals, from its cosine and sine parts."""
     cosine, sine = parts
     amplitude, phase = line_with_variance(cosine, sine, covariance)
-    prefix = next(harmonic for harmonic in reversed(HARMONIC_NAMES) if name.startswith(harmonic))
+    prefix = name.removesuffix(number_of(name))
     return {
         name: quantity(*amplitude, _unit(candidate, name, unit_of)),
         f"{prefix}phase": quantity(*phase, _unit(candidate, "phase", unit_of)),

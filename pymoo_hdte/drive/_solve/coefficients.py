@@ -158,7 +158,7 @@ class Coefficients:
 
     @property
     def further_orders(self) -> tuple[float, ...]:
-        """Orders of ``load_errors``, then of ``late_errors``, in cycles per input turn."""
+        """Orders of ``load_errors``, then ``late_errors``, in cycles per input turn; shape (k,)."""
         by_load = tuple(order for order, _ in self.load_errors)
         return (*by_load, *(order for _, order, _ in self.late_errors))
 

@@ -14,6 +14,7 @@ from experiments.studies.virtual_rig.rig import draw_rig, run_campaign
 from pymoo_hdte.discrepancy import analyse, read_campaign, write_campaign
 from pymoo_hdte.discrepancy._evidence.order_lines.candidates import drive_candidates
 from pymoo_hdte.discrepancy._evidence.order_lines.sizes import port_sizes
+from pymoo_hdte.discrepancy._report.document import effects_of
 from pymoo_hdte.drive import ChangedStaticError
 from pymoo_hdte.units import ARCSEC
 
@@ -48,9 +49,15 @@ def test_a_hidden_change_is_named_with_its_lines(stated):
     assert analysis.verdict.status == "named"
     lines = [one for one in analysis.revised_model().effects if one.name == NAME]
     assert [line.order for line in lines] == [1.0, 2.0]
+    (told,) = [one["parameters"] for one in effects_of(analysis.verdict)]
     for line, truth in zip(lines, planted, strict=True):
         found, hidden = (one.amplitude * np.exp(1j * one.phase) for one in (line, truth))
         assert abs(found - hidden) < 0.5 * ARCSEC
+        # A document has cosines, each line with a phase of its own.
+        amplitude, phase = (
+            told[f"order_{line.order:g}_{number}"]["value"] for number in ("amplitude", "phase")
+        )
+        assert amplitude * np.exp(1j * phase) == pytest.approx(-1j * found, rel=0.01)
 
 
 def test_files_keep_the_series(tmp_path):

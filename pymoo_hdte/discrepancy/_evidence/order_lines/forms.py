@@ -281,7 +281,7 @@ def _drift(candidate: Candidate, ranges: Ranges) -> list[DriveEffect]:
     return [ThermalDrift(_ANGLE / time, time) for time in times]
 
 
-def _load(candidate: Candidate, ranges: Ranges) -> list[DriveEffect]:
+def load_series(ranges: Ranges) -> list[DriveEffect]:
     """Return torques of a load that hangs on a spring, a damper or both: a series in the rate."""
     fastest = ranges.speed.max()
     return [LoadRate(k, _SHARE * ranges.inertia / fastest**k) for k in _RATES]
@@ -300,7 +300,7 @@ _FAMILIES: dict[str, Callable[[Candidate, Ranges], list[DriveEffect]]] = {
     "harmonics_of_scale": _scale_error,
     "lagging_reaction": _reaction,
     "growing_damping": _damping,
-    "hanging_load": _load,
+    "hanging_load": lambda candidate, ranges: load_series(ranges),
     "drift_in_time": _drift,
 }
 """What the families of `effects.effect.FORMS` span."""

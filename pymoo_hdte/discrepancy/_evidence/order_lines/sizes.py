@@ -238,7 +238,8 @@ def port_sizes(
             speed=shared.speed / slower[port],
             damping=damping[port],
             load=scales.torque / believed.ratio if port == "input" else 0.0,
-            swept=scales.swept and port == "output",
+            # The output turns as far as the mesh is twisted.
+            swept=scales.swept and port in ("output", "mesh"),
             turns=port == "load",
             coupling=port in ("input", "output", "load"),
             braked=scales.torque if port == "load" else 0.0,

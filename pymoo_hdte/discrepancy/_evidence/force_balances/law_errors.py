@@ -1,0 +1,208 @@
+"""Relative errors of laws in force balances, and what no law of the library holds.
+
+Both are Gaussian processes over the motion at a port: over its position, over its speed, over its
+load and over the time. What a real machine leaves is coloured, so that residuals count as fewer
+independent values than there are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pymoo_hdte.discrepancy._evidence.force_balances.evidence import MeasuredData
+from pymoo_hdte.discrepancy._selection.candidate import Candidate
+from pymoo_hdte.discrepancy._selection.fitting import Fit
+from pymoo_hdte.discrepancy._selection.linearised import linearise
+from pymoo_hdte.discrepancy._selection.process import TERMS, sine_of
+from pymoo_hdte.discrepancy._selection.score import Linearised, Sized
+from pymoo_hdte.effects.law import Law
+from pymoo_hdte.mechanism.port_motion import PortMotion, law_force
+
+Matrix = NDArray[np.float64]
+
+NOISE = float(np.log(10.0))
+"""Standard deviation of the logarithm of the noise, which nobody states of a balance."""
+TURNS = (1e-3, 1.0)
+"""Range of the force around a turn that is not known, as a share of what holds a port at rest."""
+_STILL = 0.02
+"""Share of the largest speed below which a port counts as still."""
+_SMOOTHED = 9
+"""Bins over which a spectrum is smoothed, to see how coloured it is."""
+
+
+@dataclass(frozen=True, eq=False)
+class BalanceErrors:
+    """Hypotheses of a mechanism as the score takes them.
+
+    Attributes
+    ----------
+    data : MeasuredData
+    base : Fit
+        Without effects.
+    best : Fit
+        Of the least residuals: how coloured these are tells how many of them are independent.
+    """
+
+    data: MeasuredData
+    base: Fit
+    best: Fit
+    _of_turns: dict[str, Matrix] = field(default_factory=dict)
+
+    @property
+    def channels(self) -> NDArray[np.int_]:
+        """Balance of each residual."""
+        return self.data._part
+
+    @property
+    def groups(self) -> list[NDArray[np.int_]]:
+        """Rows of each record and of each balance."""
+        return [
+            np.flatnonzero(labels == label)
+            for labels in (self.data._record, self.data._part)
+            for label in np.unique(labels)
+        ]
+
+    @cached_property
+    def shares(self) -> Matrix:
+        """Independent values that each residual counts for, shape (n,)."""
+        shares = np.ones(len(self.channels))
+        window = np.ones(_SMOOTHED) / _SMOOTHED
+        for record in np.unique(self.data._record):
+            for part in np.unique(self.data._part):
+                rows = np.flatnonzero((self.data._record == record) & (self.data._part == part))
+                if len(rows) < _SMOOTHED:
+                    continue
+                power = np.convolve(self.best.residuals[rows] ** 2, window, "same")
+                shares[rows] = np.sum(power) ** 2 / (len(rows) * np.sum(power**2))
+        return shares
+
+    def linearised(self, fitted: Fit) -> Linearised:
+        """Return a fit as a hypothesis."""
+
+        def errors(candidate: Candidate, place: slice) -> Matrix | None:
+            if candidate.releases is not None or not candidate.parameters:
+                return None
+            values = [float(value) for value in fitted.values[place]]
+            columns = [
+                self._column(effect.port, over, number, effect.law)
+                for effect in candidate.build(values)
+                for over in ("position", "speed")
+                for number in range(1, TERMS + 1)
+            ]
+            return np.column_stack(columns)
+
+        hypothesis = linearise(fitted, self.channels, errors, NOISE, self.shares)
+        return hypothesis.beside(*self._turning(fitted))
+
+    def _turning(self, fitted: Fit) -> Iterator[Sized]:
+        """Yield what dry friction may do where a port turns, starts or stops.
+
+        When it does is known to a part of the time over which the motion is smoothed only.
+        """
+        for effect in fitted.effects:
+            if not (effect.law.breakaway and (columns := self._turns(effect.port)).size):
+                continue
+            none = np.zeros(columns.shape[1])
+            name = f"turns of {effect.name}:{effect.port}"
+            force = effect.law.breakaway * columns
+            yield Sized(name, force, *TURNS, none, none > 0.0)
+
+    def _turns(self, port: str) -> Matrix:
+        """Return whitened balances of a unit force around each turn of a port, (n, 2 n_turns)."""
+        if port not in self._of_turns:
+            self._of_turns[port] = np.column_stack(
+                [np.empty((len(self.channels), 0)), *self._pulses(port)]
+            )
+        return self._of_turns[port]
+
+    def _pulses(self, port: str) -> Iterator[Matrix]:
+        ends = np.cumsum([0, *(int(balance.kept.sum()) for balance in self.data.spectra)])
+        for number, balance in enumerate(self.data.spectra):
+            speed, step = balance.ports[port].speed, float(balance.time[1] - balance.time[0])
+            smoothed = 1.0 / (balance.cutoff * step)
+            for turn in _turns_of(speed, _STILL * float(np.abs(speed).max()), 2.0 * smoothed):
+                place = (np.arange(len(speed)) - turn) / (smoothed / 4.0)
+                for pulse in (np.exp(-0.5 * place**2), place * np.exp(-0.5 * place**2)):
+                    column = np.zeros(len(self.channels))
+                    force = balance.of_port(port, pulse) / self.data.deviation[number]
+                    column[ends[number] : ends[number + 1]] = force[balance.kept]
+                    yield column
+
+    def _column(self, port: str, over: str, number: int, law: Law | None = None) -> Matrix:
+        """Return whitened balances of a function over something, times a law's force, (n,)."""
+        parts = []
+        reach = self._reach(port, over)
+        stiffness = self.data.mechanism.port(port).stiffness.value
+        for balance, deviation in zip(self.data.spectra, self.data.deviation, strict=True):
+            motion = balance.ports[port]
+            signal = sine_of(number, _argument(motion, over) / reach)[0]
+            if law is not None:
+                signal = signal * law_force(law, motion, stiffness)
+            parts.append((balance.of_port(port, signal) / deviation)[balance.kept])
+        return np.concatenate(parts)
+
+    def _reach(self, port: str, over: str) -> float:
+        peaks = [
+            float(np.abs(_argument(balance.ports[port], over)).max())
+            for balance in self.data.spectra
+        ]
+        return max(*peaks, 1e-12)
+
+    @cached_property
+    def outside(self) -> tuple[Sized, ...]:
+        """What no law holds: a process over something at each port."""
+        return tuple(self._outside())
+
+    def _outside(self) -> Iterator[Sized]:
+        for port in self.data.mechanism.ports:
+            overs = ["position", "speed", "time"]
+            if all(balance.ports[port.name].load is not None for balance in self.data.spectra):
+                overs.append("load")
+            for over in overs:
+                columns = np.column_stack(
+                    [self._column(port.name, over, number) for number in range(1, TERMS + 1)]
+                )
+                columns = columns * np.sqrt(self.shares)[:, None]
+                size = max(float(np.sum(columns**2)), 1e-24)
+                independent = float(np.sum(self.shares))
+                most = np.sqrt(
+                    max(float(self.shares @ self.base.residuals**2), 4.0 * independent) / size
+                )
+                none = np.zeros(TERMS)
+                columns = columns / np.sqrt(self.shares)[:, None]
+                yield Sized(
+                    f"outside: {over} at {port.name}",
+                    columns,
+                    float(np.sqrt(TERMS / size)),
+                    float(most),
+                    none,
+                    none > 0.0,
+                )
+
+
+def _turns_of(speed: Matrix, still: float, long: float) -> list[float]:
+    """Return the rows, perhaps between two, at which a motion turns, stops or starts.
+
+    A rest of more than ``long`` rows has two of them, its end and its beginning.
+    """
+    turns, moving = list[float](), np.flatnonzero(np.abs(speed) >= still)
+    for before, after in pairwise(moving.tolist()):
+        if after - before > long:
+            turns += [before, after]
+        elif speed[before] * speed[after] < 0.0:
+            turns.append((before + after) / 2.0)
+    return turns
+
+
+def _argument(motion: PortMotion, over: str) -> Matrix:
+    """Return what a process is over, (n,): the position counts from its mean."""
+    if over == "time":
+        return np.linspace(-1.0, 1.0, len(motion.position))
+    values = np.asarray(getattr(motion, over))
+    return values - np.mean(values) if over == "position" else values

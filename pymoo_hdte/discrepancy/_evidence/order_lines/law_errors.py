@@ -1,0 +1,329 @@
+"""Relative errors of laws in the lines of a drive, and what no law of the library holds.
+
+The relative error of a law is a Gaussian process over its arguments. Speed and load change from
+record to record, so that it multiplies what the law does in each. A law of the torsion also errs
+within a turn: there it is the law itself times smooth functions of the torsion.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pymoo_hdte.discrepancy._evidence.order_lines.corrections import Correction
+from pymoo_hdte.discrepancy._evidence.order_lines.evidence import Data, _ranges_of
+from pymoo_hdte.discrepancy._evidence.order_lines.features import MEANS
+from pymoo_hdte.discrepancy._evidence.order_lines.forms import load_series
+from pymoo_hdte.discrepancy._records.line_fit import CHANNELS
+from pymoo_hdte.discrepancy._selection.candidate import Candidate
+from pymoo_hdte.discrepancy._selection.fitting import Fit, Response
+from pymoo_hdte.discrepancy._selection.linearised import amplitudes, linearise
+from pymoo_hdte.discrepancy._selection.process import TERMS, sine_of, sines_of
+from pymoo_hdte.discrepancy._selection.score import Linearised, Sized
+from pymoo_hdte.drive import DriveEffect, LawAtPort
+from pymoo_hdte.effects.hysteresis import MaxwellSlip
+from pymoo_hdte.effects.law import Behaviour, Law, PortState
+from pymoo_hdte.effects.law import Response as Torque
+from pymoo_hdte.effects.ripple import PeriodicTorque
+
+Matrix = NDArray[np.float64]
+
+LENGTH = 1.0
+"""Length over which a relative error changes, where the argument runs from -1 to 1: half of it.
+
+Its process has one derivative (Matern, 3/2): one with all of them, known at some records, would be
+known at the others to a ten-thousandth, which no error of a law is.
+"""
+_SMALLEST = 1e-9
+"""Least share of the variance of a process for which a direction counts."""
+REPEATABLE = (0.03, 30.0)
+"""Range of what a record's mean is off by, in standard deviations of its noise."""
+_FREQUENCY_LENGTH = 0.3
+"""Length over which a response errs, where the logarithm of the frequency runs from -1 to 1."""
+_STEP = 0.01
+"""Relative step by which a law is changed to see what follows."""
+
+
+@dataclass(frozen=True, eq=False)
+class ScaledLaw(Behaviour):
+    """A law times a small smooth function of the torsion."""
+
+    law: Law
+    travel: float
+    number: int
+    size: float
+
+    @property
+    def orders(self) -> tuple[float, ...]:
+        """Those of the law."""
+        return self.law.orders
+
+    @property
+    def loaded(self) -> bool:  # type: ignore[override]
+        """As the law."""
+        return self.law.loaded
+
+    @property
+    def warmed(self) -> bool:  # type: ignore[override]
+        """As the law."""
+        return self.law.warmed
+
+    def respond(self, state: PortState) -> Torque:
+        """Return torque and tangents."""
+        response = self.law.respond(state)
+        factor, slope = sine_of(self.number, state.position / self.travel)
+        factor, slope = self.size * factor, self.size * slope / self.travel
+        return Torque(
+            response.torque * factor,
+            response.slope * factor + response.torque * slope,
+            response.damping * factor,
+        )
+
+    def with_input_locked(self) -> Law | None:
+        """Return the law with the input locked, times the same function."""
+        locked = self.law.with_input_locked()
+        return None if locked is None else ScaledLaw(locked, self.travel, self.number, self.size)
+
+
+@dataclass(frozen=True, eq=False)
+class LawErrors:
+    """Hypotheses of a campaign as the score takes them.
+
+    Attributes
+    ----------
+    data : Data
+    base : Fit
+        Without effects.
+    """
+
+    data: Data
+    base: Fit
+
+    @property
+    def n_rows(self) -> int:
+        """Number of residuals of the data."""
+        return self.data.features.values.size + self.data.n_sweep_residuals
+
+    @cached_property
+    def channels(self) -> NDArray[np.int_]:
+        """Channel of each residual, that of sweeps last."""
+        channels = np.zeros(self.n_rows, dtype=int)
+        for channel, rows in enumerate(self.data.rows_of_parts()):
+            channels[rows] = channel
+        return channels
+
+    @cached_property
+    def records(self) -> NDArray[np.int_]:
+        """Record of each residual; sweeps count as one more."""
+        n_records, n_features = self.data.features.values.shape
+        running = np.repeat(np.arange(n_records), n_features)
+        return np.append(running, np.full(self.data.n_sweep_residuals, n_records))
+
+    @property
+    def groups(self) -> list[NDArray[np.int_]]:
+        """Rows of each record and of each channel."""
+        return [
+            np.flatnonzero(labels == label)
+            for labels in (self.records, self.channels)
+            for label in np.unique(labels)
+        ]
+
+    @cached_property
+    def conditions(self) -> Matrix:
+        """A process over speed and load, of deviation 1: its value in each record, shape (r, k)."""
+        when = self.data.features.conditions
+        speed = np.log(np.abs(when.input_speed))
+        half = max(float(np.ptp(speed)) / 2.0, 0.5)
+        load = when.output_torque / max(float(np.abs(when.output_torque).max()), 1e-12)
+        places = np.column_stack([(speed - speed.mean()) / half, load, np.sign(when.input_speed)])
+        apart = np.sqrt(3.0 * np.sum((places[:, None] - places[None]) ** 2, axis=2)) / LENGTH
+        values, vectors = np.linalg.eigh((1.0 + apart) * np.exp(-apart))
+        kept = values > _SMALLEST * values.max()
+        return np.asarray(vectors[:, kept] * np.sqrt(values[kept]))
+
+    @cached_property
+    def _by_row(self) -> Matrix:
+        """`conditions` for each residual; of sweeps one value of their own, shape (n, k + 1)."""
+        n_records, k = self.conditions.shape
+        whole = np.zeros((n_records + 1, k + 1))
+        whole[:-1, :-1], whole[-1, -1] = self.conditions, 1.0
+        return np.asarray(whole[self.records][:, : k + bool(self.data.n_sweep_residuals)])
+
+    def linearised(self, fitted: Fit) -> Linearised:
+        """Return a fit as a hypothesis."""
+        response = self.data.response(fitted)
+
+        def errors(candidate: Candidate, place: slice) -> Matrix | None:
+            if candidate.releases is not None or not candidate.parameters:
+                return None
+            columns = fitted.jacobian[: self.n_rows, place]
+            parts = [
+                self._by_row * (columns[:, [row]] * amplitude)
+                for rows, amplitude in amplitudes(candidate, fitted.values[place])
+                for row in rows
+            ]
+            parts += self._within(candidate, fitted.values[place], response)
+            if not parts:
+                return None
+            whole = np.column_stack(parts)
+            whole = whole[:, np.linalg.norm(whole, axis=0) > 0.0]
+            return whole if whole.size else None
+
+        return linearise(fitted, self.channels, errors).beside(*self.of_records)
+
+    @cached_property
+    def of_records(self) -> tuple[Sized, ...]:
+        """What the mean of a channel is off by in one record, and by something else in the next."""
+        shape = self.data.features.values.shape
+        sized = []
+        for row, channel in enumerate(MEANS):
+            values = np.zeros((shape[0], *shape))
+            records = np.arange(shape[0])
+            values[records, records, row] = self._noise[row]
+            columns = self._whole(self.data.whiten(values).T)
+            none = np.zeros(shape[0])
+            sized.append(
+                Sized(f"repeatability of {CHANNELS[channel]}", columns, *REPEATABLE, none, none > 0)
+            )
+        return tuple(sized)
+
+    @cached_property
+    def _noise(self) -> Matrix:
+        """Standard deviation of each feature in the middle one of the records, shape (f,)."""
+        variances = np.diagonal(self.data.covariance, axis1=1, axis2=2)
+        return np.asarray(np.sqrt(np.median(variances, axis=0)))
+
+    def _whole(self, columns: Matrix) -> Matrix:
+        """Return changes of the running records (n_running, m) as those of all residuals."""
+        whole = np.zeros((self.n_rows, columns.shape[1]))
+        whole[: len(columns)] = columns
+        return whole
+
+    def _within(self, candidate: Candidate, values: Matrix, response: Response) -> Iterator[Matrix]:
+        """Yield what a law of the torsion does if it errs within a turn, (n, m)."""
+        laws = [
+            effect
+            for effect in candidate.build([float(value) for value in values])
+            if isinstance(effect, LawAtPort) and effect.port == "mesh"
+        ]
+        ranges = _ranges_of(self.data)
+        for effect in laws:
+            if effect.law.states:
+                yield self._springs(ranges, response, float(np.abs(values[0])))
+                continue
+            changes = [
+                response((Correction("mesh", ScaledLaw(effect.law, ranges.travel, k, _STEP)),))
+                for k in range(1, TERMS + 1)
+            ]
+            yield np.column_stack(changes)[: self.n_rows] / _STEP
+
+    def _springs(self, ranges: Any, response: Response, force: float) -> Matrix:
+        """Return what springs do that slip elsewhere, each of a share of the force, (n, m)."""
+        shares = np.geomspace(0.01, 1.0, TERMS)
+        size = max(_STEP * force, 1e-12)
+        changes = [
+            response((Correction("mesh", MaxwellSlip(size, share * ranges.travel, 1e-3)),))
+            for share in shares
+        ]
+        return np.column_stack(changes)[: self.n_rows] / (_STEP * np.sqrt(TERMS))
+
+    @cached_property
+    def outside(self) -> tuple[Sized, ...]:
+        """What no law holds: a process over speed and load at each line and mean of a channel.
+
+        And a torque at each port and order, as it shows in all channels. Each has a scale from
+        what is visible up to the misfit of the base.
+        """
+        return tuple(self._outside())
+
+    def _outside(self) -> Iterator[Sized]:
+        features = self.data.features
+        n_records, n_features = features.values.shape
+        places = [(f"mean of {CHANNELS[channel]}", [row]) for row, channel in enumerate(MEANS)]
+        for channel, name in enumerate(CHANNELS):
+            for order, pair in zip(features.orders, features.places(channel), strict=True):
+                places.append((f"order {order:.4g} of {name}", pair.tolist()))
+        k = self.conditions.shape[1]
+        for name, rows in places:
+            values = np.zeros((len(rows) * k, n_records, n_features))
+            for number, row in enumerate(rows):
+                block = slice(number * k, (number + 1) * k)
+                values[block, :, row] = self._noise[row] * self.conditions.T
+            yield self._place(name, self.data.whiten(values).T, len(rows) * n_records)
+        yield from self._responses()
+        ranges = _ranges_of(self.data)
+        for port, size in (("input", ranges.torque / ranges.ratio), ("output", ranges.torque)):
+            for order in features.orders:
+                at_port = float(order) * ranges.slower(port)
+                parts = [
+                    self._running(Correction(port, PeriodicTorque(at_port, phase, _STEP * size)))
+                    for phase in (0.0, np.pi / 2.0)
+                ]
+                columns = [self._by_row[: part.size, :k] * part[:, None] for part in parts]
+                yield self._place(
+                    f"torque of order {order:.4g} at {port}", np.hstack(columns), 2 * n_records
+                )
+        response = self.data.response(self.base)
+        hanging = np.column_stack([response((effect,)) for effect in load_series(ranges)])
+        running = features.values.size
+        yield self._place("what hangs at the output", hanging[:running], running)
+        start = features.values.size
+        for points in self.data.torsion:
+            torque = points.torque
+            place = torque / max(float(np.abs(torque).max()), 1e-12)
+            sines = sines_of(place)
+            stop = start + len(points.angle) - 1
+            swept = np.zeros((self.n_rows, TERMS))
+            swept[start:stop] = points.whitening @ sines * np.median(points.deviation)
+            start = stop
+            yield self._place("torsion sweep", swept, len(points.angle))
+
+    def _running(self, effect: DriveEffect) -> Matrix:
+        """Return how a further effect changes the running records of the base, (n_running,).
+
+        To all digits of a prediction, as it may be far larger than the noise.
+        """
+        base = self.base.values[None, : len(self.data.base)]
+        change = self.data.predict(base, (effect,)) - self._unchanged
+        return np.nan_to_num(self.data.whiten(change)[0])
+
+    @cached_property
+    def _unchanged(self) -> Matrix:
+        return self.data.predict(self.base.values[None, : len(self.data.base)], ())
+
+    def _responses(self) -> Iterator[Sized]:
+        """Yield relative errors of the response of each channel, smooth over the frequency."""
+        features = self.data.features
+        predicted = np.nan_to_num(self._unchanged[0])
+        speed = np.abs(features.conditions.input_speed)
+        frequency = np.log(np.outer(speed, features.orders))
+        place = 2.0 * (frequency - frequency.min()) / np.ptp(frequency) - 1.0
+        apart = (place.ravel()[:, None] - place.ravel()) ** 2 / _FREQUENCY_LENGTH**2
+        values, vectors = np.linalg.eigh(np.exp(-0.5 * apart))
+        kept = values > 1e-3 * values.max()
+        smooth = (vectors[:, kept] * np.sqrt(values[kept])).T.reshape(-1, *place.shape)
+        for channel, name in enumerate(CHANNELS):
+            real, imaginary = features.places(channel).T
+            change = np.zeros((2, len(smooth), *features.values.shape))
+            change[0][..., real] = smooth * predicted[:, real]
+            change[0][..., imaginary] = smooth * predicted[:, imaginary]
+            change[1][..., real] = -smooth * predicted[:, imaginary]
+            change[1][..., imaginary] = smooth * predicted[:, real]
+            columns = self.data.whiten(change.reshape(-1, *features.values.shape)).T
+            yield self._place(f"response of {name}", columns, 2 * place.size)
+
+    def _place(self, name: str, columns: Matrix, n_rows: int) -> Sized:
+        """Return what may be at a place: from as large as the noise of its rows to the misfit."""
+        whole, m = self._whole(columns), columns.shape[1]
+        size = max(float(np.sum(whole**2)), 1e-24)
+        least, most = (
+            np.sqrt(n_rows / size),
+            np.sqrt(max(self.base.chi_square, 4.0 * n_rows) / size),
+        )
+        none = np.zeros(m)
+        return Sized(f"outside: {name}", whole, float(least), float(most), none, none > 0.0)
