@@ -295,7 +295,7 @@ def unexpected_lines(
         power = amplitudes**2
         threshold = np.log(power.size * len(features.records) / rules.unexpected_line_chance)
         seen = (power[:3] > threshold).any(axis=0)
-        for place in np.flatnonzero(np.abs(orders - orders.round()) < _WHOLE):
+        for place in np.flatnonzero(np.abs(orders - orders.round()) < _WHOLE).tolist():
             seen[place] |= power[3, place] > _threshold_at(place, power[3], threshold)
         beyond = np.flatnonzero(seen)
         sizes = power[:, beyond].sum(axis=0)
