@@ -172,25 +172,24 @@ def _cogging(sizes: Sizes) -> list[Guess]:
     """
     if sizes.slower != 1.0 or not sizes.coupling:
         return []
-    guesses = []
-    for slots, poles in _MOTORS:
-        orders = (float(poles), float(slots), float(math.lcm(poles, slots)))
-        lines = tuple(order for order in orders if order < sizes.highest)
-        if not lines or not all(is_among((*sizes.seen, *sizes.clear), order) for order in lines):
-            continue
-        family = Family(lines, harmonic=False)
-        guesses.append(
-            guess_of_lines(
-                family,
-                "amplitude",
-                sizes.largest,
-                sizes.residual,
-                torque_line,
-                form=family.form,
-                sentence=f"The motor cogs: {poles} poles, {slots} slots.",
-            )
+    motors = [
+        tuple(order for order in orders if order < sizes.highest)
+        for slots, poles in _MOTORS
+        for orders in [(float(poles), float(slots), float(math.lcm(poles, slots)))]
+    ]
+    seen = (*sizes.seen, *sizes.clear)
+    # Several motors may differ in lines only that no record could show.
+    families = [
+        Family(lines, harmonic=False)
+        for lines in dict.fromkeys(motors)
+        if lines and all(is_among(seen, order) for order in lines)
+    ]
+    return [
+        guess_of_lines(
+            family, "amplitude", sizes.largest, sizes.residual, torque_line, form=family.form
         )
-    return guesses
+        for family in families
+    ]
 
 
 _MOTORS = tuple(
@@ -232,7 +231,7 @@ register(
         PeriodicTorque,
         ("input",),
         {"order": "", "phase": "angle", "amplitude": "torque"},
-        "The motor cogs, order {order} of its position.",
+        "The motor cogs at its poles or slots: order {order} of its position.",
         _cogging,
         exact=True,
         nuisance_at=("input",),

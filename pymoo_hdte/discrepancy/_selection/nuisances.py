@@ -54,6 +54,7 @@ def leading_nuisances(search: Search, beside: Hypothesis | None = None) -> Fit |
         trials,
         key=lambda trial: trial.chi_square / misfit + _unknowns(trial) * logarithm,
     )
+    best = fit(search.data, best.candidates, best)
     nuisance = best.candidates[-1]
     misfit, gain = best.misfit, fitted.chi_square - best.chi_square
     if not _is_worth(search, best, fitted):
@@ -70,7 +71,8 @@ def leading_nuisances(search: Search, beside: Hypothesis | None = None) -> Fit |
         for rival in search.hypotheses
         if beside is None or set(rival.candidates) > set(beside.candidates)
     ]
-    if lead < max(others, default=-np.inf):
+    # What the bench explains is no reason to name an effect that explains it no better.
+    if lead < max(others, default=-np.inf) - search.data.rules.bic_gain:
         return None
     return _with_others(search, best)
 

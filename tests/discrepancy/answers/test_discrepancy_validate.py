@@ -68,11 +68,15 @@ def test_model_is_read_back_exactly(candidate, clean, tmp_path):
 def test_revised_model_predicts_the_fit_s_transmission_error(ripple):
     fitted = ripple.verdict.chosen.fit
     campaign = replace(ripple.campaign, rig=replace(RIG, proportional=0.0, integral=0.0))
-    data = replace(ripple.data, campaign=campaign)
+    free = replace(ripple.data.features.conditions, lead=None)
+    data = replace(
+        ripple.data, campaign=campaign, features=replace(ripple.data.features, conditions=free)
+    )
     features = data.predict(fitted.values[None, : len(data.base)], fitted.effects)[0]
     model = revised_model(ripple)
     speeds = data.features.conditions.input_speed
-    gain, zero = fitted.values[-4:-2]
+    names = [parameter.name for parameter in data.base]
+    gain, zero = (fitted.values[names.index(f"output_torque_{part}")] for part in ("gain", "zero"))
     loads = (data.features.conditions.output_torque - zero) / (1.0 + gain)
     for record, (speed, load) in enumerate(zip(speeds, loads, strict=True)):
         spectrum = model.at(float(speed), float(load)).steady_state(model.nominal[None, :])

@@ -34,7 +34,7 @@ ALONE = {
     "warming": LawAtPort("warming", "input", WarmingFriction(DAMPING, 0.2, 250.0)),
     "input_torque_drift": InputTorqueDrift(3e-3, 250.0),
     "new_input_torque_zero": NewInputTorqueZero(3e-3, 350.0),
-    "bench_resonance": BenchResonance(1e-6, 250.0, 0.05),
+    "bench_resonance": BenchResonance(5e-6, 400.0, 0.05),
 }
 COULOMB = LawAtPort("coulomb_friction", "input", CoulombFriction(0.02))
 
@@ -54,7 +54,14 @@ def verdict_on(effects, seed=5):
     return verdict, [nuisance.name for nuisance, _ in shown], data
 
 
-@pytest.mark.parametrize("name", ALONE)
+DAILY = ("coupling_ripple", "gravity")
+"""Others run at night."""
+
+
+@pytest.mark.parametrize(
+    "name",
+    [name if name in DAILY else pytest.param(name, marks=pytest.mark.nightly) for name in ALONE],
+)
 def test_a_nuisance_alone_is_told_of_the_bench_and_the_drive_is_adequate(name):
     verdict, told, _ = verdict_on([ALONE[name]])
     assert verdict.status == "adequate"
@@ -62,7 +69,13 @@ def test_a_nuisance_alone_is_told_of_the_bench_and_the_drive_is_adequate(name):
     assert told == ["torque_ripple" if name == "brake_ripple" else name]
 
 
-@pytest.mark.parametrize("name", ["coupling_ripple", "gravity", "warming"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "gravity",
+        *(pytest.param(n, marks=pytest.mark.nightly) for n in ("coupling_ripple", "warming")),
+    ],
+)
 def test_a_nuisance_takes_no_name_from_an_effect(name):
     verdict, told, _ = verdict_on([COULOMB, ALONE[name]])
     assert (verdict.status, verdict.chosen.names) == ("named", {("coulomb_friction", "input")})

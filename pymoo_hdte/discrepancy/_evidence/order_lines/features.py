@@ -294,30 +294,27 @@ def unexpected_lines(
         )
         power = amplitudes**2
         threshold = np.log(power.size * len(features.records) / rules.unexpected_line_chance)
-        of_motor = np.abs(orders - orders.round()) < _WHOLE
-        of_motor &= power[3] > threshold * _level(power[3], threshold)
-        beyond = np.flatnonzero((power[:3] > threshold).any(axis=0) | of_motor)
+        seen = (power[:3] > threshold).any(axis=0)
+        for place in np.flatnonzero(np.abs(orders - orders.round()) < _WHOLE).tolist():
+            seen[place] |= power[3, place] > _threshold_at(place, power[3], threshold)
+        beyond = np.flatnonzero(seen)
         sizes = power[:, beyond].sum(axis=0)
         lines.append(dict(zip(orders[beyond].round(9).tolist(), sizes.tolist(), strict=True)))
     return lines
 
 
-def _level(power: NDArray[np.float64], threshold: float) -> NDArray[np.float64]:
-    """Return by how much the noise exceeds the stated one around each line, shape (k,).
+def _threshold_at(place: int, power: NDArray[np.float64], threshold: float) -> float:
+    """Return the power that a line exceeds no more often by chance than noise the ``threshold``.
 
-    1 where the neighbours show no more than noise. A mean of n of them is not exact: a line exceeds
-    c times it by chance in (1 + c / n)^-n of all cases, not in exp(-c), so that it is the larger.
+    Where its neighbours show more than noise, their mean is the measure. Of n of them it is not
+    exact: a line exceeds c times it by chance in (1 + c / n)^-n of all cases, not in exp(-c).
     """
-    levels = np.ones(len(power))
-    for place in range(len(power)):
-        near = np.r_[
-            power[max(place - _GUARD - _NEIGHBOURS, 0) : max(place - _GUARD, 0)],
-            power[place + _GUARD + 1 : place + _GUARD + 1 + _NEIGHBOURS],
-        ]
-        if near.size and near.sum() > chi2.isf(np.exp(-threshold), 2 * near.size) / 2.0:
-            larger = near.size * np.expm1(threshold / near.size)
-            levels[place] = near.mean() * larger / threshold
-    return levels
+    below = power[max(place - _GUARD - _NEIGHBOURS, 0) : max(place - _GUARD, 0)]
+    near = np.concatenate([below, power[place + _GUARD + 1 :][:_NEIGHBOURS]])
+    n = near.size
+    if not n or near.sum() <= chi2.isf(np.exp(-threshold), 2 * n) / 2.0:
+        return threshold
+    return float(near.mean() * n * np.expm1(threshold / n))
 
 
 def unexpected_orders(
