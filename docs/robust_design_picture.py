@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 from pymoo.optimize import minimize
 from scipy.stats import gaussian_kde
 
-from pymoo_hdte.algorithms import ElitistSwarm
+from pymoo_hdte.algorithms import CompactSwarm
 from pymoo_hdte.decision import PREFERENCES, WeightedUtopia
 from pymoo_hdte.problems import RobustDTE
 
@@ -19,13 +19,13 @@ DRIVES = 2000
 def draw(target: Path = PICTURE) -> None:
     """Optimise the calibrated drive and draw what that does to drives as they are built."""
     problem = RobustDTE()
-    found = minimize(problem, ElitistSwarm(), ("n_eval", 20_000), seed=1)
+    found = minimize(problem, CompactSwarm(), ("n_eval", 20_000), seed=1)
     chosen = found.X[WeightedUtopia(PREFERENCES["balanced"]).do(found.F)]
     figure = Figure(figsize=(9.6, 3.4), layout="constrained")
     scatter, front = figure.subplots(1, 2)
     labels = []
     front.plot(*problem.pareto_front().T, color="0.6", linewidth=5, label="front of the surrogate")
-    front.plot(*found.F.T, ".", color=CHOSEN, markersize=4, label="ElitistSwarm")
+    front.plot(*found.F.T, ".", color=CHOSEN, markersize=4, label="CompactSwarm")
     for name, design, colour, line in (
         ("data sheet", problem.nominal, DATA_SHEET, "--"),
         ("balanced design", chosen, CHOSEN, "-"),

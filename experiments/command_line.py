@@ -170,9 +170,9 @@ def _add_open_options(parser: argparse.ArgumentParser) -> None:
     opened = parser.add_argument_group(
         f"another setting than the paper's, for {_names(SEEDED)}",
         "Names are those of this package (calibrated, resonant, toy, the members of "
-        "robust_dte_family; AMP-MOPSO, MOPSO, NSGA-II, A-MOPSO, MP-MOPSO, ElitistSwarm), those of "
-        "pymoo (zdt1; NSGA2), or module:name of a module of yours. The first algorithm is tested "
-        "against the others.",
+        "robust_dte_family; AMP-MOPSO, MOPSO, NSGA-II, A-MOPSO, MP-MOPSO, ElitistSwarm, "
+        "CompactSwarm, which sizes itself), those of pymoo (zdt1; NSGA2), or module:name of a "
+        "module of yours. The first algorithm is tested against the others.",
     )
     opened.add_argument("--evaluations", type=_positive, help="of every run (default 10000)")
     opened.add_argument(

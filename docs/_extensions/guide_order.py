@@ -3,6 +3,8 @@
 ORDER = (
     "robust_simulator.py",
     "robust_examples.py",
+    "robust_reliability.py",
+    "robust_failures.py",
     "robust_study.py",
     "drive_data_sheet.py",
     "own_problem.py",

@@ -1,9 +1,9 @@
-"""A joint of a robot from its log to a verdict: one file without titles, rig.toml, the command.
+"""Write the log of a robot's joint, in which gravity, dry friction and a ripple are hidden.
 
     python docs/examples/own_joint.py FOLDER
 
-FOLDER must be new or empty. The log is of a joint with a harmonic drive, and rig.toml believes in
-an inertia and a viscous friction only. `docs/bring_your_own_rig.md` explains what is printed.
+FOLDER must be new or empty. The joint has a harmonic drive; its log has no titles, and its clock
+jitters. `docs/bring_your_own_rig.md` goes on from here.
 """
 
 import sys
@@ -11,28 +11,8 @@ from pathlib import Path
 
 import numpy as np
 
-from pymoo_hdte.cli import command_line as cli
-
 INERTIA, VISCOUS, GAIN, RATIO = 0.4, 2.0, 7.6, 101  # kg.m2, N.m.s/rad, N.m/A
 TRUTH = {"gravity": 3.0, "coulomb_friction": 1.5, "torque_ripple": 0.3}  # N.m
-RIG = """\
-title = "A joint of a robot"
-[coordinates.joint]
-inertia = { value = 0.5, factor = 3.0 }
-[ports.bearing]
-motion = { joint = 1.0 }
-damping = { value = 3.0, tolerance = 1.0 }
-gear = { ratio = 101, kind = "harmonic drive" }
-[inputs.current]
-acts = { joint = 1.0 }
-gain = { value = 7.6 }
-[table]
-time = { column = 0, unit = "s" }
-channels.joint = { column = 1, unit = "rad" }
-channels.current = { column = 2, unit = "A" }
-[[records]]
-file = "log.csv"
-"""
 
 
 def log():
@@ -54,11 +34,8 @@ def log():
 if __name__ == "__main__":
     if len(sys.argv) != 2:
         sys.exit("usage: own_joint.py FOLDER")
-    rig = Path(sys.argv[1])
-    rig.mkdir(parents=True, exist_ok=True)
-    if any(rig.iterdir()):
-        sys.exit(f"{rig} is not empty")
-    np.savetxt(rig / "log.csv", log(), "%.6f", ",")
-    (rig / "rig.toml").write_text(RIG, encoding="utf-8")
-    if code := cli.main(["discrepancy", str(rig), "--out", str(rig / "report")]):
-        sys.exit(code)
+    folder = Path(sys.argv[1])
+    folder.mkdir(parents=True, exist_ok=True)
+    if any(folder.iterdir()):
+        sys.exit(f"{folder} is not empty")
+    np.savetxt(folder / "log.csv", log(), "%.6f", ",")

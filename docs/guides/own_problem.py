@@ -4,8 +4,8 @@ Use the swarms on your own problem
 
 The algorithms of this package know nothing of drives. They take any pymoo problem with real
 variables, finite bounds and two objectives or more, constrained or not. ``ElitistSwarm`` is the one
-to use with up to five objectives: it has nothing to tune. ``AMPMOPSO`` is the paper's algorithm as
-printed, for those who compare with it.
+to use with two or three objectives: it has nothing to tune. ``AMPMOPSO`` is the paper's algorithm,
+for those who compare with it.
 """
 
 import pickle
@@ -96,7 +96,7 @@ ax.view_init(elev=25, azim=45)
 plt.show()
 
 # %%
-# Five are about the limit. Among more objectives nearly every solution is non-dominated, and what
+# With five it is behind already, and it warns: nearly every solution is non-dominated, and what
 # ranks by dominance, as NSGA-II does too, loses its way. Distances to the front (IGD in units of
 # its ranges, smaller is better) on DTLZ2 after 20,000 evaluations:
 #

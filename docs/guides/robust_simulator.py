@@ -32,8 +32,9 @@ from pymoo_hdte.problems import (
 # A simulator
 # -----------
 #
-# Any deterministic function of named numbers will do; one that no polynomial follows within the
-# budget is refused. It may return one number, or several by name. Here it is an
+# Any function of named numbers will do; one that no polynomial follows within the budget is
+# refused, and :ref:`one that fails or is random <sphx_glr_auto_guides_robust_failures.py>` is told
+# to be so. It may return one number, or several by name. Here it is an
 # oscillator that stands on a shaking floor: how much of the shaking gets through, and how far its
 # spring is stretched.
 
@@ -153,7 +154,8 @@ plt.show()
 # ---------------
 #
 # A surrogate that misses the wanted accuracy within the budget is refused, as is one that makes a
-# positive response negative. The error says how bad it is, and where.
+# positive response negative. The error says how bad it is, and where; it holds
+# :ref:`all runs <sphx_glr_auto_guides_robust_failures.py>`, none of which has to be made again.
 
 try:
     robust_problem(
@@ -185,8 +187,8 @@ print(f"with logarithms: {wide.n_runs} runs")
 # the same call goes on from there and makes no run twice. Where the study had come to its end, or
 # the simulator's source, state or globals have changed since, the first run is made again, to see
 # whether the file is this simulator's. Files that it reads and programs that it calls are not seen:
-# delete the file where these have changed. A run that raises or gives NaN is made again, then left
-# out; the coordinates are in ``problem.failed``.
+# delete the file where these have changed. A run that raises or gives NaN is made again before it
+# counts as failed; the coordinates are in ``problem.failed``.
 # :ref:`Three simulators <sphx_glr_auto_guides_robust_examples.py>` shows an equation of motion, a
 # program that is called by `subprocess`, and the drive.
 

@@ -248,6 +248,9 @@ plt.show()
 # harmonics (Cameron and Griffin, Journal of Applied Mechanics 56, 1989), and Newton's method brings
 # the sum of torques to zero, harmonic by harmonic.
 #
+# Where the motion of the input is known, as from its encoder, ``lead`` prescribes it. Then only the
+# torsion is unknown, and the motor's torque is the one that this motion takes.
+#
 # Orders such as 2 and 2.02 do not close over one input turn. Their beat gets an angle of its own,
 # so that the grid is a torus of two angles and no record of many turns is needed.
 

@@ -29,13 +29,19 @@ from experiments.comparing.runs import ALGORITHMS, FINAL_SIZE, final_rows, robus
 from experiments.runner.campaign import Run
 from experiments.runner.provenance import fingerprint
 from experiments.runner.setting import Setting
-from pymoo_hdte.algorithms import ElitistSwarm
+from pymoo_hdte.algorithms import CompactSwarm, ElitistSwarm
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.drive import PRESETS
 from pymoo_hdte.problems import robust_benchmarks, robust_dte_family
 
 OF_PROBLEMS, OF_ALGORITHMS = "--problems", "--algorithms"
 _OF_PYMOO = "a name of this package or of pymoo, or module:name of a module that can be imported"
+
+_OURS: dict[str, Callable[..., Any]] = {
+    "ElitistSwarm": ElitistSwarm,
+    # Its size follows from the evaluations spent.
+    "CompactSwarm": lambda: CompactSwarm(n_result=FINAL_SIZE),
+}
 
 
 def check_setting(setting: Setting) -> None:
@@ -88,8 +94,8 @@ def algorithm_named(name: str, population: int, problem: str) -> Algorithm:
     """
     if name in ALGORITHMS:
         return ALGORITHMS[name](population, FINAL_SIZE)
-    if name == ElitistSwarm.__name__:
-        factory: Any = ElitistSwarm
+    if name in _OURS:
+        factory = _OURS[name]
     else:
         factory = _imported(OF_ALGORITHMS, name) if ":" in name else _pymoo_algorithm(name)
     if not callable(factory):
@@ -153,7 +159,7 @@ def _pymoo_algorithm(name: str) -> Any:
             continue
         if inspect.isclass(algorithm_class) and issubclass(algorithm_class, Algorithm):
             return algorithm_class
-    raise InvalidInput(OF_ALGORITHMS, name, f"{', '.join(ALGORITHMS)}, ElitistSwarm, {_OF_PYMOO}")
+    raise InvalidInput(OF_ALGORITHMS, name, f"{', '.join((*ALGORITHMS, *_OURS))}, {_OF_PYMOO}")
 
 
 def _imported(option: str, name: str) -> Any:

@@ -16,7 +16,6 @@ from jmetal.algorithm.multiobjective.moead import MOEAD
 from jmetal.algorithm.multiobjective.omopso import OMOPSO
 from jmetal.algorithm.multiobjective.smpso import SMPSO
 from jmetal.core.observer import Observer
-from jmetal.core.problem import FloatProblem
 from jmetal.core.solution import FloatSolution
 from jmetal.operator.crossover import DifferentialEvolutionCrossover
 from jmetal.operator.mutation import NonUniformMutation, PolynomialMutation, UniformMutation
@@ -31,6 +30,7 @@ from pymoo.core.problem import Problem
 from pymoo.util.ref_dirs import get_reference_directions
 
 from experiments.comparing.peers_pymoo import POPULATION, Offer
+from pymoo_hdte.problems._jmetal import JMetalProblem
 
 logging.getLogger("jmetal.core.algorithm").setLevel(logging.WARNING)
 
@@ -41,47 +41,14 @@ It decides which solutions are offered, not how the swarm moves.
 """
 
 
-class WrappedProblem(FloatProblem):
-    """A pymoo problem as jMetalPy sees it."""
-
-    def __init__(self, problem: Problem) -> None:
-        super().__init__()
-        self.problem = problem
-        self.evaluations = 0
-        self.lower_bound, self.upper_bound = problem.xl.tolist(), problem.xu.tolist()
-        self.directions = [self.MINIMIZE] * problem.n_obj
-
-    def number_of_objectives(self) -> int:
-        """Return the number of objectives."""
-        return self.problem.n_obj
-
-    def number_of_constraints(self) -> int:
-        """Return the number of inequality constraints."""
-        return self.problem.n_ieq_constr
-
-    def name(self) -> str:
-        """Return the name of the problem."""
-        return self.problem.name()
-
-    def evaluate(self, solution: FloatSolution) -> FloatSolution:
-        """Evaluate one solution."""
-        return BatchEvaluator().evaluate([solution], self)[0]
-
-
 class BatchEvaluator(Evaluator):
-    """Evaluates a whole swarm at once, and counts."""
+    """Evaluates a whole swarm at once."""
 
     def evaluate(
-        self, solution_list: list[FloatSolution], problem: WrappedProblem
+        self, solution_list: list[FloatSolution], problem: JMetalProblem
     ) -> list[FloatSolution]:
-        """Fill in objectives and constraints, which are violated below 0 in jMetalPy."""
-        X = np.array([solution.variables for solution in solution_list])
-        F, G = problem.problem.evaluate(X, return_values_of=["F", "G"])
-        problem.evaluations += len(X)
-        for solution, f, g in zip(solution_list, F, G, strict=True):
-            solution.objectives = f.tolist()
-            solution.constraints = (-g).tolist()
-        return solution_list
+        """Fill in objectives and constraints."""
+        return problem.evaluate_all(solution_list)
 
 
 class _Snapshots(Observer):
@@ -110,7 +77,7 @@ def run_jmetal(name: str, problem: Problem, budgets: Sequence[int], seed: int) -
     # jMetalPy draws from the generators of the modules; nothing else in this process uses them.
     random.seed(seed)
     np.random.seed(seed)  # noqa: NPY002
-    wrapped = WrappedProblem(problem)
+    wrapped = JMetalProblem(problem)
     makers = {"SMPSO": _smpso, "OMOPSO": _omopso, "GDE3": _gde3, "MOEA/D-DE": _moead_de}
     make = makers[name]
     algorithm = make(wrapped, budgets[-1])
@@ -124,13 +91,13 @@ def run_jmetal(name: str, problem: Problem, budgets: Sequence[int], seed: int) -
     return snapshots.offered
 
 
-def _dominance(problem: WrappedProblem) -> DominanceComparator:
+def _dominance(problem: JMetalProblem) -> DominanceComparator:
     if problem.number_of_constraints():
         return DominanceWithConstraintsComparator()
     return DominanceComparator()
 
 
-def _smpso(problem: WrappedProblem, budget: int) -> SMPSO:
+def _smpso(problem: JMetalProblem, budget: int) -> SMPSO:
     return SMPSO(
         problem=problem,
         swarm_size=POPULATION,
@@ -142,7 +109,7 @@ def _smpso(problem: WrappedProblem, budget: int) -> SMPSO:
     )
 
 
-def _omopso(problem: WrappedProblem, budget: int) -> OMOPSO:
+def _omopso(problem: JMetalProblem, budget: int) -> OMOPSO:
     rate = 1.0 / problem.number_of_variables()
     return OMOPSO(
         problem=problem,
@@ -156,7 +123,7 @@ def _omopso(problem: WrappedProblem, budget: int) -> OMOPSO:
     )
 
 
-def _gde3(problem: WrappedProblem, budget: int) -> GDE3:
+def _gde3(problem: JMetalProblem, budget: int) -> GDE3:
     return GDE3(
         problem=problem,
         population_size=POPULATION,
@@ -173,7 +140,7 @@ def _weights(objectives: int) -> NDArray[np.float64]:
     return get_reference_directions("energy", objectives, POPULATION, seed=1)
 
 
-def _moead_de(problem: WrappedProblem, budget: int) -> MOEAD:
+def _moead_de(problem: JMetalProblem, budget: int) -> MOEAD:
     """Return MOEA/D with differential evolution, settings of Li and Zhang (2009)."""
     objectives = problem.number_of_objectives()
     with tempfile.TemporaryDirectory() as folder:

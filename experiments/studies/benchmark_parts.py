@@ -113,10 +113,9 @@ def _of_degree_5() -> SimulatorProblem:
     coefficients = rng.normal(size=(1, len(indices))) * 0.5 ** indices.sum(axis=1)
     polynomial = SparsePolynomial(indices, coefficients)
     moments, none = SparseMoments(polynomial, inputs.axes), np.zeros(1)
-    no_points = np.empty((0, 4))
-    fit = AdaptiveFit(
-        polynomial, moments, none, none, 0, none, no_points, no_points, np.empty((0, 1))
-    )
+    no_points, no_values = np.empty((0, 4)), np.empty((0, 1))
+    runs = (no_points, no_values, no_points, no_points, no_values)
+    fit = AdaptiveFit(polynomial, moments, none, none, 0, none, *runs)
     return SimulatorProblem(inputs, fit, ("y",), (Mean(), Std()), (), 0)
 
 

@@ -140,6 +140,14 @@ def particles_at(X: NDArray[np.float64]) -> Population:
     return Population(particles)
 
 
+def twin(particle: Individual) -> Individual:
+    """Return a particle of its own with the same arrays, which nobody changes in place."""
+    other = object.__new__(type(particle))
+    vars(other).update(vars(particle))
+    other.data, other.evaluated = dict(particle.data), set(particle.evaluated or ())
+    return other
+
+
 def check_problem(problem: Problem, integers: bool = False) -> None:
     """Refuse a problem that no swarm can take; one with ``integers`` where a repair makes them."""
     mixed = getattr(problem, "vars", None) is not None

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import copy
 import warnings
-from copy import copy
 from typing import Any
 
 import numpy as np
@@ -13,6 +13,7 @@ from pymoo.core.result import Result
 from pymoo.core.sampling import Sampling
 
 from pymoo_hdte.algorithms.archive import FrontArchive
+from pymoo_hdte.algorithms.base import twin
 from pymoo_hdte.algorithms.dominance import best_front
 from pymoo_hdte.algorithms.elitist import ElitistSwarm
 from pymoo_hdte.algorithms.horizon import evaluation_limit
@@ -36,6 +37,14 @@ def size_for(evaluations: float) -> int:
     50 after 10,000 and 79 after 25,000.
     """
     return int(np.clip(np.sqrt(min(evaluations, 1e9)) / 2.0, SMALLEST, LARGEST).round())
+
+
+def evaluations_of(generations: int) -> int:
+    """Return the evaluations of a number of generations of a swarm that grows."""
+    spent = 0
+    for _ in range(generations):
+        spent += size_for(spent)
+    return spent
 
 
 class CompactSwarm(ElitistSwarm):
@@ -76,6 +85,9 @@ class CompactSwarm(ElitistSwarm):
 
     Warns
     -----
+    UserWarning
+        From ``setup`` for more than four objectives, and for a number of generations as the limit
+        of a swarm that grows: its generations are small, so that 100 of them are 1,217 evaluations.
     RuntimeWarning
         If no solution could be judged, for want of finite objectives and constraints; the result
         is empty then.
@@ -138,6 +150,14 @@ class CompactSwarm(ElitistSwarm):
         if self._by_budget:
             allowed = evaluation_limit(self.termination) if constrained else 0.0
             self.pop_size = size_for(allowed)
+        n_gen = getattr(self.termination, "n_max_gen", None)
+        if self._grows and n_gen is not None:
+            warnings.warn(
+                f"{n_gen} generations of a {type(self).__name__} are {evaluations_of(n_gen)} "
+                "evaluations, since it starts small and grows: stop by ('n_eval', n)",
+                UserWarning,
+                stacklevel=4,
+            )
         if self._by_problem and constrained:
             self.moves = tuple(move for move in self.moves if not isinstance(move, ModelStep))
 
@@ -182,9 +202,26 @@ class CompactSwarm(ElitistSwarm):
         judged = swarm[np.flatnonzero(np.isfinite(swarm.violation))]
         return judged[np.argsort(judged.violation, kind="stable")[: max(1, len(judged) // 2)]]
 
+    def __deepcopy__(self, memo: dict[int, Any]) -> CompactSwarm:
+        """Return a copy with particles of its own, which shares arrays and what is archived.
+
+        A history has a copy for every generation, and there are more of them than in other swarms.
+        """
+        own = [self.pop, self.opt, self._offered.members, *self._waiting]
+        for particle in self._front_archive.members:
+            memo[id(particle)] = particle
+        for population in own:
+            for particle in () if population is None else population.tolist():
+                if memo.get(id(particle), particle) is particle:
+                    memo[id(particle)] = twin(particle)
+        other = object.__new__(type(self))
+        memo[id(self)] = other
+        other.__dict__ |= copy.deepcopy(self.__dict__, memo)
+        return other
+
     def archive_all(self) -> Population:
         """Return all non-dominated feasible solutions found, at most ``n_archive``, thinned out."""
-        archive = copy(self._front_archive)
+        archive = copy.copy(self._front_archive)
         self._enter(archive)
         return archive.members.copy()
 

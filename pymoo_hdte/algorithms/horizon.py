@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 
 from pymoo.core.termination import TerminateIfAny, Termination
 from pymoo.termination.collection import TerminationCollection
@@ -10,7 +11,8 @@ from pymoo.termination.default import DefaultTermination
 from pymoo.termination.max_eval import MaximumFunctionCallTermination
 from pymoo.termination.max_gen import MaximumGenerationTermination
 
-from pymoo_hdte.checks import InvalidInput
+_USUAL = 1000
+"""Generations that schedules count on where nothing limits a run: pymoo's default."""
 
 
 def generation_limit(termination: Termination, pop_size: int, n_max_gen: int | None) -> int:
@@ -19,10 +21,11 @@ def generation_limit(termination: Termination, pop_size: int, n_max_gen: int | N
     Other limits are a number of evaluations, ``pop_size`` of which make a generation, and the
     smallest of the limits within a collection or a default termination of pymoo.
 
-    Raises
-    ------
-    InvalidInput
-        If nothing limits the number of generations.
+    Warns
+    -----
+    UserWarning
+        If nothing limits the number of generations, as with a tolerance or a time: then it is
+        1,000, the limit of pymoo's default termination.
     """
     limit = _limit(termination, pop_size)
     if n_max_gen is not None and not (
@@ -30,11 +33,14 @@ def generation_limit(termination: Termination, pop_size: int, n_max_gen: int | N
     ):
         return n_max_gen
     if math.isinf(limit):
-        raise InvalidInput(
-            "termination",
-            type(termination).__name__,
-            "('n_gen', n) or ('n_eval', n), or any with n_max_gen given to the algorithm",
+        warnings.warn(
+            f"{type(termination).__name__} does not say how many generations a run has: schedules "
+            f"count on {_USUAL}; give n_max_gen to the algorithm, or stop by ('n_gen', n) or "
+            "('n_eval', n)",
+            UserWarning,
+            stacklevel=5,
         )
+        return _USUAL
     return max(1, math.ceil(limit))
 
 

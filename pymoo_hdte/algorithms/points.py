@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,10 +54,15 @@ class Points:
     def __getitem__(self, rows: NDArray | slice) -> Points:
         return Points(self.X[rows], self.F[rows], self.violation[rows])
 
-    def followed_by(self, other: Points) -> Points:
-        """Return these points followed by ``other``."""
+    def __deepcopy__(self, memo: dict[int, Any]) -> Points:
+        """Return the points themselves, which nobody changes."""
+        return self
+
+    def followed_by(self, *others: Points) -> Points:
+        """Return these points followed by ``others``."""
+        parts = (self, *others)
         return Points(
-            np.concatenate([self.X, other.X]),
-            np.concatenate([self.F, other.F]),
-            np.concatenate([self.violation, other.violation]),
+            np.concatenate([part.X for part in parts]),
+            np.concatenate([part.F for part in parts]),
+            np.concatenate([part.violation for part in parts]),
         )

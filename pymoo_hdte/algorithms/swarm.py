@@ -46,7 +46,8 @@ class ParticleSwarm(Swarm):
     n_max_gen : int, optional
         Number of generations G_max that schedules count on if the termination is not ``n_gen``.
         Without it, the limit of the termination on evaluations or generations serves (1000
-        generations with pymoo's default termination and 100 particles). It is fixed at ``setup``.
+        generations with pymoo's default termination and 100 particles), and 1000 with a warning if
+        there is none, as with a time. It is fixed at ``setup``.
     sampling : Sampling, array of shape (pop_size, n_var) or Population of that size, optional
         First positions, within the bounds and in the units of the problem; uniformly random by
         default.
@@ -57,8 +58,8 @@ class ParticleSwarm(Swarm):
     ------
     InvalidInput
         From the constructor for a size that is not allowed; from ``setup`` for a problem with
-        integer, binary or mixed variables, without finite bounds or with one objective, or if G_max
-        is not known; from ``ask`` for first positions or velocities that do not fit.
+        integer, binary or mixed variables, without finite bounds or with one objective; from
+        ``ask`` for first positions or velocities that do not fit.
     TypeError
         For an argument that does not exist.
 

@@ -1,6 +1,7 @@
 """The machine: data sheet, static error, equations of motion, steady state, time integration."""
 
 from pymoo_hdte.drive._effects import (
+    ChangedStaticError,
     CoupledInertia,
     DampingReference,
     DriveEffect,
@@ -34,6 +35,7 @@ __all__ = [
     "PARAMETERS",
     "PARAMETER_UNITS",
     "PRESETS",
+    "ChangedStaticError",
     "Coefficients",
     "CoupledInertia",
     "DampingReference",

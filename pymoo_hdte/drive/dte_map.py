@@ -112,7 +112,7 @@ def critical_speeds(model: DriveModel) -> list[tuple[float, float]]:
         return []
     coefficients = model.coefficients(model.nominal[None])
     orders = set(coefficients.error_orders.tolist())
-    orders |= {order for order, _ in coefficients.load_errors}
+    orders |= set(coefficients.further_orders)
     orders |= {law.order for law in coefficients.stiffness_variations}
     return [(order, mode.speed(order)) for order in sorted(orders)]
 

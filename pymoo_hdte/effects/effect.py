@@ -35,7 +35,7 @@ FORMS: Mapping[str, tuple[str, ...]] = {
     "power_of_load": ("input",),
     "curve_of_torsion": ("mesh",),
     "slipping_springs": ("mesh",),
-    "harmonics_of_torque": ("input",),
+    "harmonics_of_torque": ("input", "output", "load"),
     "harmonics_of_stiffness": ("mesh",),
     "harmonics_of_error": ("mesh",),
     "harmonics_of_scale": ("sensor",),
@@ -77,8 +77,9 @@ class Effect:
     law : type or None
         Dataclass of the law, whose fields are numbers in SI; None if it is no law at a port.
     ports : tuple of str
-        Ports of a drive where it may be, of ``"input"``, ``"output"``, ``"mesh"`` and ``"sensor"``;
-        empty for an effect of other mechanisms only. A law may be at any port of a mechanism.
+        Ports of a drive where it may be, of ``"input"``, ``"output"``, ``"mesh"``, ``"load"``
+        and ``"sensor"``; empty for an effect of other mechanisms only. A law may be at any port of
+        a mechanism.
     quantities : mapping of str to str
         For each number its quantity, of `fields.UNITS`, or a unit of SI; empty for a dimensionless
         one. Fields of the law that are not listed here are in no file.
@@ -125,6 +126,9 @@ class Effect:
         an encoder.
     behind_gear : bool
         Whether it is searched for at the load of a gear only, not at the shaft ahead of it.
+    nuisance_at : tuple of str
+        Ports of a drive where its seat is the bench, as that of a brake's ripple: there it is told
+        of the bench, and no answer to what is missing in the drive.
 
     Raises
     ------
@@ -163,6 +167,7 @@ class Effect:
     with_load: bool = False
     slows: bool = False
     behind_gear: bool = False
+    nuisance_at: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         if not re.fullmatch(r"[a-z]+(_[a-z]+)*", str(self.name)):
@@ -176,6 +181,8 @@ class Effect:
         if self.remembers and set(self.ports) - {"mesh"}:
             allowed = '("mesh",): solvers keep inner states of laws at the mesh of a drive only'
             raise InvalidInput(f"{self.name}.ports", self.ports, allowed)
+        for port in self.nuisance_at:
+            one_of(f"{self.name}.nuisance_at", port, self.ports)
         for number in self.quantities:
             one_of(f"{self.name}.quantities", number, [field.name for field in fields(self.kind)])
         check_sentence(f"{self.name}.sentence", self.sentence)
@@ -195,6 +202,11 @@ class Effect:
     def sought_at(self) -> tuple[str, ...]:
         """Ports of a drive where it is searched for."""
         return self.ports if self.sought is None else self.sought
+
+    @property
+    def is_of_bench(self) -> bool:
+        """Whether it is searched for as a nuisance only."""
+        return bool(self.sought_at) and set(self.sought_at) <= set(self.nuisance_at)
 
     @property
     def rattles(self) -> bool:

@@ -10,13 +10,13 @@ import numpy as np
 from pymoo_hdte.checks import real_number
 from pymoo_hdte.effects.effect import Effect, register
 from pymoo_hdte.effects.guess import Guess, Sizes
-from pymoo_hdte.effects.law import Aperiodic, Law, PortState, Response
+from pymoo_hdte.effects.law import Behaviour, Law, PortState, Response
 from pymoo_hdte.effects.portable import Formula, Lumped
-from pymoo_hdte.effects.unknowns import polar, starts_along_each, wave
+from pymoo_hdte.effects.unknowns import is_among, polar, starts_along_each, wave
 
 
 @dataclass(frozen=True)
-class Gravity(Aperiodic):
+class Gravity(Behaviour):
     """T = torque cos(angle + phase): the weight of an eccentric body that turns with the port.
 
     Attributes
@@ -34,10 +34,18 @@ class Gravity(Aperiodic):
         real_number("gravity.torque", self.torque)
         real_number("gravity.phase", self.phase)
 
+    @property
+    def orders(self) -> tuple[float, ...]:
+        """Once per turn."""
+        return (1.0,)
+
     def respond(self, state: PortState) -> Response:
         """Return torque and tangents."""
-        angle = state.position + self.phase
-        return Response(self.torque * np.cos(angle), -self.torque * np.sin(angle))
+        return Response(self.torque * np.cos(state.phase(1.0) + self.phase))
+
+    def with_input_locked(self) -> Law | None:
+        """Return None: the weight of what does not turn is a constant."""
+        return None
 
     @property
     def formula(self) -> Formula:
@@ -51,8 +59,11 @@ class Gravity(Aperiodic):
 
 
 def _weight(sizes: Sizes) -> list[Guess]:
-    """Guess a weight at the angle of a shaft, whose level position is not known."""
-    if not sizes.turns:
+    """Guess a weight at the angle of a shaft, whose level position is not known.
+
+    Behind a gear that is where a line is seen once in its turn.
+    """
+    if not sizes.turns or (sizes.slower != 1.0 and not is_among(sizes.seen, 1.0 / sizes.slower)):
         return []
 
     def build(values: Sequence[float]) -> tuple[Law, ...]:
@@ -66,10 +77,12 @@ register(
     Effect(
         "gravity",
         Gravity,
-        (),
+        ("load",),
         {"torque": "torque", "phase": "angle"},
         "Gravity at the {port}: a {force} of one sine per turn.",
         _weight,
+        forms="harmonics_of_torque",
         behind_gear=True,
+        nuisance_at=("load",),
     )
 )

@@ -54,8 +54,8 @@ class Sizes:
     driven : bool
         Whether the load opposes the motion in some records and drives it in others.
     swept : bool
-        Whether a slow load moves it to and fro at one place, as the output of a drive whose input
-        is locked.
+        Whether a slow load moves it to and fro at one place, as output and mesh of a drive whose
+        input is locked.
     temperature : float
         Mean of the records, K, where their temperatures spread enough to show what depends on them;
         0 elsewhere.
@@ -75,6 +75,13 @@ class Sizes:
         All orders at which records could show lines; further harmonics could not be determined.
     together : bool
         Whether the variation at all seen orders is searched for as one effect.
+    coupling : bool
+        Whether a coupling of a bench, which may be out of line, sits between the port and the
+        sensor of its torque.
+    highest : float
+        Order below which records show every significant line; per turn of the reference shaft.
+    braked : float
+        Largest load, N.m, of a port where a brake holds it; 0 elsewhere.
     between : bool
         Whether the port lies between two measured angles: its position is the torsion of a gear,
         and what is periodic there varies with the angle of its input.
@@ -101,6 +108,9 @@ class Sizes:
     clear: tuple[float, ...] = ()
     shown: tuple[float, ...] = ()
     together: bool = False
+    coupling: bool = False
+    highest: float = 0.0
+    braked: float = 0.0
     between: bool = False
 
     def family(self, order: float, most: int = 2) -> Family:

@@ -1,8 +1,9 @@
 """A law at a port: the motion on which it depends and the torque that it returns.
 
 A port is a place where two parts move relative to each other: ``input`` (wave generator against the
-housing), ``output`` (circular spline against the housing), ``mesh`` (the torsion d). A law returns
-the torque that opposes the motion; its effect depends on its port. The laws themselves are in
+housing), ``output`` (circular spline against the housing), ``mesh`` (the torsion d) and ``load``
+(what turns with the output beyond the output torque sensor). A law returns the torque that opposes
+the motion; its effect depends on its port. The laws themselves are in
 `friction`, `stiffness`, `hysteresis` and `linear`, each beside the `Effect` that defines everything
 else about it.
 """
@@ -22,7 +23,9 @@ from pymoo_hdte.effects.portable import Formula, Lumped
 
 Values = NDArray[np.float64]
 
-PORTS = ("input", "output", "mesh")
+PORTS = ("input", "output", "mesh", "load")
+OUTPUT_SHAFT = ("output", "load")
+"""Ports that turn with the output, so that orders there are cycles per output turn."""
 
 
 def _whole(values: Values) -> Values:
@@ -48,10 +51,12 @@ class PortState:
     load : ndarray or None
         Torque that the machine passes on through the port, N.m; None where a solver does not know
         it. At the input of a drive it is what the output delivers to its load, bearings and laws,
-        over the ratio, without what accelerates inertias; at its mesh the load; at a port of
-        another mechanism, what its ``load`` says.
+        over the ratio, without what accelerates inertias; at its mesh and at its load T_L; at a
+        port of another mechanism, what its ``load`` says.
     temperature : ndarray or float
         Temperature of the machine in kelvin; NaN where it is not known.
+    elapsed : ndarray or float
+        Time of the session, s; infinite where it is not known.
     recurs : bool
         Whether the second half of a ``path`` is the first again, and so on for ever: a law that
         forgets gradually has then come to repeat itself, too.
@@ -66,6 +71,7 @@ class PortState:
     load: Values | None = None
     temperature: Values | float = np.nan
     recurs: bool = False
+    elapsed: Values | float = np.inf
 
     def known_load(self, effect: str, place: str) -> Values:
         """Return the load, N.m, for an effect that depends on it and may be at a place of a drive.
@@ -221,7 +227,7 @@ class Behaviour:
     """Whether the force is a driving force, whatever the direction of motion."""
     loaded: ClassVar[bool] = False
     """Whether the force depends on the torque that the port passes on, `PortState.load`, which is
-    known at the input and the mesh of a drive and where a mechanism states it."""
+    known at the input, the mesh and the load of a drive and where a mechanism states it."""
     warmed: ClassVar[bool] = False
     """Whether the force depends on `PortState.temperature`, which only records of a drive have."""
     varies_stiffness: ClassVar[bool] = False

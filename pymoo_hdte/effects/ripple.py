@@ -1,7 +1,9 @@
-"""A torque ripple of the motor: a force at an order of its position that acts on the motion."""
+"""A torque ripple of motor or brake: a force at an order of the position, with the motion."""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -12,6 +14,7 @@ from pymoo_hdte.effects.effect import Effect, register
 from pymoo_hdte.effects.guess import Guess, Sizes, guess_of_lines
 from pymoo_hdte.effects.law import Periodic, PortState, Response
 from pymoo_hdte.effects.portable import Formula
+from pymoo_hdte.effects.unknowns import Family, is_among, is_whole
 
 
 @dataclass(frozen=True)
@@ -31,7 +34,7 @@ class PeriodicTorque(Periodic):
 
     @property
     def driving(self) -> complex:
-        """Its phasor, N.m: the torque is the motor's."""
+        """Its phasor, N.m: the torque is that of motor or brake."""
         return complex(self.amplitude * np.exp(1j * self.phase))
 
     @property
@@ -40,29 +43,225 @@ class PeriodicTorque(Periodic):
         return Formula("-amplitude * cos(order * angle + phase)")
 
 
+@dataclass(frozen=True)
+class CouplingTorque(PeriodicTorque):
+    """The torque of a coupling whose shafts do not align; no torque of a motor, so none it reads.
+
+    It acts between a shaft and the sensor of its torque.
+    """
+
+    drives: ClassVar[bool] = False
+
+    @property
+    def driving(self) -> complex:
+        """Zero: it is no torque of the motor."""
+        return 0.0
+
+
+@dataclass(frozen=True)
+class BrakeRipple(Periodic):
+    """A torque share load cos(order angle + phase) of a brake, in proportion to the load it holds.
+
+    With the sign of a load, it opposes the motion.
+
+    Attributes
+    ----------
+    order : float
+        Cycles per turn of the brake.
+    phase : float
+        rad.
+    share : float
+        Of the load, dimensionless.
+    """
+
+    drives: ClassVar[bool] = True
+    loaded: ClassVar[bool] = True
+    share: float
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        real_number("brake_ripple.share", self.share)
+
+    def respond(self, state: PortState) -> Response:
+        """Return torque and tangents.
+
+        Raises
+        ------
+        InvalidInput
+            Where the solver does not know the load.
+        """
+        load = state.known_load("brake_ripple", "load")
+        return Response(self.share * load * self.cosine(state))
+
+    @property
+    def formula(self) -> Formula:
+        """Its equations."""
+        return Formula("share * load * cos(order * angle + phase)")
+
+
 def torque_line(order: float, amplitude: float, phase: float) -> PeriodicTorque:
     """Return one line of a ripple, as `guess_of_lines` asks for it."""
     return PeriodicTorque(order, phase, amplitude)
 
 
 def _ripple(sizes: Sizes) -> list[Guess]:
-    return [
+    """Guess ripples at seen orders, behind a gear at those of two and more whole cycles in a turn.
+
+    There nothing of a shaft has other orders, and a ripple once a turn is the same as `Gravity`. A
+    coupling has both, and a brake its ripple in proportion to the load as well.
+    """
+    behind_gear, lines = sizes.slower != 1.0, sizes.lines
+    if behind_gear:
+        lines = [family for family in lines if sizes.turns and _is_of_shaft(family.orders[0])]
+    guesses = [
         guess_of_lines(
             family, "amplitude", sizes.largest, sizes.residual, torque_line, form=family.form
         )
-        for family in sizes.lines
+        for family in lines
     ]
+    if behind_gear and sizes.coupling:
+        guesses.append(_of_coupling(sizes, torque_line))
+    brakes = [sizes.family(1.0), *lines] if sizes.braked else []
+    return [*guesses, *(_of_brake(family, sizes) for family in brakes)]
+
+
+def _is_of_shaft(order: float) -> bool:
+    return order > 1.5 and is_whole(order)
+
+
+def _of_coupling(sizes: Sizes, line: Callable[[float, float, float], PeriodicTorque]) -> Guess:
+    """Guess what a misaligned coupling does once and twice in its turn."""
+    # Shafts that are apart make the first, those at an angle the second: either may be stronger.
+    family = Family(sizes.family(1.0).orders[:2], harmonic=False)
+    sentence = "A coupling at the {port} is out of line: a torque once and twice in its turn."
+    return guess_of_lines(
+        family,
+        "amplitude",
+        sizes.largest,
+        sizes.residual,
+        line,
+        form=family.form,
+        sentence=sentence,
+    )
+
+
+def _of_brake(family: Family, sizes: Sizes) -> Guess:
+    """Guess a ripple in proportion to the load, up to all of it."""
+
+    def line(order: float, share: float, phase: float) -> BrakeRipple:
+        return BrakeRipple(order, phase, share)
+
+    return guess_of_lines(
+        family,
+        "share",
+        1.0,
+        sizes.residual / sizes.braked,
+        line,
+        form="of the load",
+        sentence="The torque of the brake varies in its turn, order {order}, as the load does.",
+        quantities={"share": ""},
+    )
+
+
+def _cogging(sizes: Sizes) -> list[Guess]:
+    """Guess the cogging of a motor with poles and slots that show all lines that records could.
+
+    It has the least common multiple of both and, as neither are quite even, the number of poles
+    and that of slots as well (Hendershot and Miller, Design of Brushless Permanent-Magnet Machines,
+    2010).
+    """
+    if sizes.slower != 1.0 or not sizes.coupling:
+        return []
+    guesses = []
+    for slots, poles in _MOTORS:
+        orders = (float(poles), float(slots), float(math.lcm(poles, slots)))
+        lines = tuple(order for order in orders if order < sizes.highest)
+        if not lines or not all(is_among((*sizes.seen, *sizes.clear), order) for order in lines):
+            continue
+        family = Family(lines, harmonic=False)
+        guesses.append(
+            guess_of_lines(
+                family,
+                "amplitude",
+                sizes.largest,
+                sizes.residual,
+                torque_line,
+                form=family.form,
+                sentence=f"The motor cogs: {poles} poles, {slots} slots.",
+            )
+        )
+    return guesses
+
+
+_MOTORS = tuple(
+    (slots, poles)
+    for slots in range(6, 25, 3)
+    for poles in range(4, 29, 2)
+    if poles != slots and 2 * slots <= 3 * poles <= 4 * slots
+)
+"""Slots and poles of motors with concentrated windings, of which nearly all of the flux is used."""
+
+
+def _coupling(sizes: Sizes) -> list[Guess]:
+    """Guess a coupling ahead of a gear; behind it, it is a ripple like any other."""
+
+    def line(order: float, amplitude: float, phase: float) -> CouplingTorque:
+        return CouplingTorque(order, phase, amplitude)
+
+    return [_of_coupling(sizes, line)] if sizes.coupling and sizes.slower == 1.0 else []
 
 
 register(
     Effect(
         "torque_ripple",
         PeriodicTorque,
-        ("input",),
+        ("input", "output", "load"),
         {"order": "", "phase": "angle", "amplitude": "torque"},
         "A ripple at the {port}, order {order} of its position, that acts on the motion.",
         _ripple,
         exact=True,
         forms="harmonics_of_torque",
+        nuisance_at=("output", "load"),
+    )
+)
+
+
+register(
+    Effect(
+        "cogging",
+        PeriodicTorque,
+        ("input",),
+        {"order": "", "phase": "angle", "amplitude": "torque"},
+        "The motor cogs, order {order} of its position.",
+        _cogging,
+        exact=True,
+        nuisance_at=("input",),
+    )
+)
+
+
+register(
+    Effect(
+        "coupling_ripple",
+        CouplingTorque,
+        ("input",),
+        {"order": "", "phase": "angle", "amplitude": "torque"},
+        "A coupling at the {port} is out of line, order {order}.",
+        _coupling,
+        exact=True,
+        nuisance_at=("input",),
+    )
+)
+
+
+register(
+    Effect(
+        "brake_ripple",
+        BrakeRipple,
+        ("load",),
+        {"order": "", "phase": "angle", "share": ""},
+        "The torque of the brake varies in its turn, order {order}, as the load does.",
+        form_of="torque_ripple",
+        nuisance_at=("load",),
     )
 )

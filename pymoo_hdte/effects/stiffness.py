@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import ClassVar
 
@@ -307,31 +307,41 @@ class PeriodicClearance(Periodic):
         return _lost_in("max(half_width + variation * cos(order * angle + phase), 0)")
 
 
-def _uneven(sizes: Sizes) -> list[Guess]:
+def guess_of_clearance(
+    sizes: Sizes, orders: Sequence[float], law: Callable[[Sequence[float]], Law]
+) -> list[Guess]:
     """Guess a play that varies with the shaft, by half of its mean and more.
 
-    Its least width is an unknown of its own: a play with negative width would be clipped to zero,
-    where a search has no gradient.
+    There is one guess for each of the orders. ``law`` is made of order, phase, half-width,
+    variation and, where a sweep shows it, half-width where the input was locked. The least width is
+    an unknown of its own: a play with negative width would be clipped to zero, where a search has
+    no gradient.
     """
     if sizes.stiffness == 0.0 or sizes.between:
         return []
     travel, guesses = sizes.travel, []
     size, widest = 0.02 * travel, 0.5 * travel
-    for order in sizes.expected:
+    for order in orders:
 
         def build(values: Sequence[float], order: float = order) -> tuple[Law, ...]:
             variation, phase = polar(values[0], values[1])
-            return (PeriodicClearance(order, phase, values[2] + variation, variation, values[3]),)
+            return (law((order, phase, values[2] + variation, variation, *values[3:])),)
 
         unknowns = (
             *wave("variation", widest / 2.0, size),
             unknown("narrowest", 0.0, widest, size, linear=True),
-            unknown("locked", 0.0, 2.0 * widest, size, linear=True),
         )
-        shapes = ((1, 0, 1, 1), (0, 1, 1, 1), (0, 0, 1, 1), (0, 0, 1, 2))
+        shapes: list[tuple[int, ...]] = [(1, 0, 1), (0, 1, 1), (0, 0, 1)]
+        if sizes.swept:
+            unknowns = (*unknowns, unknown("locked", 0.0, 2.0 * widest, size, linear=True))
+            shapes = [(1, 0, 1, 1), (0, 1, 1, 1), (0, 0, 1, 1), (0, 0, 1, 2)]
         starts = [[size * factor for factor in shape] for shape in shapes]
         guesses.append(Guess(unknowns, starts, build, Family((order,))))
     return guesses
+
+
+def _uneven(sizes: Sizes) -> list[Guess]:
+    return guess_of_clearance(sizes, sizes.expected, lambda numbers: PeriodicClearance(*numbers))
 
 
 register(

@@ -208,6 +208,11 @@ def is_among(orders: Iterable[float], order: float) -> bool:
     return any(abs(order - known) < 1e-6 for known in orders)
 
 
+def is_whole(order: float) -> bool:
+    """Tell whether an order is a whole number of cycles, to within rounding."""
+    return abs(order - round(order)) < 1e-6
+
+
 def line_with_variance(
     cosine: float, sine: float, covariance: NDArray[np.float64]
 ) -> tuple[tuple[float, float], tuple[float, float]]:

@@ -42,6 +42,9 @@ class Record:
         What else was done to the signals, in sentences, which a report repeats.
     interpolated : bool
         Whether rows stand where none was measured, on a cubic spline, which takes ten in a period.
+    context : (int, int)
+        Rows at its beginning and at its end that belong to other records: smoothing leans on them,
+        and nothing is concluded from them.
 
     Raises
     ------
@@ -66,6 +69,7 @@ class Record:
     dropped: int
     remarks: tuple[str, ...]
     interpolated: bool
+    context: tuple[int, int]
 
     def __init__(
         self,
@@ -77,6 +81,7 @@ class Record:
         dropped: int = 0,
         remarks: Sequence[str] = (),
         interpolated: bool = False,
+        context: tuple[int, int] = (0, 0),
     ) -> None:
         if not isinstance(name, str):
             raise InvalidInput("name of a record", name, "a text")
@@ -113,6 +118,7 @@ class Record:
             ("dropped", whole_number(f"dropped of record {name}", dropped, at_least=0)),
             ("remarks", tuple(remarks)),
             ("interpolated", interpolated),
+            ("context", context),
             ("name", name),
             ("role", role),
             ("time", moments),
@@ -160,7 +166,12 @@ class Record:
             for name, channel in self.channels.items()
         }
         return Record(
-            self.name, self.role, self.time[0] + self.step * between, channels, self.noise
+            self.name,
+            self.role,
+            self.time[0] + self.step * between,
+            channels,
+            self.noise,
+            context=(factor * self.context[0], factor * self.context[1]),
         )
 
     def with_delays(self, delays: Mapping[str, float]) -> Record:
@@ -203,6 +214,7 @@ class Record:
             self.dropped,
             (*self.remarks, *told),
             self.interpolated,
+            (max(self.context[0] - early, 0), max(self.context[1] - late, 0)),
         )
 
     @property

@@ -89,4 +89,14 @@ def refined(record: Record, factor: int) -> Record:
         deviation = noise_between(record, name, jumps=True)
         if deviation > 0.0:
             noise[name] = deviation * factor**0.5
-    return Record(record.name, record.role, time, channels, noise, record.dropped, record.remarks)
+    before, after = (max(rows - _REACH, 0) * factor for rows in record.context)
+    return Record(
+        record.name,
+        record.role,
+        time,
+        channels,
+        noise,
+        record.dropped,
+        record.remarks,
+        context=(before, after),
+    )

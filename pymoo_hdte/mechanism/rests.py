@@ -21,7 +21,7 @@ from pymoo_hdte.mechanism.records import Record
 
 Values = NDArray[np.float64]
 
-_STILL = 6.0
+STILL = 6.0
 """Standard deviations of the noise of a speed, below which its sign tells nothing."""
 _FADES = 2.5
 """Periods of the cutoff before and after a rest in which smoothed forces still show it: a jump has
@@ -121,7 +121,7 @@ def moving_rows(
             share * smoothed_noise(record.noise_of(channel), record.step, cutoff)[1]
             for channel, share in channels.items()
         ]
-        return np.abs(values) < _STILL * np.hypot.reduce(noise)
+        return np.abs(values) < STILL * np.hypot.reduce(noise)
 
     standing = [still(values, {name: 1.0}) for name, values in speed.items()]
     rests = _long(np.logical_and.reduce(standing), period)

@@ -11,7 +11,8 @@ from pymoo_hdte.mechanism.mechanism import Mechanism
 from pymoo_hdte.mechanism.motion import RATE_SLACK, highest_share, margin_of, stride_of
 from pymoo_hdte.mechanism.records import Record
 
-_FEWEST_BINS = 8
+FEWEST_BINS = 8
+"""Least number of coefficients of a force balance."""
 
 
 def working_rows(mechanism: Mechanism, record: Record, cutoff: float) -> slice:
@@ -39,12 +40,13 @@ def working_rows(mechanism: Mechanism, record: Record, cutoff: float) -> slice:
             f"or a cutoff of at most {highest_share(record.step):.4g} Hz",
         )
     margin = margin_of(cutoff, record.step)
+    before, after = (max(margin, rows) for rows in record.context)
     stride = stride_of(highest_known(mechanism, record, cutoff), record.step)
     # Of a length without large prime factors: a transform of another one takes many times as long.
-    n = prev_fast_len(max(len(range(margin, len(record.time) - margin, stride)), 1), real=True)
-    rows = slice(margin, margin + (n - 1) * stride + 1, stride)
-    if np.count_nonzero(frequencies(n, record.step * stride) <= cutoff) < _FEWEST_BINS:
-        shortest = _FEWEST_BINS / (2.0 * cutoff) + 2.0 * margin * record.step
+    n = prev_fast_len(max(len(range(before, len(record.time) - after, stride)), 1), real=True)
+    rows = slice(before, before + (n - 1) * stride + 1, stride)
+    if np.count_nonzero(frequencies(n, record.step * stride) <= cutoff) < FEWEST_BINS:
+        shortest = FEWEST_BINS / (2.0 * cutoff) + (before + after) * record.step
         duration = float(record.time[-1] - record.time[0])
         raise InvalidInput(
             f"duration of record {record.name}",

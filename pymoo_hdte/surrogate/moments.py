@@ -93,11 +93,23 @@ class ExactMoments:
         )(cube)
         return mean, _square_root(variance)
 
+    def series(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return the coefficients of mean and variance in Chebyshev's polynomials.
+
+        Returns
+        -------
+        mean : ndarray, shape (k_1 + 1, ..., k_m + 1)
+            In the surrogate's output unit. Entry (a, b, ...) belongs to T_a(t_1) T_b(t_2) ..., t
+            being the design in the box scaled to -1 ... 1.
+        variance : ndarray, shape (2 k_1 + 1, ..., 2 k_m + 1)
+            In the square of that unit.
+        """
+        mean, variance = self._polynomial.coefficients
+        return mean[tuple(slice((size + 1) // 2) for size in mean.shape)], variance
+
     @cached_property
     def _many_points(self) -> ManyPoints:
-        mean, variance = self._polynomial.coefficients
-        # The mean is of half the degrees of the variance.
-        return ManyPoints([mean[tuple(slice((size + 1) // 2) for size in mean.shape)], variance])
+        return ManyPoints(list(self.series()))
 
     def gradient(self, designs: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return the gradients of mean and standard deviation, shape (n, m) each.

@@ -7,7 +7,12 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 
 ENOUGH_FOR_THREADS = 4096
-"""Least number of designs for which threads, and machine code made at its first use, pay."""
+"""Least number of designs for which threads pay."""
+ENOUGH_TO_COMPILE = 1000
+"""Least number of designs for which machine code that is made once an installation pays.
+
+It takes some seconds to make and a tenth of one to load; numpy takes up to 50 ms for as many.
+"""
 _SHARES = 4
 """Shares of the work for each core: one that is kept busy by others then holds up less."""
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +27,11 @@ class UntrustedSurrogate(InvalidInput):
         Size of what is wrong: an error as a share of the scatter, a mean in the response's unit.
     region : dict of str to tuple of float
         Interval of those variables, in their units, in which that is so; empty if all over the box.
+    problem : SimulatorProblem or None
+        The problem on the surrogate that is refused, which `robust_problem` returns where
+        ``accept="best"`` is asked for: its band is as wide as its errors are.
+    runs : Runs or None
+        All runs that were made, for ``data`` of another study.
 
     Examples
     --------
@@ -48,10 +54,12 @@ class UntrustedSurrogate(InvalidInput):
         where = f"so where {' and '.join(ends)}" if ends else "so all over the box"
         super().__init__(field, value, f"{allowed}; {where}")
         self.region = dict(region)
+        self.problem: Any = None
+        self.runs: Any = None
         self._arguments = (field, value, allowed, self.region)
 
     def __reduce__(self) -> tuple[object, ...]:
-        return type(self), self._arguments
+        return type(self), self._arguments, {"problem": self.problem, "runs": self.runs}
 
 
 def region_of(

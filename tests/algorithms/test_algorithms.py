@@ -462,9 +462,7 @@ def test_first_positions_are_checked(bad):
         run(AMPMOPSO(sampling=bad, **SMALL), Parabolas())
 
 
-def test_unlimited_run_needs_to_know_its_generations():
-    with pytest.raises(InvalidInput, match="termination"):
-        AMPMOPSO().setup(Parabolas(), termination=NoTermination())
+def test_a_run_may_go_on_beyond_its_schedules():
     swarm = AMPMOPSO(n_max_gen=40, **SMALL).setup(Parabolas(), termination=NoTermination(), seed=1)
     for _ in range(50):
         swarm.next()

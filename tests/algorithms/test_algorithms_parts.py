@@ -183,6 +183,7 @@ def test_number_of_generations(termination, n_max_gen, expected):
         TerminateIfAll(get_termination("time", 5), get_termination("n_gen", 40)),
     ],
 )
-def test_unknown_number_of_generations_is_an_error(termination):
-    with pytest.raises(InvalidInput, match=r"n_gen.*n_max_gen"):
-        generation_limit(termination, 100, None)
+def test_without_a_limit_schedules_count_on_what_pymoo_allows_by_default(termination):
+    with pytest.warns(UserWarning, match="n_max_gen"):
+        usual = generation_limit(termination, 100, None)
+    assert usual == get_termination("moo").criteria[-2].n_max_gen

@@ -15,7 +15,7 @@ from pymoo_hdte.algorithms.compact import size_for
 from pymoo_hdte.algorithms.horizon import evaluation_limit
 from pymoo_hdte.algorithms.moves import NeighbourDifference, nearest_in_objectives
 from pymoo_hdte.algorithms.points import Points
-from pymoo_hdte.algorithms.quadratic import ModelStep, Quadratic, fitted, lowest_within
+from pymoo_hdte.algorithms.quadratic import ModelStep, Quadratic, Span, fitted, lowest_within
 from pymoo_hdte.algorithms.spread import most_spread
 
 D = 5
@@ -218,6 +218,29 @@ def test_no_place_within_the_radius_is_lower(rng, signs):
         assert found <= values(inside).min() + 1e-3 * abs(found)
 
 
+def test_the_lowest_place_in_many_variables_lies_in_the_span_of_the_points(rng):
+    """Found in the coordinates of the span, it is as low as the one of the model as a whole."""
+    Z = 0.2 * rng.standard_normal((30, 200))
+    Z[0] = 0.0
+    F = np.column_stack([Z[:, 0] + 0.3 * Z[:, 1] ** 2, (Z[:, :5] ** 2).sum(axis=1) - 0.2 * Z[:, 2]])
+    weights = np.array([[0.5, 0.5], [0.0, 1.0], [1.0, 0.0]])
+    which, radii = np.array([0, 1, 2, 0]), np.array([0.1, 0.5, 1.0, 1.0])
+    whole = fitted(Z, F).weighted(weights)
+    span = Span.of(Z)
+    places = span.lowest(fitted(span.places, F).weighted(weights), which, radii)
+
+    def values(at):
+        slopes = np.einsum("ki,ki->k", whole.gradient[which], at)
+        return slopes + 0.5 * np.einsum("ki,kij,kj->k", at, whole.hessian[which], at)
+
+    np.testing.assert_allclose(
+        values(places), values(lowest_within(whole, which, radii)), rtol=1e-3
+    )
+    assert np.all(np.linalg.norm(places, axis=1) <= radii * (1.0 + 1e-6))
+    beside = places - np.linalg.lstsq(Z.T, places.T, rcond=None)[0].T @ Z
+    assert np.abs(beside).max() < 1e-9
+
+
 def test_model_steps_lead_to_the_front_of_quadratics(rng):
     """After one generation's step, positions satisfy the condition of a weighted optimum."""
     objectives, _, lowest = _quadratics(rng)
@@ -243,11 +266,12 @@ def test_model_steps_survive_what_cannot_be_fitted(rng):
 
 
 def test_model_steps_remember_no_more_than_they_say(rng):
-    move, one = ModelStep(), Points(rng.random((300, D)), rng.random((300, 2)), np.zeros(300))
-    for _ in range(20):
-        move.learn(one)
-        assert len(move._known[-move.MEMORY :]) <= move.MEMORY
-        assert len(move._known) <= 2 * move.MEMORY
+    move = ModelStep()
+    X = rng.random((6000, D))
+    for told in range(300, 6001, 300):
+        move.learn(Points(X[told - 300 : told], X[told - 300 : told, :2], np.zeros(300)))
+        np.testing.assert_array_equal(move._known().X, X[max(0, told - move.MEMORY) : told])
+        assert sum(map(len, move._told)) < move.MEMORY + 300
 
 
 def test_flat_models_give_no_step_without_a_warning():

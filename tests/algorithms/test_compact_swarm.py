@@ -63,8 +63,8 @@ def test_models_learn_every_evaluated_point_once_and_in_its_turn(kwargs):
     algorithm = run(problem, 300, **kwargs).algorithm
     (model,) = (move for move in algorithm.moves if isinstance(move, ModelStep))
     asked = np.vstack(algorithm.problem.asked)
-    np.testing.assert_array_equal(model._known.X, asked)
-    np.testing.assert_array_equal(model._known.F, Parabolas().evaluate(asked))
+    np.testing.assert_array_equal(model._known().X, asked)
+    np.testing.assert_array_equal(model._known().F, Parabolas().evaluate(asked))
 
 
 # --- result and archive ---------------------------------------------------------------------------
@@ -314,6 +314,40 @@ def test_a_copy_taken_anywhere_goes_on_alike(problem, clone):
         swarm.archive_all()
         swarm.next()
     assert digest(swarm.result()) == digest(uninterrupted)
+
+
+def test_a_history_holds_each_generation_as_it_was():
+    """Copies share arrays, but a callback may evaluate the particles of one of them again."""
+    swarm = CompactSwarm(save_history=True)
+    swarm.setup(get_problem("zdt1"), termination=("n_eval", 300), seed=3)
+    fronts = []
+    while swarm.has_next():
+        swarm.next()
+        fronts.append(swarm.opt.get("F"))
+    for particle in (*swarm.pop, *swarm.opt):
+        particle.F, particle.data["again"] = particle.F + 1.0, True
+    for then, front in zip(swarm.history, fronts, strict=True):
+        np.testing.assert_array_equal(then.opt.get("F"), front)
+        assert not any("again" in particle.data for particle in then.pop)
+    first, last = swarm.history[0].opt, swarm.history[-1].opt
+    assert first[0] is not last[0]
+    (model,) = (move for move in swarm.history[-2].moves if isinstance(move, ModelStep))
+    (later,) = (move for move in swarm.history[-1].moves if isinstance(move, ModelStep))
+    assert model._told[0].X is later._told[0].X
+
+
+def test_a_number_of_generations_is_told_in_evaluations():
+    with pytest.warns(UserWarning, match=r"20 generations .* 200 evaluations"):
+        result = minimize(Parabolas(), CompactSwarm(), ("n_gen", 20), seed=1)
+    assert result.algorithm.evaluator.n_eval == 200
+    # A size of one's own makes generations alike.
+    minimize(Parabolas(), CompactSwarm(10), ("n_gen", 3), seed=1)
+
+
+def test_many_objectives_are_not_claimed():
+    with pytest.warns(UserWarning, match="5"):
+        CompactSwarm().setup(get_problem("dtlz2", n_obj=5), termination=("n_eval", 100))
+    CompactSwarm().setup(get_problem("dtlz2", n_obj=4), termination=("n_eval", 100))
 
 
 def test_with_more_evaluations_the_swarm_goes_on_growing():

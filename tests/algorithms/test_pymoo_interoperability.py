@@ -37,7 +37,6 @@ from swarm_problems import digest
 
 import pymoo_hdte
 from pymoo_hdte.algorithms import AMPMOPSO, MOPSO, ElitistSwarm
-from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.decision import PREFERENCES, WeightedUtopia
 from pymoo_hdte.problems import RobustDTE, RobustDTETolerance, RobustToy
 
@@ -262,8 +261,9 @@ def test_a_run_ends_when_its_time_is_up():
     assert 0.2 <= result.exec_time <= time.monotonic() - before < 10.0
     assert result.algorithm.n_iter > 2
     # A swarm with schedules wants to know how long they are.
-    with pytest.raises(InvalidInput, match="n_max_gen"):
-        minimize(RobustToy(), AMPMOPSO(), ("time", "00:00:01"), seed=1)
+    with pytest.warns(UserWarning, match="n_max_gen"):
+        unknown = minimize(RobustToy(), AMPMOPSO(pop_size=20), ("time", 0.2), seed=1)
+    assert unknown.algorithm.generations == 1000
     scheduled = AMPMOPSO(pop_size=20, n_max_gen=30)
     assert minimize(RobustToy(), scheduled, ("time", 0.2), seed=1).exec_time >= 0.2
 

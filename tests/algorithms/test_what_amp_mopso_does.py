@@ -32,10 +32,10 @@ def test_the_adaptive_weight_hardly_adapts(problem, median):
     minimize(problem, AMPMOPSO(), ("n_gen", 100), seed=1, callback=noted)
     weights = np.array(noted.data["w"])
     assert np.median(weights) == pytest.approx(median, abs=0.006)
-    # Of the range .4 to .9 that it is given, it uses a sixth at most once the archive has filled,
-    # and mostly a fifteenth.
+    # Of the range .4 to .9 that it is given, it uses a sixth at most once the archive is filled and
+    # no longer replaced as a whole, which takes some ten generations, and mostly a fifteenth.
     assert weights.min() >= 0.4
-    assert weights[10:].max() < 0.48
+    assert weights[20:].max() < 0.48
     assert np.mean(weights < 0.433) > 0.8
 
 

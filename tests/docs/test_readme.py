@@ -4,9 +4,7 @@ import contextlib
 import io
 import json
 import re
-import runpy
 import shlex
-import sys
 from itertools import product
 from pathlib import Path
 
@@ -119,21 +117,6 @@ def test_the_command_looks_at_the_campaign_that_is_made():
     script, folder, arguments = campaign_to_try()
     compile((ROOT / script).read_text(), script, "exec")
     assert cli._parser().parse_args(arguments).campaign == Path(folder)
-
-
-@pytest.mark.nightly
-def test_the_campaign_to_try_holds_the_effect_that_is_named(tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(ROOT)
-    script, folder, arguments = campaign_to_try()
-    monkeypatch.setattr(sys, "argv", [script, str(tmp_path / folder)])
-    runpy.run_path(script, run_name="__main__")
-    monkeypatch.chdir(tmp_path)
-    assert cli.main(arguments) == 0
-    printed = capsys.readouterr().out
-    assert "hidden is HiddenEffect(name='torque_ripple'" in printed
-    assert "named: torque_ripple at the input" in printed
-    # The second harmonic of the hidden ripple lies above the orders that all records show.
-    assert "At order 7 and order 14 in all channels" in printed
 
 
 def test_the_readme_is_short():

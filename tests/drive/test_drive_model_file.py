@@ -160,6 +160,9 @@ def test_a_file_of_version_1_still_holds_its_model():
         "load_dependent_damping",
         "shear_thinning_drag",
         "bouc_wen_hysteresis",
+        "gravity",
+        "changed_static_error",
+        "uneven_load_sharing",
     }
     known = {one.name for one in drive_effects()}
     assert {effect.name for effect in loaded.effects} == known - later

@@ -14,6 +14,7 @@ from pymoo_hdte.drive import MeshStiffnessVariation, SpeedLoop, harmonic_balance
 from pymoo_hdte.drive._effects import LawAtPort
 from pymoo_hdte.drive._solve.time_domain import StartUp, equations_of_motion
 from pymoo_hdte.effects.friction import CoulombFriction, PeriodicFriction
+from pymoo_hdte.effects.gravity import Gravity
 from pymoo_hdte.effects.law import Periodic
 from pymoo_hdte.units import ARCSEC
 
@@ -73,6 +74,8 @@ def mirror(coefficients):
     """Return the drive seen in a mirror: every angle and torque has the other sign."""
 
     def mirrored(law):
+        if isinstance(law, Gravity):
+            return Gravity(-law.torque, -law.phase)
         if not isinstance(law, Periodic):
             return law
         turned = replace(law, phase=-law.phase)

@@ -27,6 +27,7 @@ from pymoo_hdte.effects.linear import (
     LinearSpring,
 )
 from pymoo_hdte.effects.load_friction import LoadFriction
+from pymoo_hdte.effects.load_sharing import UnevenSharing
 from pymoo_hdte.effects.ripple import PeriodicTorque
 from pymoo_hdte.effects.shear_thinning import ShearThinningDrag
 from pymoo_hdte.effects.stiffness import DeadZone, HardeningStiffness, PeriodicClearance, SoftWindup
@@ -65,6 +66,7 @@ LAWS = {
     "soft_windup": SoftWindup(0.3, 0.2, 4.0),
     "backlash": DeadZone(0.05),
     "clearance_variation": PeriodicClearance(2.0, 0.3, 0.05, 0.08),
+    "uneven_load_sharing": UnevenSharing(1.0, 0.3, 0.05, 0.08),
 }
 """One law of each effect that a mechanism may have."""
 INERTIA, STIFFNESS, DAMPING, GAIN = 0.5, 4.0, 3.0, 7.6

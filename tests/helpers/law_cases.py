@@ -16,8 +16,10 @@ from pymoo_hdte.effects.friction import (
     PeriodicFriction,
     StribeckFriction,
 )
+from pymoo_hdte.effects.gravity import Gravity
 from pymoo_hdte.effects.hysteresis import MaxwellSlip
 from pymoo_hdte.effects.load_friction import LoadFriction
+from pymoo_hdte.effects.load_sharing import UnevenSharing
 from pymoo_hdte.effects.ripple import PeriodicTorque
 from pymoo_hdte.effects.shear_thinning import ShearThinningDrag
 from pymoo_hdte.effects.stiffness import DeadZone, HardeningStiffness, PeriodicClearance, SoftWindup
@@ -49,6 +51,10 @@ EFFECTS = [
     KinematicReaction(),
     LoadDependentError(3.0, 2 * ARCSEC, 0.7, 40.0),
     LawAtPort("load_dependent_damping", "mesh", LoadDamping(4.0, 40.0)),
+    LawAtPort("uneven_load_sharing", "mesh", UnevenSharing(1.0, 0.3, 4 * ARCSEC, 3 * ARCSEC)),
+    # Few harmonics of an output turn are kept: they are as weak as integrators are to agree.
+    LawAtPort("torque_ripple", "load", PeriodicTorque(3.0, 1.0, 0.1)),
+    LawAtPort("gravity", "load", Gravity(0.1, 0.4)),
 ]
 
 

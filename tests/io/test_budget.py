@@ -7,7 +7,6 @@ import time
 import tracemalloc
 import zipfile
 import zlib
-from contextlib import suppress
 
 import numpy as np
 import pytest
@@ -229,29 +228,35 @@ def test_devices_and_pipes_are_refused_at_once(tmp_path, form, kind):
         read_toml(path)
 
 
-def test_the_time_grows_in_proportion_to_the_length(tmp_path, monkeypatch):
-    """Of one line, of blank lines and of a quote: each once took time by the square."""
+@pytest.mark.parametrize(
+    "part", [b"\n" * 12_000, b'"x",2\n' * 12_000, b'"' + b"1,2\n" * 6_000 + b'",2\n']
+)
+def test_each_character_is_looked_at_once_by_each_step(tmp_path, monkeypatch, part):
+    """Of blank lines, of quotes and of a cell of many blocks: each once took work by the square."""
     monkeypatch.setenv("PYMOO_HDTE_MOST_CHARACTERS", "1_000_000_000")
     monkeypatch.setenv("PYMOO_HDTE_MOST_BYTES", "1_000_000_000")
     monkeypatch.setenv("PYMOO_HDTE_MOST_ROWS", "1_000_000_000")
-    # As many blocks as a file four times as long has.
-    monkeypatch.setattr("pymoo_hdte._io.csv_table.BLOCK", text_lines.BLOCK // 4)
+    monkeypatch.setattr("pymoo_hdte._io.csv_table.BLOCK", 1_000)
+    path = tmp_path / "t.csv"
+    path.write_bytes(HEADER + part * 2 + b"0,1\n")
+    table, seen = read_text_table(path), dict.fromkeys(("_check", "_quotes", "_cut"), 0)
 
-    def seconds(content):
-        path = tmp_path / "t.csv"
-        path.write_bytes(HEADER + content)
-        best = np.inf
-        for _ in range(2):
-            begin = time.process_time()
-            with suppress(InvalidInput):
-                for _ in read_text_table(path).blocks():
-                    pass
-            best = min(best, time.process_time() - begin)
-        return best
+    def counted(name, texts_of):
+        original = getattr(text_lines, name)
 
-    for part in (b"\n" * 120_000, b'"x",2\n' * 120_000, b'"' + b"1,2\n" * 60_000):
-        few, many = seconds(part * 4), seconds(part * 16)
-        assert many < 10.0 * few
+        def step(*arguments):
+            seen[name] += sum(len(text) + 1 for text in texts_of(*arguments))
+            return original(*arguments)
+
+        monkeypatch.setattr(text_lines, name, step)
+
+    counted("_check", lambda _path, _kind, text, _done: [text])
+    counted("_quotes", lambda lines: lines)
+    counted("_cut", lambda _file, _numbers, rows, _mark: rows)
+    for _ in table.blocks():
+        pass
+    # A block counts one end of a line more than it has.
+    assert max(seen.values()) <= 1.01 * path.stat().st_size
 
 
 def test_a_quoted_cell_across_blocks_is_one_cell(tmp_path, monkeypatch):

@@ -3,14 +3,15 @@
 ``python -m experiments.studies.blind.benches --cases 3,11,24 --benches ideal,mild,lag,wander=4e-4``
 runs each case on each bench, goes on where it was interrupted, and prints alarms and lost names. A
 bench is ``ideal``, a level with all nuisances, or one group of them alone at the level ``mild``,
-whose leading number another one may replace.
+whose leading number another one may replace. With ``--protocol`` the cases are `protocol_cases`:
+forty pairs of the ideal bench and the level ``mild``, and five with each of `TOLD_AS` alone.
 """
 
 from __future__ import annotations
 
 import argparse
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -31,8 +32,36 @@ from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy._verdicts.drive import examine_drive
 
 IDEAL_BENCH = "ideal"
+TOLD = "told"
 ALONE = tuple(group for group in GROUPS if MILD.has(group))
 """Groups that the level has, each a bench of its own."""
+TOLD_AS: Mapping[str, frozenset[str]] = {
+    "input_coupling": frozenset({"coupling_ripple"}),
+    # On a load that hardly gives way both sides of its torque sensor are one place.
+    "output_coupling": frozenset({"torque_ripple", "gravity"}),
+    "mount": frozenset({"bench_resonance"}),
+    "brake_ripple": frozenset({"torque_ripple"}),
+    "gravity": frozenset({"torque_ripple", "gravity"}),
+    "warming": frozenset({"warming"}),
+    "drift": frozenset({"input_torque_drift", "output_torque_drift"}),
+    "zeros": frozenset({"new_input_torque_zero", "new_output_torque_zero"}),
+}
+"""Names of nuisances in a verdict, any of which tells a group. Others have no name there."""
+PAIRS, CLEAN, EACH = 40, 16, 5
+"""Paired campaigns, those of them that hide nothing, and campaigns with one nuisance alone."""
+SEEN = range(3001, 3421)
+"""Places in the list of cases that were looked at before."""
+
+
+def protocol_cases(cases: Sequence[Case]) -> list[int]:
+    """Return the places of the first `CLEAN` clean cases of `SEEN`, then of the first others."""
+    clean = [place for place in SEEN if cases[place - 1].truth == "none"]
+    others = [
+        place
+        for place in SEEN
+        if cases[place - 1].truth != "none" and cases[place - 1].kind != "unlisted"
+    ]
+    return [*clean[:CLEAN], *others[: PAIRS - CLEAN]]
 
 
 def nuisances_of(bench: str) -> Nuisances:
@@ -64,7 +93,10 @@ def nuisances_of(bench: str) -> Nuisances:
 
 @dataclass(frozen=True)
 class BenchJob:
-    """A case on a bench; its run has one row of `scoring.COLUMNS`, nan beyond the verdict."""
+    """A case on a bench; its run has one row of `scoring.COLUMNS`, nan beyond the verdict.
+
+    A further column has the groups of `TOLD_AS` that the verdict tells, as bits.
+    """
 
     case: Case
     bench: str
@@ -79,19 +111,23 @@ class BenchJob:
         hidden = hiding(self.case, nuisances_of(self.bench))
         campaign = campaign_of(hidden, hidden.session)
         begin = time.process_time()
-        scores = verdict_scores(self.case, examine_drive(campaign).verdict)
+        finding = examine_drive(campaign)
+        scores = verdict_scores(self.case, finding.verdict)
         seconds = time.process_time() - begin
-        row = [scores.get(column, np.nan) for column in COLUMNS]
-        return Run(COLUMNS, np.array([row]), seconds, (seconds,))
+        names = {nuisance.name for nuisance, _ in finding.nuisances}
+        bits = sum(1 << k for k, group in enumerate(TOLD_AS) if TOLD_AS[group] & names)
+        row = [*(scores.get(column, np.nan) for column in COLUMNS), float(bits)]
+        return Run((*COLUMNS, TOLD), np.array([row]), seconds, (seconds,))
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """A case on the ideal bench and on another."""
+    """A case on the ideal bench and on another, with the groups of nuisances told there."""
 
     bench: str
     ideal: Outcome
     real: Outcome
+    told: frozenset[str] = frozenset()
 
     @property
     def alarm(self) -> bool:
@@ -119,11 +155,15 @@ def compare(cases: Sequence[Case], benches: Sequence[str], campaign: Campaign) -
     names = list(dict.fromkeys((IDEAL_BENCH, *benches)))
     jobs = [BenchJob(case, bench) for bench in names for case in cases]
     runs = campaign.run(jobs, "benches")
-    outcomes = {
-        (job.case, job.bench): outcome(job.case, run) for job, run in zip(jobs, runs, strict=True)
-    }
+    outcomes, told = {}, {}
+    for job, run in zip(jobs, runs, strict=True):
+        outcomes[job.case, job.bench] = outcome(job.case, run)
+        bits = int(run.values[0, run.columns.index(TOLD)])
+        told[job.case, job.bench] = frozenset(
+            group for place, group in enumerate(TOLD_AS) if bits >> place & 1
+        )
     return [
-        Comparison(bench, outcomes[case, IDEAL_BENCH], outcomes[case, bench])
+        Comparison(bench, outcomes[case, IDEAL_BENCH], outcomes[case, bench], told[case, bench])
         for bench in names
         if bench != IDEAL_BENCH
         for case in cases
@@ -141,6 +181,9 @@ def text_of(comparisons: Sequence[Comparison]) -> str:
         lost = sum(len(comparison.lost) for comparison in chosen)
         named = sum(len(c.ideal.hidden & set(c.ideal.names)) for c in chosen)
         wrong = sum(len(comparison.wrong) for comparison in chosen)
+        if bench in TOLD_AS:
+            count = sum(bench in comparison.told for comparison in chosen)
+            lines.append(f"{bench}: told in {count} of {len(chosen)}")
         lines.append(
             f"{bench}: {alarms} alarms in {clean} clean campaigns, {lost} of {named} names lost, "
             f"{wrong} new wrong names\n"
@@ -154,15 +197,19 @@ def _line(comparison: Comparison) -> str:
         f"{each.status} {' '.join(each.chosen) if each.names else ''}".strip()
         for each in (comparison.ideal, comparison.real)
     ]
-    return f"  {comparison.bench:16} {case.kind} {case.number} ({case.truth}): {' -> '.join(said)}"
+    told = f" [{' '.join(sorted(comparison.told))}]" if comparison.told else ""
+    what = f"{case.kind} {case.number} ({case.truth})"
+    return f"  {comparison.bench:16} {what}: {' -> '.join(said)}{told}"
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; return the exit code."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
-    parser.add_argument(
-        "--cases", type=_numbers, required=True, help="places in the list of cases: 3,11,24 or 1-24"
+    chosen_cases = parser.add_mutually_exclusive_group(required=True)
+    chosen_cases.add_argument(
+        "--cases", type=_numbers, help="places in the list of cases: 3,11,24 or 1-24"
     )
+    chosen_cases.add_argument("--protocol", action="store_true", help="the forty pairs, and alone")
     parser.add_argument(
         "--benches",
         default="mild",
@@ -180,13 +227,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except InvalidInput as error:
         parser.error(str(error))
     cases = all_cases()
+    if options.protocol:
+        options.cases, benches = protocol_cases(cases), ["mild"]
     if not all(1 <= number <= len(cases) for number in options.cases):
         parser.error(f"--cases must lie between 1 and {len(cases)}")
     options.out.mkdir(parents=True, exist_ok=True)
     executor = make_executor(options.workers, None)
     with executor or nullcontext():
         chosen = [cases[number - 1] for number in options.cases]
-        print(text_of(compare(chosen, benches, Campaign(options.out, executor))))
+        campaign = Campaign(options.out, executor)
+        print(text_of(compare(chosen, benches, campaign)))
+        if options.protocol:
+            print(text_of(compare(chosen[:EACH], list(TOLD_AS), campaign)))
     return 0
 
 

@@ -20,8 +20,10 @@ from pymoo_hdte.drive._effects import ENCODER_LINE, drive_effects
 ERROR = "error"
 """Status of a case in which the workflow raised an exception."""
 STATUSES = (*VERDICTS, ERROR)
-_NEVER_HIDDEN = tuple(sorted({effect.name for effect in drive_effects()} - set(LISTED)))
-"""Effects of the library that no case hides under their names."""
+_NEVER_HIDDEN = tuple(
+    sorted({effect.name for effect in drive_effects() if not effect.is_of_bench} - set(LISTED))
+)
+"""Effects of the library that no case hides under their names; nuisances are no answers."""
 NAMES = (
     *LISTED,
     *_NEVER_HIDDEN,

@@ -2,7 +2,8 @@
 
 An answer is *right* if it is plain and names every effect that is known and none that is not;
 *partly right* if it names the main effect, but not all or more, or says itself that it is not all;
-*confidently wrong* if it is plain and does not name the main effect; *wrong* otherwise.
+*confidently wrong* if it is plain and does not name the main effect; *not found* if it says that
+nothing it knows is the cause; *wrong* otherwise.
 """
 
 from __future__ import annotations
@@ -14,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 RIGHT, PARTLY, WRONG, CONFIDENT = "right", "partly right", "wrong", "confidently wrong"
-UNKNOWN = "no answer known"
-FALLS_SHORT = (CONFIDENT, WRONG, PARTLY, UNKNOWN, RIGHT)
+NOT_FOUND, UNKNOWN = "not found", "no answer known"
+FALLS_SHORT = (CONFIDENT, WRONG, NOT_FOUND, PARTLY, UNKNOWN, RIGHT)
 """Judgements, what falls short first."""
 PLAIN = ("named", "adequate", "parameter")
 """Statuses of an answer without a reservation."""
@@ -38,13 +39,14 @@ class Friction:
 
 @dataclass(frozen=True)
 class KnownRig:
-    """A rig of ``data/<name>.toml`` and what is known of it.
+    """A measured rig and what is known of it.
 
     Attributes
     ----------
     name : str
     folder : str
-        With its records, in `experiments.studies.measured.rigs.MEASURED`.
+        With its records, in `experiments.studies.measured.rigs.SHARED`; described by a ``rig.toml``
+        there, or else by ``experiments/data/<name>.toml``.
     answer : str
         What is missing in the believed model, in words.
     source : str
@@ -52,7 +54,8 @@ class KnownRig:
     effects : tuple of frozenset of str
         Effects that are missing, the main one first; any of a set counts as that effect.
     also : frozenset of str
-        Further effects that are plausible there, and that no published answer excludes.
+        Further effects that are plausible there, and that no published answer excludes. Where no
+        effect is known, a plain verdict may name nothing else.
     values : dict of str to float
         Known values by effect and quantity, SI.
     friction : Friction or None
@@ -88,12 +91,15 @@ def judged(rig: KnownRig, status: str, names: Collection[str]) -> str:
         Effects that it names.
     """
     if not rig.effects:
-        return UNKNOWN
+        beyond = set(names) - rig.also if rig.also else set()
+        return CONFIDENT if beyond and status in PLAIN else UNKNOWN
     main = bool(rig.effects[0] & set(names))
     every = all(effect & set(names) for effect in rig.effects)
     known = frozenset().union(*rig.effects, rig.also)
     if main:
         return RIGHT if every and known >= set(names) and status in PLAIN else PARTLY
+    if status == "unlisted":
+        return NOT_FOUND
     return CONFIDENT if status in (*PLAIN, "class") else WRONG
 
 
@@ -103,11 +109,18 @@ def beside(rig: KnownRig, names: Collection[str]) -> list[str]:
     return [name for name in names if name in rig.also and name not in known]
 
 
+_RESISTANCE = frozenset(
+    {
+        *("stribeck_friction", "load_dependent_friction"),
+        *("shear_thinning_drag", "nonlinear_drag"),
+    }
+)
+_LEAST_SQUARES = "least squares of our own"
 _UR10E = "identification in shamilmamedov/dynamic_calibration, and least squares of our own"
 KNOWN_RIGS = (
     KnownRig(
         "ur10e_joint_1",
-        "ur10e",
+        "measured/ur10e",
         "dry friction; ripple twice per input turn (202 per joint turn)",
         _UR10E,
         (_DRY | {"nonlinear_drag"}, _RIPPLE),
@@ -119,7 +132,7 @@ KNOWN_RIGS = (
     ),
     KnownRig(
         "ur10e_joint_4",
-        "ur10e",
+        "measured/ur10e",
         "gravity 3.0 N.m; Coulomb friction 2.3 N.m; ripple twice per input turn",
         _UR10E,
         (frozenset({"gravity"}), _DRY, _RIPPLE),
@@ -129,7 +142,7 @@ KNOWN_RIGS = (
     ),
     KnownRig(
         "ur10e_joint_6",
-        "ur10e",
+        "measured/ur10e",
         "Coulomb friction 2.30 N.m; ripple four times per input turn (404 per joint turn)",
         _UR10E,
         (_DRY, _RIPPLE),
@@ -139,7 +152,7 @@ KNOWN_RIGS = (
     ),
     KnownRig(
         "tx40_joint_4",
-        "tx40_j4",
+        "measured/tx40_j4",
         "Coulomb friction 2.48 N.m beside viscous friction 1.11 N.m.s/rad",
         "thanhndv212/figaroh-examples",
         (_DRY,),
@@ -148,7 +161,7 @@ KNOWN_RIGS = (
     ),
     KnownRig(
         "silverbox",
-        "silverbox",
+        "measured/silverbox",
         "a cubic spring that hardens, 3.76 to 3.9",
         "band-limited least squares, R2 of the force .9997 on the arrow",
         (frozenset({"hardening_stiffness"}),),
@@ -158,7 +171,7 @@ KNOWN_RIGS = (
     ),
     KnownRig(
         "bouc_wen",
-        "bouc_wen",
+        "measured/bouc_wen",
         "hysteresis of Bouc and Wen",
         "simulated with the parameters of the public benchmark",
         (frozenset({"hysteresis"}),),
@@ -167,7 +180,7 @@ KNOWN_RIGS = (
     ),
     KnownRig(
         "emps",
-        "emps",
+        "measured/emps",
         "Coulomb friction 20.39 N; friction differs with the direction, or there is an offset",
         "Janot, Gautier, Brunot (2019)",
         (_DRY, frozenset({"direction_dependent_friction", "force_offset"})),
@@ -179,7 +192,7 @@ KNOWN_RIGS = (
     ),
     KnownRig(
         "kinova",
-        "kinova_gen3_j7",
+        "measured/kinova_gen3_j7",
         "dry friction with a Stribeck dip; ripple at 200 and 400 per joint turn",
         "means and lines of the ten runs; HBRS-SDP/joint-friction-model",
         (_DRY, _RIPPLE),
@@ -188,8 +201,117 @@ KNOWN_RIGS = (
     ),
     KnownRig(
         "lara8_joint_3",
-        "lara8_j3",
+        "measured/lara8_j3",
         "none published, of torques or torsion",
         "allwinlucious/MasterThesis",
+    ),
+    KnownRig(
+        "ur10e_joint_2",
+        "cases/real/gravity_hides_coulomb",
+        "gravity; Coulomb friction 16.3 N.m beside viscous friction 21 N.m.s/rad",
+        _UR10E,
+        (frozenset({"gravity"}), frozenset({"coulomb_friction"})),
+        _RESISTANCE | {"torque_ripple"},
+        values=(("coulomb_friction: level", 16.3), ("damping of bearing", 21.0)),
+    ),
+    KnownRig(
+        "kinova_joint_4",
+        "cases/real/vote_kills_gravity",
+        "gravity 9.3 N.m; dry friction",
+        _LEAST_SQUARES,
+        (frozenset({"gravity"}),),
+        _DRY | {"torque_ripple"},
+        values=(("gravity: torque", 9.3),),
+    ),
+    KnownRig(
+        "kinova_joint_5",
+        "cases/real/kinova5_missing_is_certain",
+        "dry friction 1.2 N.m",
+        _LEAST_SQUARES,
+        (_DRY,),
+        frozenset({"torque_ripple", "gravity"}),
+        values=(("coulomb_friction: level", 1.2),),
+    ),
+    KnownRig(
+        "tx40_joint_3",
+        "cases/real/named_though_gap_grows",
+        "Coulomb friction 6.1 N.m, while all joints move; the rest is not sure",
+        _LEAST_SQUARES,
+        (frozenset({"coulomb_friction"}),),
+        frozenset({"torque_ripple"}),
+        values=(("coulomb_friction: level", 6.1),),
+    ),
+    KnownRig(
+        "lara8_joint_6",
+        "cases/real/lara8_order_3131",
+        "an error of the gear twice per input turn (202 to 203 per joint turn), 12.7 arcsec",
+        _LEAST_SQUARES,
+        (_RIPPLE,),
+        order=202.5,
+        reach=0.5 + 2.0,
+    ),
+    KnownRig(
+        "dm4310",
+        "cases/real/rests_and_breakaway",
+        "Coulomb friction 0.119 N.m beside viscous friction 0.0073 N.m.s/rad",
+        "its authors, and least squares of our own within 3 %",
+        (_DRY | {"presliding_friction"},),
+        frozenset({"torque_ripple", "position_dependent_friction"}),
+        values=(
+            ("coulomb_friction: level", 0.119),
+            ("damping of bearing", 0.0073),
+            ("inertia of q", 0.0017),
+        ),
+    ),
+    KnownRig(
+        "ak80_pendulum",
+        "cases/real/delayed_torque",
+        "the torque column leads by 50 ms and is half of what it should be",
+        _LEAST_SQUARES,
+        also=frozenset({"gravity", "coulomb_friction"}),
+    ),
+    KnownRig(
+        "rack_and_pinion",
+        "cases/real/one_way_push",
+        "dry friction 18 N beside viscous friction 42 N.s/m; mass 25.3 kg",
+        "least squares of our own on the whole push",
+        (_DRY,),
+        values=(
+            ("coulomb_friction: level", 18.0),
+            ("damping of guide", 42.0),
+            ("inertia of x", 25.3),
+        ),
+    ),
+    KnownRig(
+        "filmed_pendulum",
+        "cases/real/pendulum_30Hz_refused",
+        "gravity 0.0492 N.m",
+        _LEAST_SQUARES,
+        (frozenset({"gravity"}),),
+        values=(("gravity: torque", 0.0492),),
+    ),
+    KnownRig(
+        "mr_damper",
+        "cases/real/damper_vote",
+        "hysteresis of a magneto-rheological damper",
+        _LEAST_SQUARES,
+        (frozenset({"hysteresis", "bouc_wen_hysteresis"}),),
+    ),
+    KnownRig(
+        "mr_damper_made",
+        "cases/real/inertia_zero",
+        "none: made up, with an inertia that may be zero",
+        "whoever made it",
+    ),
+    *(
+        KnownRig(
+            f"made_rest_{seconds}s",
+            f"cases/real/rest_hides_coulomb/rest_{seconds}s",
+            "Coulomb friction 0.12 N.m, in a motor that rests at first",
+            "whoever made it",
+            (frozenset({"coulomb_friction"}),),
+            values=(("coulomb_friction: level", 0.12),),
+        )
+        for seconds in (0, 10, 20)
     ),
 )

@@ -1,4 +1,4 @@
-"""What other tools make of a measured rig: sparse regression, NARMAX, and least squares.
+"""What other tools make of a measured rig: least squares, sparse regression, NARMAX, MuJoCo.
 
 They get the smoothed motion and the force of the workflow, train on its training records and
 predict its held-out ones. Each imports its package when it is called.
@@ -6,20 +6,20 @@ predict its held-out ones. Each imports its package when it is called.
 
 from __future__ import annotations
 
-import time
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from importlib.util import find_spec
+from importlib.metadata import PackageNotFoundError, version
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import dct
 
-from pymoo_hdte.discrepancy._answers.descriptive_model import descriptive_model
+from experiments.studies.measured import mujoco_study
+from pymoo_hdte.discrepancy._evidence.force_balances.evidence import measured_data
 from pymoo_hdte.discrepancy._verdicts.mechanism_finding import MechanismFinding
 from pymoo_hdte.mechanism import Record
-from pymoo_hdte.mechanism.motion import margin_of, motion_of, smooth
+from pymoo_hdte.mechanism.motion import motion_of, smooth
 
 Values = NDArray[np.float64]
 Part = tuple[float, float]
@@ -32,7 +32,6 @@ _VALIDATED = 0.3
 _AS_GOOD = 1.1
 """Ratio of mean squares up to which the model with fewer terms is taken."""
 _THRESHOLDS = np.geomspace(1e-3, 0.3, 12)
-_SIDES = "descriptive", "six_terms"
 _LAGS, _DEGREE, _TERMS = 2, 3, 12
 """Of NARMAX models: past samples, powers, and most terms."""
 
@@ -41,30 +40,33 @@ _LAGS, _DEGREE, _TERMS = 2, 3, 12
 class Terms:
     """Terms and force of records as coefficients of a cosine transform up to the cutoff.
 
-    Beyond it the motion is not known.
+    Beyond it the motion is not known. Rows at rest are left out as in the force balances.
 
     Attributes
     ----------
     columns : ndarray, shape (n, k)
     force, constant : ndarray, shape (n,)
         Of the inputs, and of a constant.
+    rows : int
+        Of the records that are not left out.
     """
 
     columns: Values
     force: Values
     constant: Values
+    rows: int
 
     @property
     def power(self) -> float:
         """Variance of the force about its mean over all records."""
-        samples = self.constant @ self.constant
-        about = self.force - self.constant * (self.constant @ self.force) / samples
-        return float(about @ about / samples)
+        mean = (self.constant @ self.force) / (self.constant @ self.constant)
+        about = self.force - self.constant * mean
+        return float(about @ about / self.rows)
 
     def explained(self, values: Values) -> float:
         """Return R2 of the force for values (k,) of the terms."""
         residual = self.force - self.columns @ values
-        return float(1.0 - residual @ residual / (self.constant @ self.constant) / self.power)
+        return float(1.0 - residual @ residual / self.rows / self.power)
 
 
 TERMS: dict[str, Callable[[Values, Values, Values], Values]] = {
@@ -99,76 +101,67 @@ class Answer:
 
     Attributes
     ----------
-    tool : str
     words : str
         Its terms with their values.
     names : frozenset of str or None
         Effects that its terms stand for; None where they have no such meaning.
     of_force, of_motion : float or None
         R2 of the held-out force, and of the position simulated in the windows of the workflow.
-    seconds : float
-        CPU time.
     """
 
-    tool: str
     words: str
-    names: frozenset[str] | None
-    of_force: float | None
-    of_motion: float | None
-    seconds: float
+    names: frozenset[str] | None = None
+    of_force: float | None = None
+    of_motion: float | None = None
 
 
-def answers(finding: MechanismFinding) -> list[Answer]:
-    """Return the answers of all tools on a mechanism of one coordinate and one input."""
-    given = []
-    for tool in (least_squares, six_terms, descriptive, sparse_regression, narmax):
-        began = time.process_time()
-        answer = tool(finding)
-        given.append(Answer(*answer, time.process_time() - began))
-    return given
+@dataclass(frozen=True)
+class Tool:
+    """A tool that is set beside the workflow.
+
+    Attributes
+    ----------
+    name : str
+    package : str
+        That it needs; empty for what is there anyway.
+    ask : callable
+        From a finding on a mechanism of one coordinate and one input to an `Answer`.
+    rigs : tuple of str
+        That it is asked about; all where empty.
+    """
+
+    name: str
+    package: str
+    ask: Callable[[MechanismFinding], Answer]
+    rigs: tuple[str, ...] = ()
+
+    @property
+    def version(self) -> str | None:
+        """Version of the package; None where it is not installed."""
+        if not self.package:
+            return ""
+        if self.package == "mujoco" and not mujoco_study.installed():
+            return None
+        try:
+            return version(self.package)
+        except PackageNotFoundError:
+            return None
 
 
-Said = tuple[str, str, frozenset[str] | None, float | None, float | None]
-
-
-def least_squares(finding: MechanismFinding) -> Said:
+def least_squares(finding: MechanismFinding) -> Answer:
     """Fit inertia, viscous and Coulomb friction, an offset, and the spring that is believed."""
     names = ["a", "v", "sign v", "1", *(["q"] if _sprung(finding) else [])]
-    return _least_squares("least squares", finding, names)
-
-
-def six_terms(finding: MechanismFinding) -> Said:
-    """Fit what a practitioner fits to a joint: the same, and gravity whether it can pull or not."""
-    return _least_squares("six terms", finding, ["a", "v", "sign v", "sin q", "cos q", "1"])
-
-
-def _least_squares(tool: str, finding: MechanismFinding, names: Sequence[str]) -> Said:
     train, test = terms_of(finding, "train", names), terms_of(finding, "held_out", names)
     values: Values = np.linalg.lstsq(train.columns, train.force, rcond=None)[0].astype(float)
-    named = frozenset({"coulomb_friction"})
-    return tool, _in_words(names, values), named, test.explained(values), None
+    return Answer(_in_words(names, values), frozenset({"coulomb_friction"}), test.explained(values))
 
 
-def descriptive(finding: MechanismFinding) -> Said:
-    """Describe the records by all terms that predict better, whatever the verdict (our own)."""
-    model = descriptive_model("", finding)
-    (coordinate,) = finding.mechanism.coordinates
-    errors = [one for one in model.held_out if one.quantity == coordinate]
-    words = " + ".join(dict.fromkeys(effect.name for effect, _ in model.effects)).replace("_", " ")
-    # Both were judged on the same rows, which are fewer than those of the other tools.
-    ours, theirs = (sum(getattr(one, name) ** 2 for one in errors) for name in _SIDES)
-    of_force = 1.0 - ours / theirs * (1.0 - (six_terms(finding)[3] or 0.0))
-    return "descriptive model", words or "nothing", None, of_force, None
-
-
-def sparse_regression(finding: MechanismFinding) -> Said:
+def sparse_regression(finding: MechanismFinding) -> Answer:
     """Name terms by sequentially thresholded least squares of the force (pysindy).
 
     Brunton, Proctor, Kutz, PNAS 113, 2016. The threshold is the largest that predicts the last part
     of the training records within a tenth of the best one.
     """
-    if find_spec("pysindy") is None:
-        return "pysindy", "not installed", None, None, None
     from pysindy.optimizers import STLSQ
 
     turning = any(finding.mechanism.turns(port) for port in finding.mechanism.ports)
@@ -193,24 +186,22 @@ def sparse_regression(finding: MechanismFinding) -> Said:
     believed = {"linear_stiffness"} if _sprung(finding) else set()
     named = frozenset(MEANS[name] for name in selected if name in MEANS) - believed
     of_force = terms_of(finding, "held_out", names).explained(values)
-    return "pysindy", _in_words(names, values), named, of_force, None
+    return Answer(_in_words(names, values), named, of_force)
 
 
-def narmax(finding: MechanismFinding) -> Said:
+def narmax(finding: MechanismFinding) -> Answer:
     """Fit a polynomial NARMAX model by forward regression of orthogonal terms (sysidentpy).
 
     Of the position from its past and that of the input, at the samples of our simulation, and
     simulated in the same windows. Its terms stand for no effect.
     """
-    if find_spec("sysidentpy") is None:
-        return "FROLS", "not installed", None, None, None
     from sysidentpy.basis_function import Polynomial
     from sysidentpy.model_structure_selection import FROLS
     from sysidentpy.parameter_estimation import LeastSquares
 
     simulated = {record.record: record for record in finding.simulated}
     if not simulated:
-        return "FROLS", "nothing held out", None, None, None
+        return Answer("nothing held out")
     stride = next(iter(simulated.values())).rows[0].step
     (train, *_), held = (
         [record for record in finding.records if record.role == role]
@@ -245,7 +236,28 @@ def narmax(finding: MechanismFinding) -> Said:
                 predicted.append(model.predict(X=x, y=y)[_LAGS:, 0])
     of_motion = _determination(np.concatenate(measured), np.concatenate(predicted))
     words = f"{len(model.final_model)} terms of a NARMAX model of degree {_DEGREE}"
-    return "FROLS", words, None, None, of_motion
+    return Answer(words, of_motion=of_motion)
+
+
+def mujoco_sysid(finding: MechanismFinding) -> Answer:
+    """Fit what a joint of MuJoCo has to the motion in windows, and a delay (mujoco.sysid)."""
+    study = mujoco_study.JointStudy(finding)
+    values = study.fitted()
+    names = ["a", "v", "sign v"]
+    fitted = np.array([values[name] for name in ("armature", "damping", "frictionloss")])
+    words = f"{_in_words(names, fitted)}, {1000.0 * values['delay']:.3g} ms of delay"
+    of_force = terms_of(finding, "held_out", names).explained(fitted)
+    of_motion = _determination(*study.held_out(values))
+    return Answer(words, frozenset({"coulomb_friction"}), of_force, of_motion)
+
+
+SYSID = "mujoco.sysid"
+TOOLS = (
+    Tool("least squares", "", least_squares),
+    Tool("pysindy", "pysindy", sparse_regression),
+    Tool("FROLS", "sysidentpy", narmax),
+    Tool(SYSID, "mujoco", mujoco_sysid, ("ur10e_joint_1", "tx40_joint_4", "dm4310")),
+)
 
 
 def _sprung(finding: MechanismFinding) -> bool:
@@ -279,21 +291,30 @@ def terms_of(
     part : (float, float)
         First and last share of each record.
     """
-    values = []
+    values, count = [], 0
     for record in finding.records:
         if record.role != role:
             continue
         force, angle = _signals(finding, record)
-        margin, n = margin_of(finding.cutoff, record.step), len(force)
-        first, last = (margin + int(share * (n - 2 * margin)) for share in part)
-        motion, rows = motion_of(angle, record.step, finding.cutoff), slice(first, last)
+        weight = _weight(finding, record)
+        moving = np.flatnonzero(weight)
+        first, last = (int(share * len(moving)) for share in part)
+        motion, rows = motion_of(angle, record.step, finding.cutoff), moving[first:last]
         state = motion.position[rows], motion.speed[rows], motion.acceleration[rows]
         columns = [TERMS[name](*state) for name in names]
-        signals = np.column_stack([*columns, force[rows], np.ones(last - first)])
-        bins = int(2.0 * (last - first) * record.step * finding.cutoff) + 1
-        values.append(dct(signals, type=2, norm="ortho", axis=0)[:bins])
+        signals = np.column_stack([*columns, force[rows], np.ones(len(rows))])
+        bins = int(2.0 * len(rows) * record.step * finding.cutoff) + 1
+        values.append(dct(weight[rows, None] * signals, type=2, norm="ortho", axis=0)[:bins])
+        count += len(rows)
     together = np.concatenate(values)
-    return Terms(together[:, :-2], together[:, -2], together[:, -1])
+    return Terms(together[:, :-2], together[:, -2], together[:, -1], count)
+
+
+def _weight(finding: MechanismFinding, record: Record) -> Values:
+    """Return the weight of each row of a record in its force balance, shape (n,)."""
+    data = measured_data(finding.mechanism, [record], finding.cutoff, finding.data.known)
+    (balance,) = data.spectra
+    return np.interp(record.time, balance.time, balance.moving.weight, left=0.0, right=0.0)
 
 
 def _determination(measured: Values, predicted: Values) -> float:

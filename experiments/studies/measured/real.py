@@ -1,7 +1,8 @@
 """Rigs that others measured: verdicts beside known answers and beside other tools.
 
 Without ``--full`` the tables are the committed ones, ``experiments/data/real*.csv``; with it the
-records in ``../shared/measured`` are analysed and the files left in the results folder.
+records in ``../shared`` are analysed and the files left in the results folder. Rows of a tool that
+is not installed then stay as they are stored.
 """
 
 from __future__ import annotations
@@ -17,33 +18,37 @@ from tqdm import tqdm
 
 from experiments.comparing.statistics import rate
 from experiments.runner.committed import (
-    committed_file,
-    read_rows,
     stored_outcome,
     table_with_origin,
 )
+from experiments.runner.machine import processor
 from experiments.runner.registry import Context
-from experiments.runner.result import Cell, Column, Finding, Result, Table, scored
+from experiments.runner.result import Column, Finding, Result, Table, scored
 from experiments.runner.store import TIMES, write_atomically
 from experiments.runner.texts import paragraphs
+from experiments.studies.measured.first_verdict import LOGS, FirstVerdict, first_verdict
 from experiments.studies.measured.known_answers import (
     CONFIDENT,
     FALLS_SHORT,
     KNOWN_RIGS,
+    PARTLY,
+    PLAIN,
     RIGHT,
     UNKNOWN,
     KnownRig,
     beside,
     judged,
 )
-from experiments.studies.measured.other_tools import Answer, answers, terms_of
+from experiments.studies.measured.other_tools import SYSID, TOOLS, Answer, terms_of
 from experiments.studies.measured.rigs import MEASURED, Study, fitted_values, study
+from experiments.studies.measured.stored_rows import Rows, cells, headings, stored
 from pymoo_hdte._io.csv_table import csv_text
+from pymoo_hdte.discrepancy._answers.descriptive_model import descriptive_model
 from pymoo_hdte.discrepancy._report.mechanism_values import effects
 from pymoo_hdte.discrepancy._report.torsion import torsion_document
 from pymoo_hdte.discrepancy._verdicts.validation_mechanism import validate_mechanism
 from pymoo_hdte.effects.effect import place_of
-from pymoo_hdte.mechanism.motion import SmoothedMotion
+from pymoo_hdte.mechanism.motion import SmoothedMotion, motion_of
 from pymoo_hdte.mechanism.port_motion import law_force
 from pymoo_hdte.units import ARCSEC
 
@@ -63,28 +68,20 @@ def named(machine: Study) -> list[dict[str, Any]]:
 def torsion_errors(machine: Study) -> list[str]:
     """Return the errors of the held-out torsion before and after, arcseconds, where measured."""
     errors = machine.joint.errors if machine.joint else ()
-    sizes = ([getattr(error, side) for error in errors] for side in ("before", "after"))
-    return [f"{np.sqrt(np.mean(np.square(each))) / ARCSEC:.4g}" if each else "" for each in sizes]
+    sizes = (_rms([getattr(error, side) for error in errors]) for side in ("before", "after"))
+    return [number_in_words(size / ARCSEC) for size in sizes]
+
+
+def number_in_words(value: float | None) -> str:
+    """Return a number as a text, an empty one where there is none."""
+    return "" if value is None or np.isnan(value) else f"{value:.4g}"
 
 
 def share_in_words(value: float | None) -> str:
     """Return an R2 as a text; far below zero, digits mean nothing."""
-    return "" if value is None else f"{value:.5f}" if value > LOST else f"below {LOST:g}"
-
-
-def determinations(machine: Study) -> list[str]:
-    """Return R2 of force and simulated position by the accepted model, held out."""
-    finding, errors = (
-        machine.finding,
-        [error for error in machine.errors if error.kind == "balance"],
-    )
-    (name,) = finding.mechanism.coordinates
-    errors = [error for error in errors if error.quantity == name]
-    if not errors:
-        return ["", ""]
-    power = terms_of(finding, "held_out", ()).power
-    residual = float(np.mean([error.after**2 for error in errors]))
-    return [f"{1.0 - residual / power:.5f}", f"{explained(machine)[1]:.5f}"]
+    if value is None or np.isnan(value):
+        return ""
+    return f"{value:.5f}" if value > LOST else f"below {LOST:g}"
 
 
 def explained(machine: Study) -> tuple[float, float]:
@@ -103,15 +100,39 @@ def explained(machine: Study) -> tuple[float, float]:
     return before, after
 
 
-def pooled(machine: Study, kind: str, side: int) -> float | None:
-    """Return the root mean square over the held-out records, of the first coordinate."""
-    name = machine.finding.mechanism.coordinates[0]
-    sizes = [
-        (error.before, error.after)[side]
-        for error in machine.errors
-        if (error.kind, error.quantity) == (kind, name)
-    ]
-    return float(np.sqrt(np.mean(np.square(sizes)))) if sizes else None
+MODELS = "base", "accepted", "six_terms", "descriptive"
+"""Models whose held-out balances are compared, in the order of `HELD_OUT`."""
+
+
+def balances(machine: Study) -> dict[str, float]:
+    """Return what each of `MODELS` leaves of the held-out balance of the coordinate, rms."""
+    (name,) = machine.finding.mechanism.coordinates
+    model = descriptive_model("", machine.finding)
+    errors = [error for error in model.held_out if error.quantity == name]
+    return {name: _rms([getattr(error, name) for error in errors]) for name in MODELS}
+
+
+def reached(machine: Study) -> float:
+    """Return the share of held-out rows at positions and speeds that fitted rows span, in %."""
+    finding = machine.finding
+    (name,) = finding.mechanism.coordinates
+    states: dict[str, list[Values]] = {"train": [], "held_out": []}
+    for record in finding.records:
+        motion = motion_of(record.channels[name], record.step, finding.cutoff)
+        states[record.role].append(np.array([motion.position, motion.speed]))
+    fitted, rows = (np.concatenate(states[role], axis=1) for role in ("train", "held_out"))
+    within = (fitted.min(axis=1) <= rows.T) & (fitted.max(axis=1) >= rows.T)
+    return 100.0 * float(np.mean(within.all(axis=1)))
+
+
+def simulated(machine: Study) -> list[float]:
+    """Return the error of all simulated positions of the held-out records, before and after."""
+    errors = [error for error in machine.errors if error.kind == "simulation"]
+    return [_rms([getattr(error, side) for error in errors]) for side in ("before", "after")]
+
+
+def _rms(sizes: Sequence[float]) -> float:
+    return float(np.sqrt(np.mean(np.square(sizes)))) if sizes else float("nan")
 
 
 def farthest(rig: KnownRig, machine: Study) -> float | None:
@@ -173,26 +194,46 @@ def nearest_order(rig: KnownRig, machine: Study) -> float | None:
     return min(orders, key=lambda order: abs(order - known), default=None)
 
 
-SECONDS = (Column("rig"), Column("tool"), Column("CPU time", "s", 3))
+SECONDS = (Column("rig"), Column("tool"), Column("time", "s", 3), Column("processor"))
 LONGEST = 20.0
 """s of CPU that reading, verdict and proof of a rig may take."""
-TOOL = "workflow"
+FIRST = 120.0
+"""s that a first verdict may take a newcomer."""
+TOOL, INIT, COMMAND = "workflow", "init", "init and discrepancy"
 
 
 def timed_study(rig: KnownRig) -> tuple[Study | None, list[str]]:
     """Return the study of a rig, None where its records are not there, and a row of `SECONDS`."""
     began = time.process_time()
     machine = study(rig.name, rig.folder)
-    return machine, [rig.name, TOOL, f"{time.process_time() - began:.3g}"]
+    return machine, _seconds(rig.name, TOOL, time.process_time() - began)
 
 
-def cpu_table(rows: Sequence[Sequence[str]]) -> Table:
-    """Return rows of `SECONDS`, and whether the workflow is fast enough on every rig."""
+def _seconds(rig: str, tool: str, taken: float) -> list[str]:
+    return [rig, tool, f"{taken:.3g}", processor()]
+
+
+def seconds_table(rows: Sequence[Sequence[str]], logs: Rows) -> Table:
+    """Return rows of `SECONDS`, and whether the workflow is fast enough on every rig and log."""
     seconds, rig = max((float(row[2]), row[0]) for row in rows if row[1] == TOOL)
     words = f"The workflow takes at most {seconds:.3g} s of CPU ({rig}); {LONGEST:g} are allowed."
-    cells = tuple((name, tool, float(taken)) for name, tool, taken in rows)
-    finding = Finding(seconds <= LONGEST, words, check=True)
-    return Table("seconds", "CPU time", SECONDS, cells, findings=(finding,), wall_times=True)
+    findings = [Finding(seconds <= LONGEST, words, check=True)]
+    waited = max((float(row[2]) for row in rows if row[1] == COMMAND), default=None)
+    if waited is not None:
+        most = max(int(row[FIRST_VERDICTS.index(CORRECTED)]) for row in logs)
+        words = (
+            f"From log to first verdict a newcomer waits at most {waited:.3g} s for the commands, "
+            f"the start of Python included, and corrects at most {most} lines of the draft; "
+            f"{FIRST:g} s are allowed for both. How long people take for these lines was not "
+            "measured."
+        )
+        findings.append(Finding(waited <= FIRST, words, check=True))
+    cells = tuple((rig, tool, float(taken), where) for rig, tool, taken, where in rows)
+    note = "CPU time; of init and discrepancy the time that passes until both commands have ended."
+    title = "How long it takes"
+    return Table(
+        "seconds", title, SECONDS, cells, note, tuple(findings), folded=True, wall_times=True
+    )
 
 
 NAME = "real"
@@ -202,32 +243,53 @@ VERDICTS = (
     Column("status"),
     Column("found"),
     Column("known answer"),
-    Column("farthest from a known value", "%", 3),
+    Column("off", "%", 3, "known values"),
     Column("ripple", "per turn", 5, "order"),
     Column("known", "per turn", 5, "order"),
-    Column("before", digits=3, group="held-out force, rms"),
-    Column("after", digits=3, group="held-out force, rms"),
-    Column("before", digits=3, group="held-out position, rms"),
-    Column("after", digits=3, group="held-out position, rms"),
+)
+RATIO = Column("ratio", digits=4, group="force balance, rms")
+"""Of the descriptive model and six terms."""
+HELD_OUT = (
+    *(
+        Column(name, digits=3, group="force balance, rms")
+        for name in ("before", "verdict", "six terms", "descriptive")
+    ),
+    RATIO,
+    Column("reached", "%", 3),
+    Column("before", digits=3, group="simulated position, rms"),
+    Column("verdict", digits=3, group="simulated position, rms"),
     Column("window", "s", 3, "simulation"),
     Column("R2 before", digits=5, group="simulation"),
-    Column("R2 after", digits=5, group="simulation"),
-    Column("before", "arcsec", 3, "held-out torsion"),
-    Column("after", "arcsec", 3, "held-out torsion"),
+    Column("R2 verdict", digits=5, group="simulation"),
+    Column("before", "arcsec", 3, "torsion"),
+    Column("verdict", "arcsec", 3, "torsion"),
 )
-TOOLS = (
+STORED = (*VERDICTS, *HELD_OUT)
+"""Columns of ``real.csv``."""
+TOOL_COLUMNS = (
     Column("rig"),
     Column("tool"),
+    Column("version"),
     Column("judged"),
     Column("says"),
-    Column("held-out force", digits=5, group="R2"),
-    Column("held-out position, simulated", digits=5, group="R2"),
+    Column("force", digits=5, group="R2, held out"),
+    Column("simulated position", digits=5, group="R2, held out"),
 )
+CORRECTED = Column("corrected", digits=1, group="lines of the draft")
+FIRST_VERDICTS = (
+    Column("rig"),
+    Column("maker"),
+    Column("marked", digits=1, group="lines of the draft"),
+    CORRECTED,
+    Column("corrections"),
+    Column("judged"),
+    Column("found"),
+)
+MOST = 1.05
+"""Held-out balance of the descriptive model in units of that of six terms, at most."""
 ARROW = "silverbox"
 """Rig whose held-out record is simulated without a break as well, which takes a minute."""
-SETTING, NOTE, TOOLS_NOTE = paragraphs("real")
-
-Rows = list[list[str]]
+SETTING, NOTE, BALANCE_NOTE, TOOLS_NOTE, FIRST_NOTE = paragraphs("real")
 
 
 @dataclass(frozen=True)
@@ -244,9 +306,11 @@ def run(context: Context) -> Result:
     if context.full and not MEASURED.is_dir():
         sentence = f"Skipped: there are no measurements in {MEASURED}."
         return Result("Verdicts on real machines", context.command(NAME), sentence)
-    tables = _examined(context) if context.full else _committed()
-    order = [FALLS_SHORT.index(row[1]) for row in tables[0]]
-    rows = [row for _, row in sorted(zip(order, tables[0], strict=True), key=lambda pair: pair[0])]
+    outcome, tools, logs, seconds = _examined(context) if context.full else _committed()
+    rows = sorted(outcome, key=lambda row: FALLS_SHORT.index(row[1]))
+    verdicts = [row[: len(VERDICTS)] for row in rows]
+    by_ratio = sorted(outcome, key=lambda row: -_ratio(row))
+    held_out = [[row[0], *row[len(VERDICTS) :]] for row in by_ratio]
     return Result(
         title="Verdicts on real machines",
         command=context.command(NAME),
@@ -257,15 +321,67 @@ def run(context: Context) -> Result:
                 "verdicts",
                 "Verdicts",
                 VERDICTS,
-                _cells(rows),
+                cells(verdicts),
                 note=NOTE,
                 findings=_findings(rows),
             ),
+            Table(
+                "held_out",
+                "Prediction of what was not fitted",
+                (Column("rig"), *HELD_OUT),
+                cells(held_out),
+                note=BALANCE_NOTE,
+                findings=(_no_worse_than_six_terms(by_ratio),),
+            ),
+            Table(
+                "first", "From a log to a first verdict", FIRST_VERDICTS, cells(logs), FIRST_NOTE
+            ),
             allowances_table(),
-            Table("tools", "Beside other tools", TOOLS, _cells(tables[1]), note=TOOLS_NOTE),
-            cpu_table(tables[2]),
+            Table(
+                "tools",
+                "Beside other tools",
+                TOOL_COLUMNS,
+                cells(tools),
+                note=TOOLS_NOTE,
+                findings=_no_worse_than_mujoco(tools),
+                folded=True,
+            ),
+            seconds_table(seconds, logs),
         ),
     )
+
+
+def _ratio(row: Sequence[str]) -> float:
+    return float(row[STORED.index(RATIO)])
+
+
+def _no_worse_than_six_terms(rows: Sequence[Sequence[str]]) -> Finding:
+    """Return whether the descriptive model keeps up with least squares everywhere."""
+    worse = [f"{row[0]} ({_ratio(row):.3g} times)" for row in rows if _ratio(row) > MOST]
+    better = sum(_ratio(row) < 1.0 for row in rows)
+    words = (
+        f"The descriptive model leaves less of the held-out balance than least squares with six "
+        f"terms on {better} of {len(rows)} sets; more than {MOST:g} times as much on: "
+        f"{_listed(worse)}."
+    )
+    return Finding(not worse, words, check=True)
+
+
+def _no_worse_than_mujoco(rows: Sequence[Sequence[str]]) -> tuple[Finding, ...]:
+    """Return whether our models are simulated as well as those of mujoco.sysid."""
+    theirs = {row[0]: row[-1] for row in rows if row[1] == SYSID}
+    ours = {row[0]: row[-1] for row in reversed(rows) if row[1] == TOOL}
+    if not theirs:
+        return ()
+    told = [f"{rig} {ours[rig]} and {share}" for rig, share in theirs.items()]
+    agrees = all(_number(ours[rig]) >= _number(share) for rig, share in theirs.items())
+    words = f"R2 of the simulated held-out position by us and by {SYSID}: {', '.join(told)}."
+    return (Finding(agrees, words, check=True),)
+
+
+def _number(share: str) -> float:
+    """Return an R2, minus infinity where it is lost."""
+    return float(share) if share and not share.startswith("below") else -np.inf
 
 
 def examined(rig: KnownRig, tools: bool = True, whole: bool = True) -> Examined | None:
@@ -275,7 +391,7 @@ def examined(rig: KnownRig, tools: bool = True, whole: bool = True) -> Examined 
     ----------
     rig : KnownRig
     tools : bool
-        Whether other tools are asked, too.
+        Whether other tools that are installed are asked, too.
     whole : bool
         Whether the held-out record of `ARROW` is simulated without a break, too.
     """
@@ -283,10 +399,20 @@ def examined(rig: KnownRig, tools: bool = True, whole: bool = True) -> Examined 
     if machine is None:
         return None
     seconds = [taken]
-    rows = [[TOOL, *_said(rig, machine), *determinations(machine)]]
-    for answer in answers(machine.finding) if tools else []:
-        rows.append(_tool_row(rig, answer))
-        seconds.append([rig.name, answer.tool, f"{answer.seconds:.3g}"])
+    left, of_force = balances(machine), None
+    # What swings freely has no force that a tool could predict.
+    forced = bool(machine.finding.mechanism.inputs)
+    if forced:
+        of_force = 1.0 - left["accepted"] ** 2 / terms_of(machine.finding, "held_out", ()).power
+    shares = [share_in_words(share) for share in (of_force, explained(machine)[1])]
+    rows = [[TOOL, "", *_said(rig, machine), *shares]]
+    for tool in TOOLS if tools and forced else ():
+        if tool.version is None or (tool.rigs and rig.name not in tool.rigs):
+            continue
+        began = time.process_time()
+        answer = tool.ask(machine.finding)
+        seconds.append(_seconds(rig.name, tool.name, time.process_time() - began))
+        rows.append([tool.name, tool.version, *_tool_cells(rig, answer)])
     if whole and rig.name == ARROW:
         error = next(
             error
@@ -295,26 +421,25 @@ def examined(rig: KnownRig, tools: bool = True, whole: bool = True) -> Examined 
         )
         assert error.determination is not None
         words = f"the same, {error.record} without a break"
-        rows.append([TOOL, "", words, "", f"{error.determination[1]:.5f}"])
-    return Examined(verdict_row(rig, machine), [[rig.name, *row] for row in rows], seconds)
+        rows.append([TOOL, "", "", words, "", f"{error.determination[1]:.5f}"])
+    return Examined(verdict_row(rig, machine, left), [[rig.name, *row] for row in rows], seconds)
 
 
-def verdict_row(rig: KnownRig, machine: Study) -> list[str]:
-    """Return what is said of a rig, in the order of `VERDICTS`."""
+def verdict_row(rig: KnownRig, machine: Study, left: dict[str, float]) -> list[str]:
+    """Return what is said of a rig, and the `balances`, in the order of `STORED`."""
     judgement, words = _said(rig, machine)
-    off, order = farthest(rig, machine), nearest_order(rig, machine)
-    rms = [pooled(machine, kind, side) for kind in ("balance", "simulation") for side in (0, 1)]
     extents = [error.extent.length for error in machine.errors if error.extent is not None]
-    numbers = [off, order, rig.order, *rms, min(extents, default=None)]
-    shown = ["" if number is None else f"{number:.4g}" for number in numbers]
-    by_simulation = [f"{value:.5f}" for value in explained(machine)]
+    numbers = [farthest(rig, machine), nearest_order(rig, machine), rig.order, *left.values()]
+    numbers += [left["descriptive"] / left["six_terms"], reached(machine), *simulated(machine)]
+    shown = [number_in_words(number) for number in (*numbers, min(extents, default=None))]
+    by_simulation = [share_in_words(value) for value in explained(machine)]
     words_of = rig.name, judgement, machine.status, words, rig.answer
     return [*words_of, *shown, *by_simulation, *torsion_errors(machine)]
 
 
 def shortfalls(rows: Sequence[Sequence[str]]) -> tuple[str, ...]:
     """Return what falls short, in sentences, the worst first."""
-    short = [row for row in rows if row[1] not in (RIGHT, UNKNOWN)]
+    short = [row for row in rows if row[1] not in (RIGHT, PARTLY, UNKNOWN)]
     sentences = [f"{row[0]} ({row[1]}): {row[3]}, where {row[4]} is known" for row in short]
     right = [row for row in rows if row[1] == RIGHT]
     known = sum(row[1] != UNKNOWN for row in rows)
@@ -374,7 +499,7 @@ def _in_one_sentence(rows: Sequence[Sequence[str]]) -> str:
     helped = sum(row[1] == RIGHT and bool(_beside(row)) for row in rows)
     counted += f" ({helped} of them with a further effect that is allowed)" if helped else ""
     none = "" if counts[0][1] else f", none {CONFIDENT}"
-    return f"Verdicts on {len(rows)} machines that others measured: {counted}{none}."
+    return f"Verdicts on {len(rows)} sets of records: {counted}{none}."
 
 
 def _said(rig: KnownRig, machine: Study) -> tuple[str, str]:
@@ -386,10 +511,9 @@ def _said(rig: KnownRig, machine: Study) -> tuple[str, str]:
     return judged(rig, machine.status, names), words
 
 
-def _tool_row(rig: KnownRig, answer: Answer) -> list[str]:
+def _tool_cells(rig: KnownRig, answer: Answer) -> list[str]:
     judgement = "" if answer.names is None else judged(rig, "named", answer.names)
     return [
-        answer.tool,
         judgement,
         answer.words,
         *(share_in_words(share) for share in (answer.of_force, answer.of_motion)),
@@ -400,8 +524,14 @@ def _findings(rows: Sequence[Sequence[str]]) -> tuple[Finding, ...]:
     """Return whether the demands on real machines hold."""
     confident = [row[0] for row in rows if row[1] == CONFIDENT]
     wrong = rate(len(confident), sum(row[1] != UNKNOWN for row in rows))
-    named = [row for row in rows if row[2] in ("named", "class", "partial") and row[10] and row[11]]
-    worse = [row[0] for row in named if not float(row[11]) < float(row[10])]
+    before, after = (len(VERDICTS) + HELD_OUT.index(column) for column in HELD_OUT[6:8])
+    named = [row for row in rows if row[2] in ("named", "class", "partial")]
+    worse = [
+        row[0]
+        for row in named
+        if row[before] and row[after] and not float(row[after]) < float(row[before])
+    ]
+    sure = [row[0] for row in rows if row[1] == PARTLY and row[2] in PLAIN]
     missed = [
         rig.name
         for rig in KNOWN_RIGS
@@ -413,7 +543,13 @@ def _findings(rows: Sequence[Sequence[str]]) -> tuple[Finding, ...]:
         scored(
             wrong.state(0.0, at_least=False),
             f"Confidently wrong: {_listed(confident)}, a share of {wrong.in_words} of {wrong.n} "
-            "machines with a known answer; none should be.",
+            "sets with a known answer; none should be.",
+        ),
+        Finding(
+            not sure,
+            "Named without a caveat, though not all is named that is known, or more: "
+            f"{_listed(sure)}.",
+            check=True,
         ),
         Finding(
             not worse,
@@ -433,43 +569,47 @@ def _listed(names: Sequence[str]) -> str:
     return ", ".join(names) or "none"
 
 
-def _examined(context: Context) -> tuple[Rows, Rows, Rows]:
+def _examined(context: Context) -> tuple[Rows, Rows, Rows, Rows]:
     verdicts, tools, seconds = Rows(), Rows(), Rows()
+    absent = {tool.name for tool in TOOLS if tool.version is None}
+    _, stored_tools, _, stored_seconds = _committed()
     for rig in tqdm(KNOWN_RIGS, desc="real rigs", leave=False):
         found = examined(rig)
         if found is not None:
             verdicts.append(found.verdict)
             tools += found.tools
             seconds += found.seconds
+            for rows, before in ((tools, stored_tools), (seconds, stored_seconds)):
+                rows += [row for row in before if row[0] == rig.name and row[1] in absent]
+    first = [outcome for log in LOGS if (outcome := first_verdict(log)) is not None]
+    logs = [first_row(outcome) for outcome in first]
+    for outcome in first:
+        seconds.append(_seconds(outcome.log.rig, INIT, outcome.seconds[0]))
+        seconds.append(_seconds(outcome.log.rig, COMMAND, sum(outcome.seconds)))
     files = (
-        (context.out / NAME / f"{NAME}.csv", VERDICTS, verdicts),
-        (context.out / NAME / f"{NAME}_tools.csv", TOOLS, tools),
+        (context.out / NAME / f"{NAME}.csv", STORED, verdicts),
+        (context.out / NAME / f"{NAME}_tools.csv", TOOL_COLUMNS, tools),
+        (context.out / NAME / f"{NAME}_first.csv", FIRST_VERDICTS, logs),
     )
     for path, columns, rows in files:
-        write_atomically(path, table_with_origin(_headings(columns), rows).encode())
+        write_atomically(path, table_with_origin(headings(columns), rows).encode())
     path = context.out / TIMES / NAME / f"{NAME}_seconds.csv"
-    write_atomically(path, csv_text(_headings(SECONDS), seconds).encode())
-    return verdicts, tools, seconds
+    write_atomically(path, csv_text(headings(SECONDS), seconds).encode())
+    return verdicts, tools, logs, seconds
 
 
-def _headings(columns: Sequence[Column]) -> list[str]:
-    return [column.heading for column in columns]
+def first_row(outcome: FirstVerdict) -> list[str]:
+    """Return what comes of a log, in the order of `FIRST_VERDICTS`."""
+    log = outcome.log
+    corrections = "; ".join(right.partition("  #")[0] for _, right in log.corrections)
+    found = " + ".join(outcome.names).replace("_", " ") or "nothing"
+    counts = str(outcome.marks), str(len(log.corrections))
+    words = corrections or "none", outcome.judgement, found
+    return [log.rig, log.maker, *counts, *words]
 
 
-def _committed() -> tuple[Rows, Rows, Rows]:
-    first, second, third = (
-        [list(row.values()) for row in read_rows(committed_file(f"{NAME}{part}.csv", NAME))]
-        for part in ("", "_tools", "_seconds")
+def _committed() -> tuple[Rows, Rows, Rows, Rows]:
+    verdicts, tools, logs, seconds = (
+        stored(f"{NAME}{part}.csv", NAME) for part in ("", "_tools", "_first", "_seconds")
     )
-    return first, second, third
-
-
-def _cells(rows: Rows) -> tuple[tuple[Cell, ...], ...]:
-    return tuple(tuple(_cell(text) for text in row) for row in rows)
-
-
-def _cell(text: str) -> Cell:
-    try:
-        return float(text) if text else None
-    except ValueError:
-        return text
+    return verdicts, tools, logs, seconds

@@ -18,8 +18,9 @@ from pymoo_hdte.discrepancy._verdicts.validation_mechanism import (
     validate_mechanism,
 )
 
-MEASURED = Path(__file__).resolve().parents[4] / "shared" / "measured"
+SHARED = Path(__file__).resolve().parents[4] / "shared"
 """Folder of the measurements, which are not part of the project."""
+MEASURED = SHARED / "measured"
 RIGS = DATA
 
 
@@ -48,10 +49,15 @@ class Study:
 
 
 def study(name: str, folder: str) -> Study | None:
-    """Return the study of ``data/<name>.toml`` on records in a folder of `MEASURED`, if there."""
-    if not (MEASURED / folder).is_dir():
+    """Return the study of records in a folder of `SHARED`, if it is there.
+
+    They are described by the ``rig.toml`` beside them, or else by ``data/<name>.toml``.
+    """
+    records = SHARED / folder
+    if not records.is_dir():
         return None
-    rig = read_rig(RIGS / f"{name}.toml", MEASURED / folder)
+    beside = records / "rig.toml"
+    rig = read_rig(beside if beside.is_file() else RIGS / f"{name}.toml", records)
     believed = rig.records, rig.cutoff, rig.effects
     joint = joint_of(rig.mechanism)
     if joint is None:

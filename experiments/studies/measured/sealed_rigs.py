@@ -9,21 +9,19 @@ from __future__ import annotations
 import time
 from collections import Counter
 from collections.abc import Sequence
-from pathlib import Path
 
 from tqdm import tqdm
 
 from experiments.runner.committed import (
-    committed_file,
-    read_rows,
     stored_outcome,
     table_with_origin,
 )
 from experiments.runner.registry import Context
-from experiments.runner.result import Cell, Column, Result, Table
+from experiments.runner.result import Column, Result, Table
 from experiments.runner.store import TIMES, write_atomically
 from experiments.runner.texts import paragraphs
 from experiments.studies.measured.rigs import MEASURED
+from experiments.studies.measured.stored_rows import Rows, cells, headings, stored
 from pymoo_hdte._io.csv_table import csv_text
 from pymoo_hdte.discrepancy import DriveAnalysis, analyse, read_campaign
 from pymoo_hdte.discrepancy._report.words import in_a_sentence
@@ -53,7 +51,6 @@ SECONDS = (
 )
 SETTING, NOTE = paragraphs("sealed_rigs")
 
-Rows = list[list[str]]
 _WORDS = 5
 """Columns of a verdict before its numbers."""
 
@@ -66,17 +63,15 @@ def run(context: Context) -> Result:
     if context.full:
         rows, seconds = _analysed(context)
     else:
-        rows, seconds = (_committed(name) for name in (f"{NAME}.csv", f"{NAME}_seconds.csv"))
+        rows, seconds = (stored(name, NAME) for name in (f"{NAME}.csv", f"{NAME}_seconds.csv"))
     return Result(
         title="Verdicts on sealed rigs",
         command=context.command(NAME),
         answer=_counted([row[1] for row in rows]),
         paragraphs=(*stored_outcome(context, NAME), SETTING),
         tables=(
-            Table(
-                "verdicts", "What is said to be missing", COLUMNS, _cells(_told(rows)), note=NOTE
-            ),
-            Table("seconds", "CPU time", SECONDS, _cells(seconds), wall_times=True),
+            Table("verdicts", "What is said to be missing", COLUMNS, cells(_told(rows)), note=NOTE),
+            Table("seconds", "CPU time", SECONDS, cells(seconds), wall_times=True),
         ),
     )
 
@@ -120,19 +115,10 @@ def _analysed(context: Context) -> tuple[Rows, Rows]:
         rows.append(verdict_row(folder.name, analysis))
         ended = time.process_time()
         seconds.append([folder.name, f"{judged - started:.3g}", f"{ended - judged:.3g}"])
-    texts = table_with_origin(_headings(COLUMNS), rows), csv_text(_headings(SECONDS), seconds)
+    texts = table_with_origin(headings(COLUMNS), rows), csv_text(headings(SECONDS), seconds)
     write_atomically(context.out / NAME / f"{NAME}.csv", texts[0].encode())
     write_atomically(context.out / TIMES / NAME / f"{NAME}_seconds.csv", texts[1].encode())
     return rows, seconds
-
-
-def _headings(columns: Sequence[Column]) -> list[str]:
-    return [column.heading for column in columns]
-
-
-def _committed(name: str) -> Rows:
-    path: Path = committed_file(name, NAME)
-    return [list(row.values()) for row in read_rows(path)]
 
 
 def _told(rows: Rows) -> Rows:
@@ -146,14 +132,3 @@ def _told(rows: Rows) -> Rows:
         ]
         for row in rows
     ]
-
-
-def _cells(rows: Rows) -> tuple[tuple[Cell, ...], ...]:
-    return tuple(tuple(_cell(text) for text in row) for row in rows)
-
-
-def _cell(text: str) -> Cell:
-    try:
-        return float(text)
-    except ValueError:
-        return text

@@ -30,7 +30,7 @@ from pymoo_hdte.discrepancy._evidence.force_balances.unexplained import (
     root_mean_square,
 )
 from pymoo_hdte.discrepancy._records.rig_model import MechanismModel
-from pymoo_hdte.discrepancy._records.rig_records import SPLIT
+from pymoo_hdte.discrepancy._records.split import SPLIT
 from pymoo_hdte.discrepancy._selection.candidate import Candidate
 from pymoo_hdte.discrepancy._verdicts.mechanism_finding import MechanismFinding
 from pymoo_hdte.discrepancy._verdicts.mechanism_simulation import laws_of
@@ -61,6 +61,8 @@ _RIDGE = 1e-10
 """Keeps apart columns that are the same in some blocks, in units of their own power."""
 _SUBSAMPLE = 1000
 """Rows of a motion on which it is seen whether a law is linear in an unknown."""
+_SLOWER = (1.0, 0.1, 0.01)
+"""Shares of the speeds of a record at which no effect may be larger than all of its forces."""
 _SAME = 1e-6
 """Share up to which two forces count as equal."""
 _SIMPLE = ("viscous_friction", "coulomb_friction", "force_offset", "gravity", "linear_stiffness")
@@ -243,6 +245,7 @@ class _Design:
             for one, value in zip(accepted.parameters, accepted.values, strict=True)
             if one.name in self.quantities
         }
+        self._peaks: dict[str, float] = {}
         self._columns: list[list[Values]] = []
         """By column and record, shape (n_balances, n_bins)."""
         self.terms: list[_Term] = []
@@ -366,11 +369,49 @@ class _Design:
                     ]
                 )
             )
-        lower = [candidate.parameters[place].lower for place in free]
-        bounds = np.where(np.array(lower) == 0.0, 0.0, -np.inf)
+        lower = np.array([candidate.parameters[place].lower for place in free])
+        above = np.array([self._most(candidate, shape, place) for place in free])
+        below = np.where(lower == 0.0, 0.0, -above)
         fixed = self._add(constant) if moving else None
-        above = np.full(len(bounds), np.inf)
-        return _Term(tuple(columns), bounds, above, fixed, "", candidate, shape, tuple(free), bends)
+        return _Term(tuple(columns), below, above, fixed, "", candidate, shape, tuple(free), bends)
+
+    def _most(self, candidate: Candidate, shape: tuple[float, ...], place: int) -> float:
+        """Return the size at which an effect alone is as large as all forces that were measured.
+
+        At any speed up to those of the records: a friction that had faded wherever the port moved
+        would otherwise take any size.
+        """
+        scale = candidate.parameters[place].scale
+        values = [scale if i == place else value for i, value in enumerate(shape)]
+        forces = [
+            self._small_force(laws_of(candidate.build(one)), 1.0, slower)
+            for slower in _SLOWER
+            for one in (values, list(shape))
+        ]
+        unit = max(
+            float(np.abs(with_it - without).max(initial=0.0))
+            for with_it, without in zip(forces[::2], forces[1::2], strict=True)
+        )
+        return abs(scale) * self._peak(candidate.port) / unit if unit > 0.0 else np.inf
+
+    def _peak(self, port: str) -> float:
+        """Return the sum of the largest forces of all that acts at the coordinates of a port."""
+        if port not in self._peaks:
+            of_port = self.mechanism.port(port)
+            shares = {port: 1.0} if of_port.read else of_port.motion
+            largest = 0.0
+            for balance in self.spectra:
+                for name, share in shares.items():
+                    row = self.names.index(name)
+                    forces = [balance.constant[row]]
+                    forces += [
+                        self.nominal.get(quantity, 0.0) * balance.terms[row, place]
+                        for place, quantity in enumerate(self.quantities)
+                    ]
+                    peaks = (np.abs(balance.in_time(force)).max() for force in forces)
+                    largest = max(largest, sum(map(float, peaks)) / abs(share) if share else 0.0)
+            self._peaks[port] = largest
+        return self._peaks[port]
 
     def _linear(self, candidate: Candidate, start: tuple[float, ...]) -> tuple[list[int], bool]:
         """Return the unknowns in which a force is linear, and whether it depends on a stiffness."""
@@ -395,13 +436,14 @@ class _Design:
                 together = joint
         return free, bool(np.abs(force({}, 1.1) - here).max() > _SAME * size)
 
-    def _small_force(self, effects: Sequence[LawAt], stiffer: float) -> Values:
-        """Return the forces of laws on some rows of the first record."""
+    def _small_force(self, effects: Sequence[LawAt], stiffer: float, slower: float = 1.0) -> Values:
+        """Return the forces of laws on some rows of the first record, at a share of its speed."""
         total: Values = np.zeros(_SUBSAMPLE)
         (stiffness,) = self._sprung
         for effect in effects:
             here = stiffness.get(effect.port, self.mechanism.port(effect.port).stiffness.value)
             motion = _thinned(self.spectra[0].ports[effect.port])
+            motion = replace(motion, speed=slower * motion.speed)
             total = total + law_force(effect.law, motion, stiffer * here)
         return total
 

@@ -187,10 +187,14 @@ def wiring_caveats(finding: JointFinding) -> list[str]:
     if misfit**2 >= rules.main_share * float(np.var(twist)):
         (slope, _), share = _explained(twist, [angle], [ones])
         if share >= rules.explained_share:
-            return [
+            told = (
                 f"The angle of {motor} is {1.0 + slope:.4g} times that of {load}, where a gear "
                 "turns both alike: the sign or the ratio of one of their columns may be wrong."
-            ]
+            )
+            if slope > -1.0:
+                stated = finding.joint.kind.ratio
+                told += f" They agree at a ratio of {(1.0 + slope) * stated:.3g} for {stated:.4g}."
+            return [told]
         (slope, _), share = _explained(twist, [torque], [ones])
         if slope < 0.0 and share >= rules.explained_share:
             return [

@@ -91,6 +91,7 @@ class Grid:
         )
         sweep = _sweep(_SWEEP_SHARE * largest, finding.campaign.rig.torsion_angle_noise)
         data = replace(finding.data, features=planned, torsion=(sweep,) if largest else ())
+        data = _moving_as_predicted(data, finding.verdict.accepted)
         # Slopes without effects serve for all models: they suffice for the uncertainty of a test.
         slopes = Objective(data, ()).slopes_at(finding.verdict.base.values)
         made = [(record.input_speed, record.load_torque) for record in finding.campaign.running]
@@ -151,6 +152,18 @@ class Grid:
         record = "a repeat of the record" if self.repeats[test] else "a record"
         what = f"{record} at {speed:.4g} r/min with {load:.3g} N.m"
         return what, speed, load, "running"
+
+
+def _moving_as_predicted(data: Data, fitted: Fit) -> Data:
+    """Return data in whose records the input moves as the loop of a fitted drive lets it.
+
+    All models will be asked what follows from the same motion, as it will be measured.
+    """
+    prediction = data.prediction(fitted.values[None, : len(data.base)], fitted.effects)
+    lead = np.nan_to_num(prediction.phasors[0, :, 3])
+    share = np.zeros(lead.shape)
+    conditions = replace(data.features.conditions, lead=lead, lead_share=share)
+    return replace(data, features=replace(data.features, conditions=conditions))
 
 
 def separation(model: Model, rival: Model) -> Values:

@@ -19,6 +19,7 @@ from pymoo_hdte.discrepancy._selection.candidate import Candidate, Layout
 from pymoo_hdte.discrepancy._selection.fitting import Fit
 from pymoo_hdte.drive import DriveEffect
 from pymoo_hdte.effects.effect import effect_named, place_of
+from pymoo_hdte.effects.law import OUTPUT_SHAFT
 
 Values = NDArray[np.float64]
 Change = Callable[[Sequence[DriveEffect]], Values]
@@ -106,7 +107,11 @@ def _candidates(data: Data, limits: PlanLimits, rated_torque: float) -> list[Can
     )
     seen = stated_orders(limits.effects, believed.ratio)
     sizes = port_sizes(believed, features.orders.tolist(), seen, scales)
-    return drive_candidates(sizes, believed.effects)
+    return [
+        candidate
+        for candidate in drive_candidates(sizes, believed.effects)
+        if not candidate.nuisance
+    ]
 
 
 def stated_orders(effects: Sequence[DriveEffect], ratio: float) -> list[float]:
@@ -115,7 +120,7 @@ def stated_orders(effects: Sequence[DriveEffect], ratio: float) -> list[float]:
     for effect in effects:
         _, port, order = place_of(effect)
         if order is not None:
-            orders.add(order / (ratio if port in ("output", "sensor") else 1.0))
+            orders.add(order / (ratio if port in (*OUTPUT_SHAFT, "sensor") else 1.0))
     return sorted(orders)
 
 

@@ -103,6 +103,9 @@ TEMPERATURE = "temperature"
 it."""
 TEMPERATURE_FIELD = "temperature_C"
 
+SERIES = "series"
+"""Key of the series of measurements to which a running record belongs; 1 where it is absent."""
+
 TRANSMISSION_ERROR = "transmission_error"
 """Channel of a measured transmission error, which replaces one of the angles."""
 

@@ -24,6 +24,7 @@ from pymoo_hdte.discrepancy._records.campaign_keys import (
     PLAIN_ENDING,
     RANGES,
     RUNNING,
+    SERIES,
     TEMPERATURE,
     TEMPERATURE_FIELD,
     TORSION,
@@ -123,6 +124,8 @@ def read_record(
     needed += [TRANSMISSION_ERROR] * shows_error
     layout = replace(layout, channels={name: stated[name] for name in needed})
     known = _ranges(entry, place) | _temperature(entry, place, layout) if running else {}
+    if running and entry.has(SERIES):
+        known[SERIES] = entry.whole(SERIES, 1)
     columns = read_columns(path, layout, seen=seen)
     measured = _in_si(columns, ratio)
     with _errors_name_file(columns, place):
@@ -144,6 +147,8 @@ def record_table(record: RunningRecord | TorsionRecord) -> dict[str, Any]:
             table |= in_units(record, {spread: (name, RUNNING[nominal][1])})
     if isinstance(record, RunningRecord) and record.temperature is not None:
         table[TEMPERATURE_FIELD] = round(record.temperature - ORIGINS["C"], 9)
+    if isinstance(record, RunningRecord) and record.series != 1:
+        table[SERIES] = record.series
     test = "running" if running else "torsion"
     return {"file": f"{record.name}{ENDING}", "test": test} | table | {"role": record.role}
 

@@ -93,7 +93,7 @@ class LineFit:
     @cached_property
     def projections(self) -> NDArray[np.float64]:
         """Parts of the channels in the basis, shape (p, 4)."""
-        return self._projected(self.values)
+        return self.projected(self.values)
 
     @cached_property
     def courses(self) -> NDArray[np.float64]:
@@ -107,10 +107,10 @@ class LineFit:
         def signals(part: slice) -> NDArray[np.float64]:
             return np.hstack([_bent(self.record, part), decays(self.record, part, constants)])
 
-        return self._projected(signals)
+        return self.projected(signals)
 
-    def _projected(self, signals: Callable[[slice], NDArray[np.float64]]) -> NDArray[np.float64]:
-        """Return the parts in the basis of signals, which are given for some rows, (b, k)."""
+    def projected(self, signals: Callable[[slice], NDArray[np.float64]]) -> NDArray[np.float64]:
+        """Return the parts (p, k) in the basis of signals, which are given for rows, (b, k)."""
         return np.sum([self.basis(part).T @ signals(part) for part in self.parts], axis=0)
 
     @property

@@ -16,6 +16,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+
+# Parts of SciPy load when they are first used: signals and statistics take longer than a study.
+import scipy
 from numpy.typing import ArrayLike, NDArray
 
 from pymoo_hdte.checks import finite_array
@@ -31,6 +34,11 @@ _READ = {"output_angle": (0, False), "input_angle": (0, True), "input_torque": (
 # Which doubles of orders are fitted beside them decides no verdict.
 _RESOLVED = 0.9
 """Largest double, as a share of the Nyquist order."""
+_KNOTS = 500
+"""Means of rows from which a wandering motion is smoothed: a spline through more takes longer than
+a fit, and what wanders is slow."""
+_HALVINGS = 16
+"""Of the logarithm of a density within some fifteen decades: it is then known to a per mille."""
 _APART = 1.5
 """Least distance of a double from another order, in cycles per output turn."""
 
@@ -167,6 +175,84 @@ def order_lines(
         bends=courses[:3],
         fading=courses[3:],
     )
+
+
+def unsteady_lines(
+    record: RunningRecord, ratio: float, lines: OrderLines
+) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
+    """Return what the rates of a wandering input have in lines beyond those of a steady one.
+
+    Beside its lines the input does something that does not repeat. A fit assigns a share of that to
+    the lines, and other shares of its rates: a line of i w phasor, and of (i w)^2 phasor, is then
+    not that of speed and acceleration, as the motion does not end as it began. What is beside the
+    lines is smoothed by a cubic spline and differentiated: as the motion under a white noise of
+    acceleration (Wahba, J. Royal Statistical Society B 40, 1978) of which the known noise is left.
+
+    Parameters
+    ----------
+    record, ratio
+        As in `order_lines`.
+    lines : OrderLines
+        Lines of the record.
+
+    Returns
+    -------
+    rates : ndarray of complex, shape (2, m)
+        Lines of speed (rad/s) and acceleration (rad/s2) of the input.
+    ends : ndarray of complex, shape (2, m)
+        Lines of the acceleration (rad/s2) by the standard deviation of the speed at either end.
+    """
+    orders = lines.orders
+    fit = LineFit.of(record, ratio, [*orders, *_doubles(orders, record, ratio)])
+    time, beside = record.time, fit.whole_residual[:, 3]
+    rows, count = max(len(time) // _KNOTS, 1), len(time)
+    middles, means = (
+        values[: count - count % rows].reshape(-1, rows).mean(axis=1) for values in (time, beside)
+    )
+    noise, step = lines.row_covariance[3, 3], 1.0 / record.sample_rate
+    course, intensity = _smoothed(middles, means, noise / rows)
+    rates = [course, course.derivative(1), course.derivative(2)]
+
+    def signals(part: slice) -> NDArray[np.float64]:
+        place = np.arange(count)[part]
+        ends = (place == 0), (place == count - 1)
+        return np.column_stack([*(rate(time[part]) for rate in rates), *ends])
+
+    parts = np.linalg.solve(fit.triangle, fit.projected(signals))
+    m, n_fitted = len(orders), len(fit.orders)
+    shown = parts[2 : 2 + m] + 1j * parts[2 + n_fitted : 2 + n_fitted + m]
+    shown = shown.T / averaging_gain(orders, record)
+    rate = 1j * orders * lines.slope[3]
+    beyond = np.stack([shown[1] - rate * shown[0], shown[2] - rate**2 * shown[0]])
+    # Of a motion under white noise of acceleration whose position is seen in white noise: the
+    # steady variance of a Kalman filter's speed.
+    variance = math.sqrt(2.0) * (noise * step) ** 0.25 * intensity**0.75
+    ends = np.asarray(shown[3:] * math.sqrt(variance) / step, dtype=complex)
+    return np.asarray(beyond, dtype=complex), ends
+
+
+def _smoothed(
+    time: NDArray[np.float64], values: NDArray[np.float64], variance: float
+) -> tuple[scipy.interpolate.BSpline, float]:
+    """Return the spline that leaves the variance of the noise (Reinsch, Numer. Math. 10, 1967).
+
+    The second value is the power density of its second derivative, which goes with it. The density
+    is searched between one that moves less than the noise in a record, and one that moves more in a
+    row.
+    """
+    step = float(np.diff(time).mean())
+    low, high = (3.0 * variance / span**3 for span in (float(np.ptp(time)), step))
+
+    def spline(intensity: float) -> scipy.interpolate.BSpline:
+        return scipy.interpolate.make_smoothing_spline(time, values, lam=variance / intensity)
+
+    for _ in range(_HALVINGS):
+        middle = math.sqrt(low * high)
+        if np.mean((values - spline(middle)(time)) ** 2) > variance:
+            low = middle
+        else:
+            high = middle
+    return spline(high), high
 
 
 def _doubles(orders: NDArray[np.float64], record: RunningRecord, ratio: float) -> list[float]:

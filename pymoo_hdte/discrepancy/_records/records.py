@@ -100,6 +100,9 @@ class RunningRecord:
         Without them both must be near the values set, within the limits of `Rules`.
     temperature : float, optional
         Of the lubricant in kelvin; the mean over the record.
+    series : int
+        Number of its series of measurements. Within one the drive stays mounted as it is; between
+        two it may have been mounted anew, which changes its static error.
     jumps : tuple of Jump
         Jumps of sensors that were taken out of the rows; none in a record as measured.
     reading_errors : tuple of ReadingError
@@ -136,6 +139,7 @@ class RunningRecord:
     speed_range: tuple[float, ...] = ()
     load_range: tuple[float, ...] = ()
     temperature: float | None = None
+    series: int = 1
     jumps: tuple[Jump, ...] = ()
     settling: float | None = None
     reading_errors: tuple[ReadingError, ...] = ()
@@ -147,6 +151,7 @@ class RunningRecord:
             raise InvalidInput("input_speed", self.input_speed, "a speed other than zero")
         real_number("load_torque", self.load_torque)
         whole_number("samples_averaged", self.samples_averaged, 1)
+        whole_number("series", self.series, 1)
         real_number("elapsed", self.elapsed, at_least=0.0)
         if self.temperature is not None:
             temperature = real_number("temperature", self.temperature)

@@ -21,7 +21,12 @@ from pymoo_hdte.discrepancy._records.rig_model import (
     model_from_fields,
     read_mechanism_model,
 )
-from pymoo_hdte.discrepancy._records.rig_records import ListedRecord, listed_record, read_records
+from pymoo_hdte.discrepancy._records.rig_records import (
+    ListedRecord,
+    divided,
+    listed_record,
+    read_records,
+)
 from pymoo_hdte.mechanism import LawAt, Mechanism, Record
 from pymoo_hdte.units import UNITS
 
@@ -127,11 +132,14 @@ def read_rig(
             for index, entry in enumerate(entries)
         ]
         _check_names(listed)
+        mechanism = _with_angles(model.mechanism, listed)
+        coordinates = mechanism.coordinates
+        listed = [divided(listing, mechanism, noise, model.cutoff) for listing in listed]
+        _check_names(listed)
         # Each part is read on its own, so that a fault outside of it does no harm.
         seen = byte_counter(
             progress, [file for listing in listed for _ in listing.parts for file in listing.paths]
         )
-        coordinates = model.mechanism.coordinates
         records: dict[str, Record] = {}
         for listing in listed:
             for record in read_records(listing, coordinates, noise, seen):
@@ -141,7 +149,7 @@ def read_rig(
                 records[record.name] = record
         _check_noise(noise, records, path.name)
     return MeasuredMechanism(
-        _with_angles(model.mechanism, listed),
+        mechanism,
         tuple(records.values()),
         model.cutoff,
         model.effects,

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import math
 import re
-from collections.abc import Collection, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path, PureWindowsPath
 
 from pymoo_hdte._io.fields import Fields
@@ -14,12 +15,11 @@ from pymoo_hdte._io.parts import Part, part_from_fields
 from pymoo_hdte._io.tables import check_sha256
 from pymoo_hdte._io.text_lines import Seen
 from pymoo_hdte.checks import InvalidInput, one_of
-from pymoo_hdte.mechanism import Record
+from pymoo_hdte.discrepancy._records.split import DEFAULT, SPLIT, Block, Split, split_of
+from pymoo_hdte.mechanism import Mechanism, Record
 from pymoo_hdte.mechanism.records import ROLES
 from pymoo_hdte.units import UNITS
 
-SPLIT = 0.6
-"""Share of a record without a role that is fitted; the rest is held out."""
 _SPEEDS = {*UNITS["speed"], *UNITS["linear speed"]}
 _OF_POSITIONS = {"position", "pos", "angle", "travel", "displacement"}
 _OF_SPEEDS = {"speed", "velocity", "vel", "rate", "rpm", "omega"}
@@ -39,9 +39,13 @@ class ListedRecord:
         The file of each channel.
     layout : TableLayout
     parts : tuple of (str, str, Part or None)
-        Name, role and part of the files of each record: one, or two of a table without a role.
+        Name, role and part of the files of each record: one, or several of a table without a role.
     sha256 : tuple of (Path, str) or None
         A file, and the digits with which its sum begins.
+    context : dict of str to (float, float)
+        By name of a record the shares of its rows at both ends that belong to other records.
+    remark : str
+        How a table without a role was divided, if not by default; the first record repeats it.
     """
 
     place: str
@@ -49,6 +53,8 @@ class ListedRecord:
     layout: TableLayout
     parts: tuple[tuple[str, str, Part | None], ...]
     sha256: tuple[Path, str] | None
+    context: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    remark: str = ""
 
     @property
     def paths(self) -> tuple[Path, ...]:
@@ -91,6 +97,79 @@ def listed_record(
     return ListedRecord(place, files, layout, parts, sha256)
 
 
+def divided(
+    listed: ListedRecord,
+    mechanism: Mechanism,
+    noise: Mapping[str, float],
+    cutoff: float | None,
+    seen: Seen | None = None,
+) -> ListedRecord:
+    """Return a table with the records that `split_of` makes of it; one with a role is unchanged.
+
+    Parameters
+    ----------
+    listed : ListedRecord
+    mechanism : Mechanism
+    noise : mapping of str to float
+        Standard deviations of channels that are known, SI.
+    cutoff : float or None
+        Hz, where it is stated.
+    seen : callable, optional
+        Called with the number of bytes read since the last call.
+
+    Raises
+    ------
+    InvalidInput, OSError
+        As `read_records`.
+    """
+    if len(listed.parts) < 2:
+        return listed
+    stem = listed.parts[0][0].removesuffix(f"_{ROLES[0]}")
+    whole = replace(listed, parts=((stem, ROLES[0], None),))
+    try:
+        pieces = read_records(whole, mechanism.coordinates, noise, seen)
+    except InvalidInput:
+        # What is wrong is told where the parts are read.
+        return listed
+    if not all(name in pieces[0].channels for name in mechanism.coordinates):
+        return listed
+    split = split_of(mechanism, pieces, cutoff)
+    if split.blocks == DEFAULT:
+        return listed
+    counts = dict.fromkeys(ROLES, 0)
+    parts, context = [], {}
+    for role, start, stop in split.blocks:
+        counts[role] += 1
+        several = sum(block.role == role for block in split.blocks) > 1
+        name = f"{stem}_{role}" + (f"_{counts[role]}" if several else "")
+        first, last = max(start - split.beside, 0.0), min(stop + split.beside, 1.0)
+        parts.append((name, role, Part("share", first, last)))
+        context[name] = (start - first) / (last - first), (last - stop) / (last - first)
+    return replace(
+        listed, parts=tuple(parts), context=context, remark=_division(split.blocks, split)
+    )
+
+
+def _division(blocks: Sequence[Block], split: Split) -> str:
+    """Return a sentence on the blocks of a record."""
+    held_out = " and ".join(
+        f"{100.0 * block.start:.3g} to {100.0 * block.stop:.3g} %"
+        for block in blocks
+        if block.role == ROLES[1]
+    )
+    first = f"its first {100.0 * SPLIT:.0f} %"
+    expected = (
+        f"{first} hold nothing of some of it, or the others do"
+        if math.isinf(split.by_default)
+        else f"with {first} an error of {split.by_default:.2g} times the noise is to be expected "
+        f"where a part is predicted from the other, with these rows {split.chosen:.2g} times"
+    )
+    return (
+        f"Rows from {held_out} of the file are held out and the others are fitted, because both "
+        f"parts then hold the directions, speeds and accelerations that occur: {expected}."
+    )
+
+
 def read_records(
     listed: ListedRecord,
     coordinates: Collection[str],
@@ -120,7 +199,7 @@ def read_records(
     if listed.sha256 is not None:
         _check_sha256(*listed.sha256, listed.place)
     layout, notes = _with_positions(listed, coordinates)
-    records = []
+    records: list[Record] = []
     tables = [
         (name if len(pieces) == 1 else f"{name}_{number}", role, table)
         for name, role, part in listed.parts
@@ -130,6 +209,8 @@ def read_records(
     for name, role, table in tables:
         channel_noise = {channel: noise[channel] for channel in noise if channel in table.channels}
         remarks = [*([table.remark] if table.remark else []), *notes]
+        if listed.remark and not records:
+            remarks.append(listed.remark)
         try:
             record = Record(
                 name,
@@ -140,12 +221,18 @@ def read_records(
                 table.dropped,
                 remarks,
                 table.interpolated,
+                _context(listed, name, len(table.time)),
             )
         except InvalidInput as error:
             place = f"{listed.paths[0].name}: {error.field}"
             raise InvalidInput(place, error.value, error.allowed) from None
         records.append(record)
     return records
+
+
+def _context(listed: ListedRecord, name: str, rows: int) -> tuple[int, int]:
+    before, after = listed.context.get(name, (0.0, 0.0))
+    return round(before * rows), round(after * rows)
 
 
 def _path(file: str, place: str, folder: Path) -> Path:
@@ -186,9 +273,9 @@ def _parts(entry: Fields, place: str, path: Path) -> tuple[tuple[str, str, Part 
     if part is not None:
         allowed = "one of 'train', 'held_out', for a part of a file"
         raise InvalidInput(f"{place}.role", None, allowed)
-    shares = Part("share", 0.0, SPLIT), Part("share", SPLIT, 1.0)
     return tuple(
-        (f"{named or stem}_{role}", role, share) for role, share in zip(ROLES, shares, strict=True)
+        (f"{named or stem}_{role}", role, Part("share", start, stop))
+        for role, start, stop in DEFAULT
     )
 
 

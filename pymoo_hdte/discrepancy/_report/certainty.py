@@ -79,6 +79,7 @@ def how_sure_of_records(verdict: Verdict) -> str:
         words.append(_next_best(best, chosen))
     else:
         words.append("No other set of effects came near enough to be compared.")
+    words += _with_more(verdict, chosen)
     if not verdict.shown_in_held_out:
         words.append("The held-out records do not show it.")
     words.append("No probability is given, because real records leave more than noise.")
@@ -97,6 +98,27 @@ def _next_best(best: Hypothesis, chosen: Hypothesis, error_orders: Sequence[floa
         f"The best other explanation, {label}, explains {share}; its BIC is "
         f"{number(abs(gap))} {'above' if gap > 0.0 else 'below'}."
     )
+
+
+def _with_more(
+    verdict: Verdict, chosen: Hypothesis, error_orders: Sequence[float] = ()
+) -> list[str]:
+    """Return what the chosen effects explain with others beside them, if the BIC prefers that."""
+    richer = [
+        hypothesis
+        for hypothesis in verdict.alternatives
+        if chosen.names < hypothesis.names
+        and hypothesis.bic < chosen.bic
+        and hypothesis not in verdict.equivalent
+    ]
+    if not richer:
+        return []
+    best = min(richer, key=lambda hypothesis: hypothesis.bic)
+    label, gap = labels_by_order(best.label, error_orders), number(chosen.bic - best.bic)
+    return [
+        f"With more beside it, {label}, {percent(best.explained)} are explained and the BIC is "
+        f"{gap} below, which is not enough to name more."
+    ]
 
 
 def _too_little(finding: DriveFinding, nearest: Hypothesis) -> str:
@@ -139,6 +161,7 @@ def _evidence(finding: DriveFinding, chosen: Hypothesis, share: str) -> list[str
     elif others:
         best = min(others, key=lambda hypothesis: hypothesis.bic)
         words.append(_next_best(best, chosen, orders))
+    words += _with_more(verdict, chosen, orders)
     bounded = [
         words_of(parameter.name, orders)
         if row < chosen.fit.n_base

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import platform
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import replace
 from importlib.metadata import version
 from typing import Any
 
@@ -28,7 +29,7 @@ from pymoo_hdte.discrepancy._selection.rules import Rules
 from pymoo_hdte.discrepancy._selection.verdict import Verdict
 from pymoo_hdte.discrepancy._verdicts.drive_finding import DriveFinding
 from pymoo_hdte.discrepancy._verdicts.stated_sensors import scale_error, shares_scale
-from pymoo_hdte.effects.unknowns import HARMONIC_NAMES, Parameter, line_with_variance
+from pymoo_hdte.effects.unknowns import Parameter, line_with_variance, number_of
 
 SCHEMA_VERSION = 1
 """Version of ``verdict.json``: raised when a field is removed or changes name, type or meaning."""
@@ -68,12 +69,15 @@ def verdict_document(
         "doubts": caveats(verdict, orders),
         "reasons": [reason.as_dict() for reason in verdict.reasons],
         "effects": effects_of(verdict),
+        "nuisances": nuisances_of(finding),
         "relevance": None if matters is None else matters.as_dict(),
         "alternatives": alternatives_of(verdict),
         "base": {
             "chi_square": verdict.base.chi_square,
             "degrees_of_freedom": verdict.degrees_of_freedom,
-            "parameters": base_parameters(verdict.accepted, verdict.rules),
+            "parameters": base_parameters(
+                verdict.accepted, verdict.rules, but=finding.data.bench.unknowns
+            ),
         },
         "residual_over_noise": residual_of_parts(finding),
         **with_believed_effects([effect.to_dict() for effect in finding.campaign.believed.effects]),
@@ -200,6 +204,30 @@ def effects_of(verdict: Verdict, unit_of: UnitOf = base_unit) -> list[dict[str, 
     return documents
 
 
+def nuisances_of(finding: DriveFinding) -> list[dict[str, Any]]:
+    """Return the nuisances of the bench, which are no part of what is missing in the drive."""
+    verdict, fitted = finding.verdict, finding.verdict.accepted
+    documents = []
+    for nuisance, place in finding.nuisances:
+        rows = range(place.start, place.stop)
+        own = list(fitted.parameters)
+        own[place] = nuisance.parameters
+        named = replace(fitted, parameters=tuple(own))
+        accuracy = verdict.rules.exact_model_accuracy
+        documents.append(
+            {
+                "name": nuisance.name,
+                "port": nuisance.port,
+                "order": nuisance.order,
+                "sentence": nuisance.sentence,
+                "parameters": _parameters(
+                    nuisance, named, rows, verdict.rules, accuracy, base_unit
+                ),
+            }
+        )
+    return documents
+
+
 def _accuracy(candidate: Candidate, verdict: Verdict) -> float:
     """Return how closely the values of an effect are known at best, as a relative half-width.
 
@@ -276,7 +304,7 @@ def _line(
     """Return amplitude and phase of a line, with intervals, from its cosine and sine parts."""
     cosine, sine = parts
     amplitude, phase = line_with_variance(cosine, sine, covariance)
-    prefix = next(harmonic for harmonic in reversed(HARMONIC_NAMES) if name.startswith(harmonic))
+    prefix = name.removesuffix(number_of(name))
     return {
         name: quantity(*amplitude, _unit(candidate, name, unit_of)),
         f"{prefix}phase": quantity(*phase, _unit(candidate, "phase", unit_of)),
@@ -293,10 +321,17 @@ def quantity(value: float, variance: float, unit: str, least: float = -np.inf) -
     }
 
 
-def base_parameters(fitted: Fit, rules: Rules, unit_of: UnitOf = base_unit) -> dict[str, Any]:
-    """Return the base values of a fit with units, intervals and whether they ended at a bound."""
+def base_parameters(
+    fitted: Fit, rules: Rules, unit_of: UnitOf = base_unit, but: Collection[str] = ()
+) -> dict[str, Any]:
+    """Return the base values of a fit with units, intervals and whether they ended at a bound.
+
+    Those of some names are left out.
+    """
     parameters, scale = {}, scale_error(fitted, rules)
     for row, parameter in enumerate(fitted.parameters[: fitted.n_base]):
+        if parameter.name in but:
+            continue
         value, unit = fitted.values[row], unit_of(parameter.name)
         shared = scale * value / _DEVIATIONS if shares_scale(unit) else 0.0
         entry = quantity(value, fitted.covariance[row, row] + shared**2, unit)

@@ -11,6 +11,7 @@ from pymoo_hdte._reports.html import number, percent
 from pymoo_hdte.discrepancy._answers.next_test_mechanism import NextTest
 from pymoo_hdte.discrepancy._answers.where.balances import locate_in_mechanism
 from pymoo_hdte.discrepancy._evidence.force_balances.candidates import turns_back
+from pymoo_hdte.discrepancy._evidence.force_balances.lower_band import moved_by_band
 from pymoo_hdte.discrepancy._report.document import (
     SCHEMA_VERSION,
     sentence,
@@ -186,7 +187,9 @@ def limits(finding: MechanismFinding) -> list[str]:
         for name in finding.mechanism.coordinates
         if name in finding.judged_by_balance and finding.simulated
     ]
+    sentences += _moved_by_band(finding)
     sentences += _delays_told(finding)
+    sentences += _gains_told(finding)
     sentences += _not_validated(finding)
     if not any(record.role == "held_out" for record in finding.records):
         sentences.append("No record was held out: the correction is not validated.")
@@ -195,6 +198,28 @@ def limits(finding: MechanismFinding) -> list[str]:
         if names:
             sentences.append(f"At the bound of its tolerance: {', '.join(names)}.")
     return [*sentences, *finding.ripples.limits]
+
+
+def _moved_by_band(finding: MechanismFinding) -> list[str]:
+    """Return a sentence on values that the lower half of the band puts elsewhere."""
+    fitted = finding.accepted
+    moved = moved_by_band(finding.data, fitted)
+    if not moved:
+        return []
+    of_effects = {
+        row: f"{fitted.parameters[row].name} of {in_words(candidate.label)}"
+        for candidate, place in fitted.places
+        for row in range(place.start, place.stop)
+    }
+    told = ", ".join(
+        f"{of_effects.get(one.place, fitted.parameters[one.place].name)} "
+        f"({number(one.value, 3)} for {number(float(fitted.values[one.place]), 3)})"
+        for one in moved
+    )
+    return [
+        f"Fitted to the lower half of the band alone, values leave their intervals: {told}, SI. "
+        "They depend on the cutoff; something may be missing that shows at higher frequencies."
+    ]
 
 
 def _delays_told(finding: MechanismFinding) -> list[str]:
@@ -208,6 +233,23 @@ def _delays_told(finding: MechanismFinding) -> list[str]:
                 f"than its column says ({middle - spread:.3g} to {middle + spread:.3g}, "
                 f"{abs(delay.samples):.2g} samples), by the phase of the force balance. It is "
                 f"not corrected; inputs.{delay.input}.delay in the rig's file does so."
+            )
+    return sentences
+
+
+def _gains_told(finding: MechanismFinding) -> list[str]:
+    """Return a sentence on each gain of an input whose interval excludes one."""
+    sentences = []
+    for gain in finding.gains:
+        if gain.evident:
+            lower, upper = gain.lower, gain.upper
+            times = f"{lower:.3g} to {upper:.3g}" if upper < np.inf else f"at least {lower:.3g}"
+            stated = " and ".join(gain.quantities)
+            sentences.append(
+                f"{gain.input} is {times} times what its column says (95 %), if the stated "
+                f"{stated} {'is' if len(gain.quantities) == 1 else 'are'} right. It is not "
+                f"corrected; a tolerance for inputs.{gain.input}.gain in the rig's file, beside an "
+                "inertia or a stiffness without one, does so."
             )
     return sentences
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from pymoo_hdte._reports.html import digits, number
 from pymoo_hdte.discrepancy._report.tables import EffectRow, effect_rows
+from pymoo_hdte.discrepancy._report.words import bench_in_words
 
 MOST_LINES = 10
 
@@ -26,6 +27,8 @@ def summary(document: Mapping[str, Any], page: str) -> str:
     """
     torsion = document.get("torsion", {})
     top = [f"Verdict: {document['status']}. {document['sentence']}"]
+    if bench := bench_in_words(document.get("nuisances", ())):
+        top.append(bench)
     bottom = [
         *_probability(document.get("probability")),
         *_prediction_errors(document["held_out"]),
@@ -66,7 +69,7 @@ def _size(row: EffectRow) -> str:
     places = digits(row.lower, row.upper)
     value, low, high = (number(size, places) for size in (row.value, row.lower, row.upper))
     bound = ", at a bound" if row.at_bound else ""
-    return f"{row.parameter} {value} (95 %: {low} … {high}{bound}) {row.unit}".rstrip()
+    return f"{row.parameter} {value} (95 %: {low} … {high}{bound}) {_shown(row.unit)}".rstrip()
 
 
 def _probability(probability: float | None) -> Iterable[str]:
@@ -131,4 +134,9 @@ def _change(name: str, before: float | None, after: float | None, unit: str) -> 
 
 
 def _finite(size: float | None, unit: str) -> str:
-    return "diverges" if size is None else f"{number(size)} {unit}".rstrip()
+    return "diverges" if size is None else f"{number(size)} {_shown(unit)}".rstrip()
+
+
+def _shown(unit: str) -> str:
+    """Return a unit as it is printed: none for what has none, or is per unit of a signal."""
+    return "" if unit in ("SI", "1") else unit

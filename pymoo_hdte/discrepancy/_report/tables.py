@@ -145,11 +145,12 @@ def parameter_rows(finding: DriveFinding) -> list[ParameterRow]:
     fitted = finding.verdict.accepted
     # Without influence on a residual there is no interval.
     known = np.any(fitted.jacobian != 0.0, axis=0)
-    entries = base_parameters(fitted, finding.verdict.rules)
+    entries = base_parameters(fitted, finding.verdict.rules, but=finding.data.bench.unknowns)
     # With the bounds of their tolerances, also where one was freed from them.
     return [
         _parameter_row(finding.campaign, parameter, entries[parameter.name], bool(has_interval))
         for parameter, has_interval in zip(finding.data.base, known, strict=False)
+        if parameter.name in entries
     ]
 
 

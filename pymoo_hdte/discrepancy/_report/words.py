@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 from pymoo_hdte._reports.html import number
 from pymoo_hdte.discrepancy._evidence.order_lines.parameters import base_unit, labels_by_order
@@ -154,6 +155,13 @@ def what_is_missing(candidates: Sequence[Candidate]) -> str:
         return " ".join(candidate.sentence for candidate in candidates)
     effects = [candidate.sentence for candidate in candidates if not candidate.released]
     return " ".join([*effects, f"The {listed(released)} lie outside their tolerances."])
+
+
+def bench_in_words(nuisances: Sequence[Mapping[str, Any]]) -> str:
+    """Return the nuisances of a verdict's document in one line; empty without any."""
+    sentences = [nuisance["sentence"].rstrip(".") for nuisance in nuisances]
+    parts = [sentence[:1].lower() + sentence[1:] for sentence in sentences]
+    return f"The bench: {'; '.join(parts)}." if parts else ""
 
 
 def in_a_sentence(reason: Reason, label: Label = str) -> str:

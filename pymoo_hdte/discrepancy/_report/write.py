@@ -43,7 +43,7 @@ from pymoo_hdte.discrepancy._report.tables import (
     record_rows,
     rows_sentence,
 )
-from pymoo_hdte.discrepancy._report.words import limit_sentence
+from pymoo_hdte.discrepancy._report.words import bench_in_words, limit_sentence
 from pymoo_hdte.discrepancy._verdicts.drive_finding import DriveFinding
 from pymoo_hdte.discrepancy._verdicts.validation_drive import Validation
 from pymoo_hdte.drive import DriveModel
@@ -176,6 +176,7 @@ def _page(
         validation=validation,
         effects=effect_rows(document["effects"], orders),
         certainty=how_sure(finding),
+        bench=bench_in_words(document["nuisances"]),
         next_test=document["next_experiment"]["description"],
         pictures=pictures,
         plots=plots,

@@ -60,6 +60,8 @@ class Candidate:
         Names of the effects that it may replace. A search does not try it otherwise.
     among : int
         Number of candidates that differ only by a number that no fit follows, itself included.
+    nuisance : bool
+        Whether its seat is the bench, so that it is no answer to what is missing in the machine.
     unit : callable or None
         Function from the name of an unknown, or of a line, to its SI unit.
     effect : Effect or None
@@ -84,6 +86,7 @@ class Candidate:
     remembers: bool = False
     instead_of: tuple[str, ...] = ()
     among: int = 1
+    nuisance: bool = False
     unit: Callable[[str], str] | None = None
     effect: Effect | None = None
 
@@ -232,6 +235,7 @@ def candidate_of(
         remembers=effect.remembers,
         instead_of=guess.instead_of,
         among=guess.among,
+        nuisance=port in effect.nuisance_at,
         unit=partial(effect.unit, of_guess=guess.quantities),
         effect=effect,
     )

@@ -65,7 +65,7 @@ def screen(data: Evidence, fitted: Fit, candidates: Sequence[Candidate]) -> list
         Present model, perhaps with effects, whose misfit is to be explained.
     candidates : sequence of Candidate
     """
-    orthonormal, residual = _beyond_parameters(fitted)
+    orthonormal, residual = beyond_parameters(fitted)
     response, parts = data.response(fitted), data.rows_of_parts()
     inward = _inward(fitted, orthonormal) if fitted.candidates else _NONE
     screened = []
@@ -132,7 +132,7 @@ def _not_far_behind(
     contact away change them, so that only candidates far behind are left out.
     """
     share = data.rules.promising_share * data.rules.second_hope_share
-    orthonormal, residual = _beyond_parameters(fitted)
+    orthonormal, residual = beyond_parameters(fitted)
     parts, inward = data.rows_of_parts(), _inward(fitted, orthonormal)
     rescreened = (
         _screened(effect.candidate, effect.signatures, orthonormal, residual, parts, inward)
@@ -171,7 +171,7 @@ def reduced(
     return _screened(effect.candidate, effect.signatures, orthonormal, residual, (), _NONE)
 
 
-def _beyond_parameters(fitted: Fit) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def beyond_parameters(fitted: Fit) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return an orthonormal basis of the parameters' changes (n, k), and what they leave (n,)."""
     # A parameter at its bound cannot move beyond it.
     orthonormal, _ = np.linalg.qr(fitted.jacobian[:, fitted.bound_sides == 0.0])

@@ -43,6 +43,8 @@ class Search(FittedSets):
         These candidates as screened beside the base, if they were.
     forms_only : sequence of Candidate
         Further forms of effects, tried only instead of another form.
+    nuisances : sequence of Screened
+        Nuisances of the bench as screened beside the base.
     """
 
     def __init__(
@@ -52,9 +54,11 @@ class Search(FittedSets):
         candidates: Sequence[Candidate],
         screened: Sequence[Screened] = (),
         forms_only: Sequence[Candidate] = (),
+        nuisances: Sequence[Screened] = (),
     ) -> None:
         super().__init__(data, base)
         self.candidates, self.screened, self.forms_only = candidates, screened, forms_only
+        self.nuisances = nuisances
         self._extended: set[frozenset[str]] = set()
 
     def singles(self) -> None:

@@ -33,6 +33,7 @@ from pymoo_hdte.discrepancy._selection.excess import HeldOutTest
 from pymoo_hdte.discrepancy._selection.fitted_sets import beyond_stated
 from pymoo_hdte.discrepancy._selection.fitting import Evidence, Fit, fit
 from pymoo_hdte.discrepancy._selection.hypothesis import Hypothesis, down_to_noise
+from pymoo_hdte.discrepancy._selection.nuisances import leading_group, leading_nuisances
 from pymoo_hdte.discrepancy._selection.reason import (
     HELD_OUT_ERROR_GROWS,
     NOT_VALIDATED,
@@ -82,6 +83,9 @@ class Verdict:
         Names of effects that are seen in what no fit holds, as ripple beyond the band of a motion.
     rivals_beyond : tuple of str
         What would explain as much and is in no fit, as the delay of an encoder.
+    of_bench : Fit or None
+        A fit with nuisances of the bench that have to join the base first: see
+        `leading_nuisances`. The verdict without it says nothing then.
     """
 
     base: Fit
@@ -98,6 +102,7 @@ class Verdict:
     renewed: Evidence | None = None
     seen_beyond: tuple[str, ...] = ()
     rivals_beyond: tuple[str, ...] = ()
+    of_bench: Fit | None = None
 
     @property
     def status(self) -> str:
@@ -205,21 +210,29 @@ def judge(
     """
     rules = data.rules
     degrees_of_freedom = len(base.residuals) - len(base.values)
+    possible = [] if known else [candidate for candidate in candidates if candidate.nuisance]
+    candidates = [candidate for candidate in candidates if not candidate.nuisance]
     candidates = [*candidates, *data.out_of_tolerance(base.at_bounds)]
     quiet = down_to_noise(base, degrees_of_freedom, rules) and not data.evident
     # A sensor far from what is stated of it may have taken what is missing.
     quiet = quiet and not beyond_stated(base, rules).any()
     # Screening is slow, and known sets need none unless the base itself may be adequate.
     searched = [candidate for candidate in candidates if not candidate.instead_of]
-    screened = screen(data, base, searched) if quiet or not known else []
+    every = screen(data, base, [*searched, *possible]) if quiet or not known else []
+    screened = [effect for effect in every if not effect.candidate.nuisance]
+    nuisances = [effect for effect in every if effect.candidate.nuisance]
     gain = max((screening.reduction for screening in screened), default=0.0)
     if quiet and gain < rules.single_effect_gain:
         clean = probability.of_nothing(screened, len(base.residuals), rules)
-        return Verdict(base, None, True, (), (), degrees_of_freedom, rules, probability=clean)
+        of_bench = leading_nuisances(Search(data, base, searched, screened, nuisances=nuisances))
+        return Verdict(
+            base, None, True, (), (), degrees_of_freedom, rules,
+            probability=clean, of_bench=of_bench,
+        )  # fmt: skip
     if not screened and not known:
         return Verdict(base, None, False, (), (), degrees_of_freedom, rules)
     forms = [candidate for candidate in candidates if candidate.only_as_form]
-    search = Search(data, base, searched, screened, forms)
+    search = Search(data, base, searched, screened, forms, nuisances)
     if known:
         search.resume(known)
         search.leave_out_lacking()
@@ -231,8 +244,15 @@ def judge(
         search = Search(data, base, searched, screened, forms)
         search.resume(known, go_on=True)
     else:
+        if of_bench := leading_group(search):
+            return _with_nuisances(search, of_bench)
         search.singles()
+        if of_bench := leading_nuisances(search):
+            return _with_nuisances(search, of_bench)
         search = _renewed_search(search)
+        leading = search.hypotheses[0]
+        if not search.enough(leading) and (of_bench := leading_nuisances(search, leading)):
+            return _with_nuisances(search, of_bench)
     search.grow()
     search.leave_out_lacking()
     chosen = chosen_of(search)
@@ -243,8 +263,16 @@ def judge(
         chosen = chosen_of(search)
     if replaced(search, chosen, [candidate for candidate in candidates if candidate.instead_of]):
         chosen = chosen_of(search)
+    if not (known or search.enough(chosen)) and (of_bench := leading_nuisances(search, chosen)):
+        return _with_nuisances(search, of_bench)
     verdict = _verdict(search, answer_of(search, chosen, search.screened))
     return verdict if search.data is data else replace(verdict, renewed=search.data)
+
+
+def _with_nuisances(search: Search, of_bench: Fit) -> Verdict:
+    """Return that nothing is certain before nuisances have joined the base."""
+    freedom, rules = search.degrees_of_freedom, search.data.rules
+    return Verdict(search.base, None, False, (), (), freedom, rules, of_bench=of_bench)
 
 
 def _renewed_search(search: Search) -> Search:
@@ -263,7 +291,13 @@ def _renewed_search(search: Search) -> Search:
     base, candidates = fit(renewed, start=search.base.values), search.candidates
     if down_to_noise(base, search.degrees_of_freedom, data.rules):
         return search
-    again = Search(renewed, base, candidates, screen(renewed, base, candidates), search.forms_only)
+    nuisances = [effect.candidate for effect in search.nuisances]
+    every = screen(renewed, base, [*candidates, *nuisances])
+    screened = [effect for effect in every if not effect.candidate.nuisance]
+    again = Search(
+        renewed, base, candidates, screened, search.forms_only,
+        [effect for effect in every if effect.candidate.nuisance],
+    )  # fmt: skip
     again.resume(search.hypotheses, go_on=True)
     renewed_best = again.hypotheses[0]
     same = renewed_best.label == best.label and _is_all(renewed, renewed_best.fit)

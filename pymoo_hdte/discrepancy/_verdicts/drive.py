@@ -21,7 +21,7 @@ from pymoo_hdte.discrepancy._evidence.order_lines.features import (
 )
 from pymoo_hdte.discrepancy._evidence.order_lines.prediction import coefficients_of
 from pymoo_hdte.discrepancy._evidence.order_lines.sizes import port_sizes, scales_of
-from pymoo_hdte.discrepancy._evidence.order_lines.steady_states import PREDICTION
+from pymoo_hdte.discrepancy._evidence.order_lines.steady_states import PREDICTION, Lead
 from pymoo_hdte.discrepancy._records.campaign import Campaign
 from pymoo_hdte.discrepancy._records.cleaning.cleaning import cleaned_rows
 from pymoo_hdte.discrepancy._records.records import RunningRecord
@@ -32,7 +32,7 @@ from pymoo_hdte.discrepancy._selection.verdict import EXPLAINED, Verdict, judge
 from pymoo_hdte.discrepancy._verdicts import rattling
 from pymoo_hdte.discrepancy._verdicts.drive_finding import DriveFinding
 from pymoo_hdte.discrepancy._verdicts.validation_drive import validate_drive
-from pymoo_hdte.drive import SpeedLoop, harmonic_balance
+from pymoo_hdte.drive import harmonic_balance
 from pymoo_hdte.drive._solve.free_angle import torus_of
 from pymoo_hdte.effects.effect import effect_named
 from pymoo_hdte.effects.unknowns import HARMONIC_NAMES, is_among
@@ -157,13 +157,16 @@ def _check_steady(data: Data) -> None:
     values = {parameter.name: np.array([parameter.start]) for parameter in data.base}
     conditions = data.features.conditions
     coefficients = coefficients_of(believed, values, believed.effects, len(conditions))
+    torus = torus_of(coefficients)
+    # Features are of measured records, whose input moves as it did.
+    moving = Lead(data.features.orders, np.asarray(conditions.lead))
     steady = harmonic_balance(
         coefficients,
         input_speed=conditions.input_speed,
         load_torque=conditions.output_torque,
-        motor=SpeedLoop(campaign.rig.proportional, campaign.rig.integral),
-        torus=torus_of(coefficients),
+        torus=torus,
         tolerance=PREDICTION.tolerance,
+        lead=moving.on(torus),
     ).converged
     if not steady.all():
         lost = data.features.records[int(np.argmin(steady))].name
@@ -197,8 +200,8 @@ def _candidates(data: Data, base: Fit) -> list[Candidate]:
     highest = highest_order(data.campaign, data.rules)
     seen = [order for order in clear if order <= highest][: data.rules.most_order_lines]
     believed, orders = data.campaign.believed, features.orders.tolist()
-    sizes = port_sizes(believed, orders, seen, scales_of(data, base), clear)
-    return drive_candidates(sizes, believed.effects)
+    sizes = port_sizes(believed, orders, seen, scales_of(data, base), clear, highest)
+    return drive_candidates(sizes, believed.effects, data.bench.nuisances)
 
 
 def highest_order(campaign: Campaign, rules: Rules) -> float:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from pymoo_hdte.discrepancy._evidence.order_lines.evidence import Data
 from pymoo_hdte.discrepancy._records.campaign import Campaign
 from pymoo_hdte.discrepancy._records.cleaning.findings import RowFindings
+from pymoo_hdte.discrepancy._selection.candidate import Candidate
 from pymoo_hdte.discrepancy._selection.verdict import Verdict
 
 
@@ -32,6 +33,11 @@ class DriveFinding:
     verdict: Verdict
     unexpected: tuple[float, ...]
     rows: RowFindings = field(default_factory=RowFindings)
+
+    @property
+    def nuisances(self) -> list[tuple[Candidate, slice]]:
+        """Nuisances of the bench that the accepted fit shows, with the places of their values."""
+        return self.data.bench.shown(self.verdict.accepted, self.verdict.rules)
 
     @property
     def held_out(self) -> Data | None:

@@ -21,7 +21,10 @@ from pymoo_hdte.discrepancy._evidence.force_balances.beyond_band.ripple_size imp
 from pymoo_hdte.discrepancy._evidence.force_balances.candidates import port_sizes
 from pymoo_hdte.discrepancy._evidence.force_balances.evidence import MeasuredData, measured_data
 from pymoo_hdte.discrepancy._evidence.force_balances.joint_halves import Half, Joint
-from pymoo_hdte.discrepancy._evidence.force_balances.orders import position_orders
+from pymoo_hdte.discrepancy._evidence.force_balances.orders import (
+    periods_within,
+    position_orders,
+)
 from pymoo_hdte.discrepancy._evidence.force_balances.preconditions import (
     check_sampling,
     check_scale,
@@ -147,14 +150,19 @@ def _candidates(
 
 
 def _low_orders(data: MeasuredData, gear: Port, seen: Sequence[float]) -> tuple[float, ...]:
-    """Return the lowest orders of the output that the travel resolves, and that are not seen.
+    """Return the lowest orders of the output that travel and band resolve, and that are not seen.
 
     A shaft errs at whole orders by its bearings, its encoder and its splines.
     """
-    widest = max(float(np.ptp(balance.ports[gear.name].shaft)) for balance in data.spectra)
-    turns, rules = widest / (2.0 * np.pi), data.rules
+    shafts = [balance.ports[gear.name].shaft for balance in data.spectra]
+    turns, rules = max(map(np.ptp, shafts)) / (2.0 * np.pi), data.rules
     lowest, highest = rules.fewest_error_periods / turns, rules.fewest_periods / turns
     orders = np.arange(max(1.0, np.ceil(lowest)), np.ceil(highest))
+    periods = [
+        periods_within(balance.cutoff, shaft, float(balance.time[1] - balance.time[0]), orders)
+        for balance, shaft in zip(data.spectra, shafts, strict=True)
+    ]
+    orders = orders[np.max(periods, axis=0) >= rules.fewest_error_periods]
     return tuple(order for order in orders.tolist() if order not in seen)
 
 
@@ -186,6 +194,7 @@ def _lines_beyond(half: Half, joint: Joint, cutoff: float, rules: Rules) -> Ripp
                 name: record.channels[name],
                 ANGLE: motion_at_port(gear, dict(record.channels), still).position,
             },
+            context=record.context,
         )
         for record in half.records
     ]

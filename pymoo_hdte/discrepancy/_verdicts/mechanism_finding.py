@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from pymoo_hdte.discrepancy._evidence.force_balances.beyond_band.ripple import NO_RIPPLES, Ripples
 from pymoo_hdte.discrepancy._evidence.force_balances.delay import Delay, delays
 from pymoo_hdte.discrepancy._evidence.force_balances.evidence import MeasuredData
+from pymoo_hdte.discrepancy._evidence.force_balances.gain import GainRange, gains
 from pymoo_hdte.discrepancy._evidence.force_balances.unexplained import (
     root_mean_square,
     share_removed,
@@ -62,6 +63,11 @@ class MechanismFinding:
     def delays(self) -> tuple[Delay, ...]:
         """Delays of inputs in the records, with those that the mechanism states taken out."""
         return tuple(delays(self.data, tuple(self.accepted.effects)))
+
+    @cached_property
+    def gains(self) -> tuple[GainRange, ...]:
+        """What the stated mechanism tells of the gains of inputs that are stated exactly."""
+        return tuple(gains(self.data, tuple(self.accepted.effects), self.delays))
 
     @property
     def accepted(self) -> Fit:

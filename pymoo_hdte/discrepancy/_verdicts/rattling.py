@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pymoo_hdte.discrepancy._evidence.order_lines.evidence import Data
-from pymoo_hdte.discrepancy._selection.candidate import Candidate
+from pymoo_hdte.discrepancy._selection.candidate import Candidate, Layout
 from pymoo_hdte.discrepancy._selection.fitting import Fit, fit
 from pymoo_hdte.discrepancy._selection.rules import RULES, Rules
 from pymoo_hdte.discrepancy._selection.verdict import EXPLAINED, Verdict, judge
@@ -54,10 +54,10 @@ def judged(
     leading = leading_sweep_effect(data, base, candidates)
     loaded = data if leading is None else data.loaded
     if loaded is data or leading is None:
-        return _judged_from(data, base, candidates)
+        return _judged_from(data, base, candidates, candidates_of)
     if effect_named(leading).rattles:
         return _judged_on(loaded, candidates_of)
-    overall = _judged_from(data, base, candidates)
+    overall = _judged_from(data, base, candidates, candidates_of)
     if overall[-1].status == "unlisted" or overall[-1].leaves_more_than_noise:
         again = _judged_on(loaded, candidates_of)
         if _explains_by_a_clearance(again[-1]):
@@ -70,14 +70,29 @@ def _judged_on(
 ) -> tuple[Data, list[Candidate], Verdict]:
     """Return data, candidates and the verdict on all these data."""
     base = fit(data)
-    return _judged_from(data, base, candidates_of(data, base))
+    return _judged_from(data, base, candidates_of(data, base), candidates_of)
 
 
 def _judged_from(
-    data: Data, base: Fit, candidates: list[Candidate]
+    data: Data,
+    base: Fit,
+    candidates: list[Candidate],
+    candidates_of: Callable[[Data, Fit], list[Candidate]],
 ) -> tuple[Data, list[Candidate], Verdict]:
-    """Return data, with the noise that they were judged with, candidates and the verdict."""
+    """Return data, with bench and noise as they were judged with, candidates and the verdict.
+
+    Nuisances that lead join the bench, until none does.
+    """
     verdict = judge(data, base, candidates)
+    while (leading := verdict.of_bench) is not None:
+        begin = leading.values[: leading.n_base]
+        for nuisance, place in leading.places:
+            if nuisance.nuisance:
+                values = leading.values[place]
+                data, begin = data.on_bench(nuisance, values.tolist()), np.append(begin, values)
+        base = fit(data, start=begin)
+        candidates = candidates_of(data, base)
+        verdict = judge(data, base, candidates)
     renewed = verdict.renewed
     return renewed if isinstance(renewed, Data) else data, candidates, verdict
 
@@ -176,7 +191,9 @@ def leading_sweep_effect(data: Data, fitted: Fit, candidates: Sequence[Candidate
     """
     base = fitted.values[None, : len(data.base)]
     before = data.torsion_residuals(base, fitted.effects)[0]
-    stiffness, offset = np.eye(len(data.base))[[0, -1]]
+    layout = Layout(data.base)
+    places = [layout.index(name) for name in ("stiffness", "output_torque_zero")]
+    stiffness, offset = np.eye(len(data.base))[places]
     steps = np.array([0.01 * base[0, 0], data.campaign.torque_scale * 0.05])
     moved = np.vstack([base + steps[0] * stiffness, base + steps[1] * offset])
     imitated = (data.torsion_residuals(moved, fitted.effects) - before).T
@@ -184,7 +201,7 @@ def leading_sweep_effect(data: Data, fitted: Fit, candidates: Sequence[Candidate
     residual = before - orthonormal @ (orthonormal.T @ before)
     least, gains = data.rules.sweep_gain, list[tuple[float, str]]()
     for candidate in candidates:
-        for start in candidate.starts:
+        for start in candidate.starts if not candidate.nuisance else ():
             effects = (*fitted.effects, *candidate.build(start))
             change = np.nan_to_num(data.torsion_residuals(base, effects)[0] - before)
             change -= orthonormal @ (orthonormal.T @ change)

@@ -153,8 +153,9 @@ def windows_of(record: Record, cutoff: float, reach: Reach | None, rules: Rules)
     share = _SAMPLES * cutoff * record.step
     finer, stride = (int(np.ceil(share - 1e-9)), 1) if share > 1.0 else (1, int(1.0 / share))
     # Where smoothing has one side only, the state at the start of a window is not known.
-    begin = min(margin_of(cutoff, record.step), len(record.time) // 4)
-    room = (len(record.time) - 1 - begin) // stride
+    before, after = record.context
+    begin = max(min(margin_of(cutoff, record.step), len(record.time) // 4), before)
+    room = (len(record.time) - 1 - after - begin) // stride
     if reach is None:
         return Windows((slice(begin, begin + room * stride + 1, stride),), 1, finer)
     step = stride * record.step

@@ -44,8 +44,13 @@ class DriveSizes(Sizes):
         Duration of the session, s.
     changes : tuple of float
         Times of the session between records, at which a reading may have changed at once, s.
+    series : tuple of float
+        Times of the session between series of measurements, s: as stated, else ``changes``.
     loads_differ : bool
         Whether the records are taken under different loads.
+    readings, largest_readings : tuple of float
+        Typical and largest error of a reading of the input's and the output's torque that may be
+        missing, N.m.
     """
 
     error: float = 0.0
@@ -55,7 +60,10 @@ class DriveSizes(Sizes):
     inertia: float = 0.0
     duration: float = 0.0
     changes: tuple[float, ...] = ()
+    series: tuple[float, ...] = ()
     loads_differ: bool = False
+    readings: tuple[float, float] = (0.0, 0.0)
+    largest_readings: tuple[float, float] = (0.0, 0.0)
 
     def further(self) -> Self:
         """Return the sizes without the orders of believed lines of the error."""
@@ -107,6 +115,9 @@ class DriveEffect:
 
     name: ClassVar[str]
     """Name of the effect, in model files and verdicts."""
+    only_reads: ClassVar[bool] = False
+    """Whether it is all in `reading_lines` and in the input torque of `torque_reading`, so that no
+    motion has to be found anew."""
 
     def apply(self, coefficients: Coefficients) -> Coefficients:
         """Return the coefficients with this effect added."""
@@ -150,6 +161,36 @@ class DriveEffect:
         """
         return None
 
+    def torque_reading(self, elapsed: Values) -> Values | None:
+        """Return what is added to the readings of input and output torque, or None for nothing.
+
+        Parameters
+        ----------
+        elapsed : ndarray, shape (n,)
+            Time of the session, s.
+
+        Returns
+        -------
+        ndarray, shape (2, n), or None
+            N.m.
+        """
+        return None
+
+    def turned_back(self, frequency: Values) -> Lines | None:
+        """Return by how much less the output angle is read for a torque there, or None for nothing.
+
+        Parameters
+        ----------
+        frequency : ndarray, shape (...)
+            rad/s; negative where the drive turns backward.
+
+        Returns
+        -------
+        ndarray of complex, shape (...), or None
+            rad/(N.m).
+        """
+        return None
+
     def on_sheet(self, ratio: float) -> DriveEffect:
         """Return the effect for a model that holds B_fc, not the damping of the torsion.
 
@@ -189,7 +230,7 @@ class LawAtPort(DriveEffect):
     name : str
         Name of the effect, in model files and verdicts, e.g. ``"coulomb_friction"``.
     port : str
-        ``"input"``, ``"output"`` or ``"mesh"``, where the law may be.
+        ``"input"``, ``"output"``, ``"mesh"`` or ``"load"``, where the law may be.
     law : Law
         A law of the type that belongs to the name; its numbers are in SI.
 

@@ -12,6 +12,7 @@ from pymoo_hdte.drive._effects.base import DriveEffect, DriveSizes, Lines, Sessi
 from pymoo_hdte.effects.effect import Effect, register
 from pymoo_hdte.effects.guess import Guess, guess_of_lines
 from pymoo_hdte.effects.law import Values
+from pymoo_hdte.effects.unknowns import is_whole
 
 ENCODER_LINE = "encoder_line"
 """Name of an error of the encoder's scale, which no verdict names: see `Guess.name`."""
@@ -45,6 +46,7 @@ class Eccentricity(DriveEffect):
     ('sensor', 1.0)
     """
 
+    only_reads: ClassVar[bool] = True
     name: ClassVar[str] = "eccentricity"
     port: ClassVar[str] = "sensor"
     amplitude: float
@@ -88,16 +90,12 @@ class Eccentricity(DriveEffect):
         return np.zeros(len(lines)), lines
 
 
-_CLOSED = 1e-6
-"""Cycles per output turn by which a line of the encoder's scale may differ from a whole number."""
-
-
 def _off_centre(sizes: DriveSizes) -> list[Guess]:
     """Guess a disc off centre, and errors of its scale wherever whole cycles per turn are seen."""
     guesses = [_turning(sizes, 1.0)]
     for order in sizes.further().seen:
         turns = order * sizes.slower
-        if turns > 1.5 and abs(turns - round(turns)) < _CLOSED:
+        if turns > 1.5 and is_whole(turns):
             guesses.append(_turning(sizes, float(round(turns))))
     return guesses
 

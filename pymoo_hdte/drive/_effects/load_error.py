@@ -23,7 +23,8 @@ class LoadDependentError(DriveEffect):
     """A line of theta_s in proportion to the load T_L.
 
     It is amplitude (T_L / reference) sin(order theta_in + phase): parts that bend under the load
-    shift what errs. A load in the other direction reverses its sign. The load is the torque beyond
+    shift what errs. So do two zones of engagement of unequal stiffness, at order 1: no record
+    tells the two. A load in the other direction reverses its sign. The load is the torque beyond
     all inertias, so that the line does not follow a torque that fluctuates.
 
     Attributes

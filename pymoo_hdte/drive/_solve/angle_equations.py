@@ -5,17 +5,20 @@ the input speed w fluctuates. Unknown are the torsion d(alpha) and E(alpha) = w^
 th_in'' = E' and th_d'' = 2 E th_d'' + E' th_d' (primes on the right: by alpha), so that
 
     J_in E' + B_in w + f_in + T (1/N - r th_s') = T_motor
-    J_out (E'/N - 2 E th_d'' - E' th_d') + B_out (w/N - w th_d') + f_out - T = -T_L
+    J_out (E'/N - 2 E th_d'' - E' th_d') + B_out (w/N - w th_d') + f_out + f_load - T = -T_L
     T = k d + c w d' + f_mesh,    th_d = th_s + d
 
 The mean of 1/w is that of the wanted speed, whose sign w has: a drive may turn either way.
+
+Where the motion of the input is prescribed, by its lead(alpha) = alpha - Omega t, E is known from
+w = Omega / (1 - lead'), and the first equation gives the motor's torque (inverse dynamics).
 """
 
 from __future__ import annotations
 
 from copy import copy
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, reduce
 from typing import cast
 
 import numpy as np
@@ -23,20 +26,23 @@ from numpy.typing import NDArray
 
 from pymoo_hdte.drive._solve.coefficients import Coefficients
 from pymoo_hdte.drive._solve.recursion import Recollection
-from pymoo_hdte.drive._solve.steady_motion import Phasors, SpeedLoop
+from pymoo_hdte.drive._solve.steady_motion import CONSTANT_TORQUE, Phasors, SpeedLoop
 from pymoo_hdte.drive._solve.torus import Torus
 from pymoo_hdte.effects.law import Memory, PortState, Response
 
 _STATIC_STEPS = 8
 _BY_ROW = (
-    "speed", "load", "output_inertia", "output_damping", "static", "_static_slope", "_stiffness",
-    "_backward", "_share_of_mesh", "rate", "input_operator",
+    "speed", "load", "output_inertia", "output_damping", "static", "energy", "_static_error",
+    "_static_slope",
+    "_stiffness", "_backward", "_share_of_mesh", "rate", "input_operator",
 )  # fmt: skip
 """Attributes of `AngleEquations` with a row per case; the last three are computed on demand."""
 
 Values = NDArray[np.float64]
 
 _NO_LAW = Response(np.zeros((1, 1)))
+_SLOWEST = 1e-3
+"""Least relative change of time with the angle: an input that turned back has no speed over it."""
 
 
 @dataclass(frozen=True)
@@ -45,8 +51,9 @@ class TorsionMotion:
 
     ``energy`` are the harmonics of E, (n, n_harmonics). ``mesh_slope`` and ``mesh_damping`` are the
     derivatives of ``mesh_torque`` by torsion and by its rate, ``output_loss`` that of
-    ``output_friction`` by speed. What is the same on the whole grid, or of no law, may have one
-    column or row, or be a number.
+    ``output_friction`` by speed, both of the laws at output and load together. ``of_load`` is the
+    part of those at the load, and ``of_brake`` of what drives or brakes there. What is the same on
+    the whole grid, or of no law, may have one column or row, or be a number.
     """
 
     energy: Phasors
@@ -59,10 +66,20 @@ class TorsionMotion:
     mesh_damping: Values
     output_friction: Values
     output_loss: Values
+    of_load: Values
+    of_brake: Values
 
 
 class AngleEquations:
-    """The equations of n rows, each at a speed (rad/s, either sign) and a load (N.m) of its own."""
+    """The equations of n rows, each at a speed (rad/s, either sign) and a load (N.m) of its own.
+
+    Attributes
+    ----------
+    prescribed : bool
+        Whether the motion of the input is given, so that the motor follows no loop.
+    energy : complex ndarray, shape (n, n_harmonics)
+        E as prescribed, otherwise that of the mean speed, from which to begin.
+    """
 
     def __init__(
         self,
@@ -71,7 +88,10 @@ class AngleEquations:
         load: Values,
         motor: SpeedLoop,
         torus: Torus,
+        lead: Phasors | None = None,
     ) -> None:
+        self.prescribed = lead is not None
+        motor = CONSTANT_TORQUE if self.prescribed else motor
         self.coefficients, self.motor, self.torus = coefficients, motor, torus
         self.speed, self.load = speed[:, None], load[:, None]
         self.output_inertia, self.output_damping = (
@@ -84,6 +104,13 @@ class AngleEquations:
         ):
             place, conjugate = torus.place(float(order))
             self.static[:, place] += phasor.conj() if conjugate else phasor
+        self._static_error = torus.signal(self.static)
+        self.energy = np.zeros_like(self.static)
+        if lead is None:
+            self.energy[:, :1] = self.speed**2 / 2.0
+        else:
+            longer = np.maximum(1.0 - torus.signal(torus.derivative(lead)), _SLOWEST)
+            self.energy = torus.phasors((self.speed / longer) ** 2 / 2.0)
         self._static_slope = torus.signal(torus.derivative(self.static))
         angle = 2.0 * torus.phase(1.0) + coefficients.stiffness_phase
         varying = 1.0 + coefficients.stiffness_depth * np.cos(angle)
@@ -112,6 +139,12 @@ class AngleEquations:
             torsion = torsion + (torque - stiffness * torsion - added) / stiffness
         return torsion
 
+    def torsion_by_load(self) -> Values:
+        """Return the largest torsion, shape (n, 1), by which laws at the load twist the mesh."""
+        speed = np.broadcast_to(self.speed / self.coefficients.ratio, (len(self.speed), 1))
+        torque = self._of_output("load", speed, np.zeros_like(speed)).torque
+        return np.abs(torque).max(axis=1, keepdims=True) / self.coefficients.stiffness[:, None]
+
     def motion(self, torsion: Phasors, energy: Phasors) -> TorsionMotion:
         """Evaluate torsion and E on the grid, with the resulting torques.
 
@@ -138,7 +171,9 @@ class AngleEquations:
         rate = angular_speed * slope_there
         stiffness, damping = self._stiffness, coefficients.damping[:, None]
         mesh = self._laws("mesh", position, rate)
-        output = self._laws("output", np.zeros_like(output_speed), output_speed)
+        lag = self._static_error + position
+        at_load = self._of_output("load", output_speed, lag)
+        output = added(self._of_output("output", output_speed, lag), at_load)
         return TorsionMotion(
             energy=energy * faster**2,
             angular_speed=angular_speed,
@@ -150,38 +185,58 @@ class AngleEquations:
             mesh_damping=damping + np.asarray(mesh.damping),
             output_friction=output.torque,
             output_loss=np.asarray(output.damping),
+            of_load=np.asarray(at_load.torque),
+            of_brake=np.asarray(self._of_output("load", output_speed, lag, driving=True).torque),
         )
 
+    def _of_output(
+        self, port: str, speed: Values, lag: Values, *, driving: bool = False
+    ) -> Response:
+        """Return the sum of the laws at a port that turns with the output, ``lag`` behind alpha/N.
+
+        The grid knows angles up to whole turns only, and so no position. With ``driving`` only laws
+        of what drives or brakes the port count.
+        """
+        position = np.full_like(speed, np.nan)
+        return self._laws(port, position, speed, lag=lag, driving=driving)
+
     def _laws(
-        self, port: str, position: Values, speed: Values, load: Values | None = None
+        self,
+        port: str,
+        position: Values,
+        speed: Values,
+        load: Values | None = None,
+        *,
+        lag: Values | None = None,
+        driving: bool = False,
     ) -> Response:
         """Return the sum of the laws at a port, which passes on ``load`` besides them.
 
         What the mesh passes on is the load itself: a damping that followed the torque that
         accelerates inertias would rectify it.
         """
-        laws = [law for place, law in self.coefficients.laws if place == port]
+        laws = [
+            law
+            for place, law in self.coefficients.laws
+            if place == port and (law.drives or not driving)
+        ]
         if not laws:
             return _NO_LAW
-        # The angle of periodic laws at the output omits the small fluctuation of the output.
-        slower = self.coefficients.ratio if port == "output" else 1.0
 
         def phase(order: float) -> Values:
-            return self.torus.phase(order / slower)
+            if lag is None:
+                return self.torus.phase(order)
+            return np.asarray(self.torus.phase(order / self.coefficients.ratio) - order * lag)
 
         stiffness = self.coefficients.stiffness[:, None]
-        load = self.load if port == "mesh" else load
+        load = self.load if port in ("mesh", "load") else load
         warmth = np.reshape(self.coefficients.temperature, (-1, 1))
         around = (self._path, self._back)
-        state = PortState(position, speed, phase, stiffness, *around, load, warmth, recurs=True)
-        total, *others = (law.respond(state) for law in laws)
-        for response in others:
-            total = Response(
-                total.torque + response.torque,
-                total.slope + response.slope,
-                total.damping + response.damping,
-            )
-        return total
+        elapsed = np.reshape(self.coefficients.elapsed, (-1, 1))
+        state = PortState(
+            position, speed, phase, stiffness, *around, load, warmth, recurs=True, elapsed=elapsed
+        )
+        return reduce(added, (law.respond(state) for law in laws))
 
     def _path(self, values: Values) -> Values:
         """Return grid values in the order in which a row passes them, for two passages."""
@@ -255,12 +310,13 @@ class AngleEquations:
         """Return the torque, N.m, that the output passes on to load, bearings and laws there."""
         return self.output_damping * motion.output_speed + motion.output_friction + self.load
 
+    def brake_torque(self, motion: TorsionMotion) -> Values:
+        """Return the torque between load inertia and brake: T_L and what the brake adds, N.m."""
+        return self.load + motion.of_brake + np.zeros_like(motion.output_speed)
+
     def _of_input(self, motion: TorsionMotion, delivered: Values) -> Values:
         """Return the residual of the first equation on the grid, without the lead's share."""
-        coefficients = self.coefficients
-        still = np.zeros_like(motion.angular_speed)
-        passed_on = delivered / coefficients.ratio
-        friction = self._laws("input", still, motion.angular_speed, passed_on)
+        coefficients, friction = self.coefficients, self._input_friction(motion, delivered)
         return np.asarray(
             coefficients.input_inertia[:, None] * motion.energy_slope
             + coefficients.input_damping[:, None] * motion.angular_speed
@@ -268,6 +324,25 @@ class AngleEquations:
             + motion.mesh_torque * self._share_of_mesh
             - self.motor.proportional * (self.speed - motion.angular_speed)
         )
+
+    def _input_friction(self, motion: TorsionMotion, delivered: Values) -> Response:
+        still = np.zeros_like(motion.angular_speed)
+        return self._laws("input", still, motion.angular_speed, delivered / self.coefficients.ratio)
+
+    def slopes(self, motion: TorsionMotion) -> Values:
+        """Return mean derivatives of torques, shape (n, 4).
+
+        Of the mesh by torsion (N.m/rad) and by its rate, of friction at the output and at the input
+        by speed (N.m.s/rad), bearings included.
+        """
+        friction = np.asarray(self._input_friction(motion, self.delivered(motion)).damping)
+        parts = (
+            mean(motion.mesh_slope),
+            mean(motion.mesh_damping),
+            self.output_damping + mean(motion.output_loss),
+            self.coefficients.input_damping[:, None] + mean(friction),
+        )
+        return np.hstack([np.broadcast_to(part, self.speed.shape) for part in parts])
 
     @cached_property
     def _share_of_mesh(self) -> Values:
@@ -306,6 +381,8 @@ class AngleEquations:
         coupling = coupling + damping / (self.speed * self.coefficients.ratio)
         share = 1.0 + coupling / self.input_operator
         share[:, 0] = 1.0
+        if self.prescribed:
+            share[:] = 1.0
         return output / share, coupling, share
 
     @cached_property
@@ -316,6 +393,15 @@ class AngleEquations:
         inertia = self.output_inertia + self.coefficients.inertia_in_clutches(frequency)
         inertia = inertia + sum(size * self.rate**k for k, size in rates)
         return inertia * frequency**2, 1j * self.torus.orders * inertia / self.coefficients.ratio
+
+
+def added(response: Response, other: Response) -> Response:
+    """Return the sum of two responses."""
+    return Response(
+        response.torque + other.torque,
+        response.slope + other.slope,
+        response.damping + other.damping,
+    )
 
 
 def mean(values: Values | float) -> Values:

@@ -4,7 +4,8 @@
     J_out th_out'' + B_out th_out' - (k d + c d')     = -T_L(t)
     d = th_in / N - th_out - th_s(th_in),   k = K (1 + kappa cos(2 th_in + psi))
 
-and laws at ports, which add their torques, and the reaction of theta_s on the input.
+and laws at ports, which add their torques, and the reaction of theta_s on the input. A law at the
+load acts on the second equation as one at the output does, beyond the output torque sensor.
 `hill_steady_state`, `harmonic_balance` and `time_domain` all solve these equations, so each term is
 defined here once.
 """
@@ -73,6 +74,11 @@ class Coefficients:
     load_errors : tuple of (float, complex)
         Lines of theta_s in proportion to the load: each an order with a phasor in rad per N.m.
         Solvers know them by `at_loads`.
+    late_errors : tuple of (float, float, complex)
+        Lines of theta_s that are there from a time of the session on: each the time in s, an order
+        and a phasor in rad. Solvers know them by `at_loads` too.
+    elapsed : float or ndarray, shape (n,)
+        Time of the session, s; by default after all of it.
 
     Examples
     --------
@@ -102,6 +108,8 @@ class Coefficients:
     load_rates: tuple[tuple[int, float], ...] = ()
     coupled: tuple[tuple[float, float], ...] = ()
     load_errors: tuple[tuple[float, complex], ...] = ()
+    late_errors: tuple[tuple[float, float, complex], ...] = ()
+    elapsed: float | NDArray[np.float64] = np.inf
 
     def rows(self, rows: slice | NDArray[np.int_]) -> Coefficients:
         """Return the coefficients of some of the designs.
@@ -120,7 +128,9 @@ class Coefficients:
         return replace(self, **parts)
 
     def at_loads(self, load_torque: float | NDArray[np.float64]) -> Coefficients:
-        """Return the coefficients with the lines of ``load_errors`` among those of theta_s.
+        """Return the coefficients with all lines of theta_s as at loads and at their times.
+
+        The lines of ``load_errors`` and ``late_errors`` are then among those of theta_s.
 
         Parameters
         ----------
@@ -131,16 +141,26 @@ class Coefficients:
         -------
         Coefficients
         """
-        if not self.load_errors:
+        if not (self.load_errors or self.late_errors):
             return self
-        orders, by_load = zip(*self.load_errors, strict=True)
-        load = np.broadcast_to(load_torque, len(self.stiffness))
+        load, elapsed = (
+            np.broadcast_to(of_rows, len(self.stiffness)) for of_rows in (load_torque, self.elapsed)
+        )
+        phasors = [load * by_load for _, by_load in self.load_errors]
+        phasors += [np.where(elapsed >= after, late, 0.0) for after, _, late in self.late_errors]
         return replace(
             self,
-            error_orders=np.append(self.error_orders, orders),
-            error_phasors=np.hstack([self.error_phasors, np.outer(load, by_load)]),
+            error_orders=np.append(self.error_orders, self.further_orders),
+            error_phasors=np.column_stack([self.error_phasors, *phasors]),
             load_errors=(),
+            late_errors=(),
         )
+
+    @property
+    def further_orders(self) -> tuple[float, ...]:
+        """Orders of ``load_errors``, then ``late_errors``, in cycles per input turn; shape (k,)."""
+        by_load = tuple(order for order, _ in self.load_errors)
+        return (*by_load, *(order for _, order, _ in self.late_errors))
 
     def torque_at(
         self, input_speed: NDArray[np.float64], load_torque: NDArray[np.float64]
@@ -198,5 +218,5 @@ class Coefficients:
 
 _BY_DESIGN = (
     "stiffness", "damping", "input_inertia", "input_damping", "output_inertia", "output_damping",
-    "error_phasors", "load_inertia", "temperature",
+    "error_phasors", "load_inertia", "temperature", "elapsed",
 )  # fmt: skip

@@ -25,11 +25,13 @@ from pymoo_hdte.drive._solve.newton import Place, nearer
 from pymoo_hdte.drive._solve.steady_motion import (
     BY_CASE,
     CONSTANT_TORQUE,
+    Phasors,
     SpeedLoop,
     SteadyMotion,
     Tangents,
 )
 from pymoo_hdte.drive._solve.torus import Torus, shared_torus
+from pymoo_hdte.effects.law import OUTPUT_SHAFT
 
 HIGHEST = 8
 """Least number of harmonics of the input turn that are kept."""
@@ -50,9 +52,9 @@ _SHRINKS = 0.1
 def torus_of(coefficients: Coefficients) -> Torus:
     """Return a torus that holds all excited orders with room for their combinations."""
     excited = [float(order) for order in coefficients.error_orders]
-    excited += [order for order, _ in coefficients.load_errors]
+    excited += coefficients.further_orders
     for port, law in coefficients.laws:
-        scale = 1.0 / coefficients.ratio if port == "output" else 1.0
+        scale = 1.0 / coefficients.ratio if port in OUTPUT_SHAFT else 1.0
         excited += [scale * order for order in law.orders]
     fundamentals = fundamental_orders(excited)
     needed = largest_multiples(fundamentals, excited)
@@ -74,6 +76,7 @@ def harmonic_balance(
     start: SteadyMotion | None = None,
     steps: int = STEPS,
     tangents: bool = False,
+    lead: Phasors | None = None,
 ) -> SteadyMotion:
     """Return the steady state of the n designs of ``coefficients``, laws at ports included.
 
@@ -102,6 +105,9 @@ def harmonic_balance(
     tangents : bool
         Whether the result is to serve as ``start`` of cases that take steps with its matrices as
         long as these shrink fast; it then holds all that it was found from.
+    lead : complex ndarray, shape (n, n_harmonics), optional
+        Motion of the input, if it is known: alpha - Omega t at the orders of ``torus``, rad. The
+        motor's torque is then the one that this motion takes, whatever its loop does.
 
     Returns
     -------
@@ -111,7 +117,8 @@ def harmonic_balance(
     Raises
     ------
     InvalidInput
-        If a speed is 0: a drive at rest has no steady state over its angle.
+        If a speed is 0: a drive at rest has no steady state over its angle; if ``lead`` has another
+        shape.
 
     Examples
     --------
@@ -128,12 +135,17 @@ def harmonic_balance(
         raise InvalidInput("input_speed", 0.0, "other than 0")
     coefficients = coefficients.at_loads(load)
     torus = torus_of(coefficients) if torus is None else torus
+    if lead is not None and lead.shape != (n, len(torus.orders)):
+        raise InvalidInput("lead", lead.shape, f"of shape {(n, len(torus.orders))}")
     if start is not None and not np.array_equal(start.torus.orders, torus.orders):
         start = None
     solvers = []
     for begin in range(0, max(n, 1), _ROWS_AT_ONCE):
         rows = slice(begin, begin + _ROWS_AT_ONCE)
-        equations = AngleEquations(coefficients.rows(rows), speed[rows], load[rows], motor, torus)
+        known = None if lead is None else lead[rows]
+        equations = AngleEquations(
+            coefficients.rows(rows), speed[rows], load[rows], motor, torus, known
+        )
         solver = _Solver(equations, None if start is None else start.rows(rows))
         # A row that diverges is marked as not converged; its values are meaningless.
         with np.errstate(over="ignore", invalid="ignore"):
@@ -196,12 +208,13 @@ class _Solver:
         else:
             self.torsion = np.zeros_like(equations.static)
             self.torsion[:, 0] = equations.static_torsion()
-            self.energy = np.zeros_like(equations.static)
-            self.energy[:, :1] = equations.speed**2 / 2.0
+            self.energy = equations.energy.copy()
             if neighbour is not None:
                 known = neighbour.converged[:, None]
                 self.torsion = np.where(known, neighbour.torsion, self.torsion)
                 self.energy = np.where(known, neighbour.energy, self.energy)
+        if equations.prescribed:
+            self.energy = equations.energy.copy()
 
     def solve(self, tolerance: float, steps: int, systems: list[LinearSystem | None]) -> None:
         """Iterate until the torsion converges; rows that do not are marked.
@@ -210,6 +223,7 @@ class _Solver:
         """
         equations, open_rows = self.equations, np.arange(len(self.torsion))
         size = np.abs(self.torsion[:, :1]) + np.abs(equations.static).sum(axis=1)[:, None] + 1e-9
+        size = size + equations.torsion_by_load()
         at = Place(equations, self.torsion, self.energy)
         before, least = np.full(len(open_rows), np.inf), np.full(len(open_rows), np.inf)
         distance, waited = at.distance[:, 0], np.zeros(len(open_rows), dtype=int)
@@ -270,22 +284,31 @@ class _Solver:
         motion = equations.motion(self.torsion, self.energy)
         inertia = np.reshape(equations.coefficients.load_inertia, (-1, 1))
         coupling = (
-            equations.load + inertia * motion.output_acceleration + equations.of_loose_loads(motion)
+            equations.load
+            + inertia * motion.output_acceleration
+            + equations.of_loose_loads(motion)
+            + motion.of_load
         )
+        brake = equations.brake_torque(motion)
         slower = equations.speed - motion.angular_speed
-        missing, _, lead, others = equations.residuals(motion, slower, coupling)
-        # The motor's torque is that of its loop, with a constant.
-        loop = equations.motor
-        motor_torque = loop.proportional * others[0] - loop.integral * lead
-        motor_torque[:, :1] += missing[:, :1].real
+        missing, _, lead, others = equations.residuals(motion, slower, coupling, brake)
+        motor_torque = missing
+        if not equations.prescribed:
+            # The motor's torque is that of its loop, with a constant.
+            loop = equations.motor
+            motor_torque = loop.proportional * others[0] - loop.integral * lead
+            motor_torque[:, :1] += missing[:, :1].real
         return SteadyMotion(
             torus=equations.torus,
             transmission_error=equations.static + self.torsion,
             torsion=self.torsion,
             motor_torque=motor_torque,
             coupling_torque=others[1],
+            brake_torque=others[2],
             lead=lead,
             energy=motion.energy,
+            slower=others[0],
+            slopes=equations.slopes(motion),
             converged=self.converged,
         )
 

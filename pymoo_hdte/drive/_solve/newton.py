@@ -45,7 +45,8 @@ _BY_ROW = (
 class Place:
     """A torsion and E of all rows, with what the equations leave there.
 
-    E is eliminated: near the steady state it answers to the mesh torque harmonic by harmonic.
+    E is eliminated: near the steady state it answers to the mesh torque harmonic by harmonic, and
+    where it is prescribed not at all.
 
     Attributes
     ----------
@@ -65,6 +66,8 @@ class Place:
         missing, of_output, *_ = equations.residuals(motion)
         self._energy_change = -ratio * missing / operator
         self._energy_change[:, 0] = 0.0
+        if equations.prescribed:
+            self._energy_change[:] = 0.0
         self._residual = (of_output + coupling * self._energy_change) / share
         self._viscous = equations.rate * mean(motion.mesh_damping) - self._impedance
         self._level = mean(motion.mesh_slope)
@@ -109,6 +112,8 @@ class Place:
         longest = np.abs(change).max(axis=1, keepdims=True)
         change *= np.minimum(1.0, size / np.maximum(longest, 1e-300))
         energy_change = self._energy_change.copy()
+        if self.equations.prescribed:
+            return change, energy_change
         operator = self.equations.input_operator
         energy_change[:, 1:] -= ((self._residual + self._impedance * change) / operator)[:, 1:]
         # Nor may the speed come near zero on the way.

@@ -113,12 +113,17 @@ class SteadyMotion:
         Whose ``orders`` the phasors belong to.
     transmission_error, torsion : ndarray of complex, shape (n, n_harmonics)
         theta_d and d, rad.
-    motor_torque, coupling_torque : ndarray of complex, shape (n, n_harmonics)
-        Torque on the input, and between drive and load inertia, N.m.
+    motor_torque, coupling_torque, brake_torque : ndarray of complex, shape (n, n_harmonics)
+        Torque on the input, between drive and load inertia, and between that and the brake, N.m.
     lead : ndarray of complex, shape (n, n_harmonics)
         Input angle ahead of the mean speed's, alpha - Omega t, rad; its mean is 0.
     energy : ndarray of complex, shape (n, n_harmonics)
         Half the square of the input speed, rad2/s2.
+    slower : ndarray of complex, shape (n, n_harmonics)
+        Mean speed of the input less its speed, rad/s.
+    slopes : ndarray, shape (n, 4)
+        Mean derivatives of torques: of the mesh by torsion (N.m/rad) and by its rate, of friction
+        at the output and at the input by speed (N.m.s/rad).
     converged : ndarray of bool, shape (n,)
         Whether the balance of the case was found; if not, its other values mean nothing.
     tangents : Tangents, optional
@@ -137,8 +142,11 @@ class SteadyMotion:
     torsion: Phasors
     motor_torque: Phasors
     coupling_torque: Phasors
+    brake_torque: Phasors
     lead: Phasors
     energy: Phasors
+    slower: Phasors
+    slopes: NDArray[np.float64]
     converged: NDArray[np.bool_]
     tangents: Tangents | None = field(default=None, kw_only=True, repr=False, compare=False)
 
@@ -164,7 +172,7 @@ class SteadyMotion:
 
 
 BY_CASE = (
-    "transmission_error", "torsion", "motor_torque", "coupling_torque", "lead", "energy",
-    "converged",
+    "transmission_error", "torsion", "motor_torque", "coupling_torque", "brake_torque", "lead",
+    "energy", "slower", "slopes", "converged",
 )  # fmt: skip
 """Fields of `SteadyMotion` with a row a case, in their order."""

@@ -95,7 +95,8 @@ def equations_of_motion(
     reaction = coefficients.reaction
 
     def losses(rate: float) -> float:
-        return dry("input", 0.0, rate, 0.0) + dry("output", 0.0, rate / ratio, 0.0) / ratio
+        at_output = dry("output", 0.0, rate / ratio, 0.0) + dry("load", 0.0, rate / ratio, 0.0)
+        return dry("input", 0.0, rate, 0.0) + at_output / ratio
 
     # The error of the holding torque is of second order, by fluctuations of speed and torsion.
     remembering = memories(coefficients)
@@ -127,9 +128,10 @@ def equations_of_motion(
         input_torque = accelerating * envelope_rate + (holding + excess) * envelope
         input_torque += losses(speed * envelope)
         output_speed = input_speed / ratio - error_rate
-        output_angle = position / ratio
+        output_angle = position / ratio - error
         delivered = load * envelope + bearing_out * output_speed
         delivered += laws("output", output_angle, output_speed, output_angle)
+        delivered += laws("load", output_angle, output_speed, output_angle, load * envelope)
         dragged = sum(j / late * slip for (j, late), slip in zip(clutches, slips, strict=True))
         output_acceleration = (mesh_torque - delivered - dragged) / inertia_out
         resisting = bearing_in * input_speed

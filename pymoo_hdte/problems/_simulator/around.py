@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from functools import cached_property
 from itertools import product
+from typing import Any
 
 import numpy as np
 
@@ -12,13 +13,27 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from pymoo_hdte.problems._simulator.crashes import SuccessAround
+from pymoo_hdte.problems._simulator.replicates import OwnScatter
+from pymoo_hdte.problems._simulator.tails import NormalScatter, Tail
 from pymoo_hdte.surrogate._sparse.moments import SparseMoments, deviation
+from pymoo_hdte.surrogate._sparse.success import STUDENT_OF_DRAWS
+from pymoo_hdte.surrogate.moments import divide_or_zero
 
 Array = NDArray[np.float64]
 
 SAMPLES = 4096
 """Samples of the scatter: four scrambled Sobol sequences."""
 PARTS = 4
+STUDENT = 3.182
+"""Standard errors of a mean of four parts within which it lies with 95 %: Student's t(3).
+
+The size of the standard error itself is taken from these four; 2 would cover some 86 %.
+"""
+RESOLVED = 10.0 / SAMPLES
+"""Smallest probability beyond a quantile for which they serve: ten have an error of a third."""
+OFTEN = 0.1
+"""Smallest probability of an event for which they serve: 410 of them have an error of 5 %."""
 MOST_CORNERS = 256
 """Corners of the box of the scatter at which a search for the extreme begins, at most."""
 _SWEEPS = 8
@@ -55,6 +70,10 @@ class CommonSamples:
         self.ends = ends
         self._corners = self._some_corners(ends, np.random.default_rng(seed))
 
+    def __deepcopy__(self, memo: dict[int, Any]) -> CommonSamples:
+        """Return itself: nothing in it changes."""
+        return self
+
     @staticmethod
     def _some_corners(ends: Array, random_state: np.random.Generator) -> Array:
         moving = np.flatnonzero(ends[:, 0] < ends[:, 1])
@@ -65,6 +84,19 @@ class CommonSamples:
         corners = np.tile(ends[:, 0], (len(sides), 1))
         corners[:, moving] = ends[moving, sides]
         return corners
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what is pickled: not what can be computed anew."""
+        return {
+            name: value
+            for name, value in vars(self).items()
+            if name not in ("basis", "starts", "normal_scatter")
+        }
+
+    @cached_property
+    def normal_scatter(self) -> NormalScatter:
+        """The scatter as a function of standard normal variables."""
+        return NormalScatter(self.moments.axes)
 
     @cached_property
     def basis(self) -> Array:
@@ -89,11 +121,48 @@ class Around:
         Expansion of the response, from `SparseMoments.expansion`.
     part : slice
         The samples to use.
+
+    Attributes
+    ----------
+    resolved, often : float
+        Smallest probabilities, beyond a quantile and of an event, for which the samples serve.
+    beside : dict of str to Around
+        All responses around these designs by name, itself among them; None stands for the only one.
+    mean_error, std_error : ndarray, shape (n,)
+        Errors of mean and standard deviation in the response's unit.
+    success : SuccessAround or None
+        How likely runs succeed there, if some have failed; statistics then are of those that do.
+    own : OwnScatter or None
+        What the response of a random simulator scatters by itself.
+    n_runs : int
+        Runs behind it.
     """
 
-    def __init__(self, common: CommonSamples, expansion: Array, part: slice = slice(None)) -> None:
+    resolved, often = RESOLVED, OFTEN
+
+    def __init__(
+        self,
+        common: CommonSamples,
+        expansion: Array,
+        part: slice = slice(None),
+        success: SuccessAround | None = None,
+        own: OwnScatter | None = None,
+    ) -> None:
         self._common, self.expansion, self._part = common, expansion, part
-        self.mean, self.std = expansion[:, 0], deviation(expansion)
+        self.success, self.own, self.n_runs = success, own, 0
+        self.beside: dict[str | None, Around] = {None: self}
+        self.mean_error = self.std_error = np.zeros(len(expansion))
+
+    def tail(
+        self,
+        row: int,
+        margin: Callable[[Mapping[str | None, Array]], Array],
+        target: Callable[[Array, Array], float] = lambda values, weights: 0.0,
+    ) -> Tail:
+        """Return samples around one design where a margin of the responses is above a level."""
+        expansions = {name: around.expansion[row] for name, around in self.beside.items()}
+        moments = self._common.moments
+        return Tail(self._common.normal_scatter, moments.basis, expansions, margin, target)
 
     @property
     def size(self) -> int:
@@ -101,25 +170,101 @@ class Around:
         return self.expansion.shape[1]
 
     @cached_property
+    def weights(self) -> Array | None:
+        """What the samples count, shape (n, k), their mean 1; None if all count alike."""
+        if self.success is None:
+            return None
+        weights = np.maximum(self.success.probabilities(self._part), np.finfo(float).tiny)
+        return weights / weights.mean(axis=1, keepdims=True)
+
+    @cached_property
+    def success_share(self) -> Array:
+        """The probability that a run succeeds, shape (n,)."""
+        if self.success is None:
+            return np.ones(len(self.expansion))
+        return self.success.probabilities(self._part).mean(axis=1)
+
+    @cached_property
+    def mean(self) -> Array:
+        """The mean, shape (n,), exact where all runs succeed."""
+        if self.weights is None:
+            return self.expansion[:, 0]
+        # The samples tell how failures change it: without any, it is the exact one.
+        values = self.expansion @ self._common.basis[self._part].T
+        return self.expansion[:, 0] + np.mean((self.weights - 1.0) * values, axis=1)
+
+    @cached_property
+    def std(self) -> Array:
+        """The standard deviation, shape (n,), exact where all runs succeed."""
+        by_inputs = deviation(self.expansion)
+        if self.weights is not None:
+            values = self.expansion @ self._common.basis[self._part].T
+            mean = np.mean(self.weights * values, axis=1, keepdims=True)
+            variance = np.mean(self.weights * (values - mean) ** 2, axis=1)
+            by_inputs = by_inputs * np.sqrt(divide_or_zero(variance, values.var(axis=1)))
+        if self.own is None:
+            return by_inputs
+        return np.sqrt(by_inputs**2 + self.own.variance(self.weights, self._part))
+
+    def error_of_success(self, value: Callable[[Around], Array]) -> Array:
+        """Return by how much a number may be off since success is uncertain, shape (n,).
+
+        Parameters
+        ----------
+        value : callable
+            Returns the number, shape (n,), of what is around designs.
+        """
+        if self.success is None:
+            return np.zeros(len(self.expansion))
+        part = slice(0, SAMPLES // PARTS)
+        own = value(self._with(self.success, part))
+        others = [value(self._with(draw, part)) for draw in self.success.drawn()]
+        parts = np.array([value(quarter) for quarter in self.quarters()])
+        sampling = STUDENT * parts.std(axis=0, ddof=1) / np.sqrt(PARTS)
+        posterior = np.sqrt(np.mean((np.array(others) - own) ** 2, axis=0))
+        return STUDENT_OF_DRAWS * posterior + sampling
+
+    def _with(self, success: SuccessAround | None, part: slice) -> Around:
+        """Return all responses with another probability of success and a part of the samples."""
+        others = {
+            id(around): Around(self._common, around.expansion, part, success, around.own)
+            for around in self.beside.values()
+        }
+        beside = {name: others[id(around)] for name, around in self.beside.items()}
+        for around in others.values():
+            around.beside = beside
+        return others[id(self)]
+
+    @cached_property
     def samples(self) -> tuple[Array, Array]:
         """Values at the samples, shape (n, k), and the polynomials there, shape (k, q)."""
         basis = self._common.basis[self._part]
-        return self.expansion @ basis.T, basis
+        values = self.expansion @ basis.T
+        return values if self.own is None else values + self.own.drawn(self._part), basis
+
+    @property
+    def common_alone(self) -> bool:
+        """Whether only common samples serve: others know no failures and no own scatter."""
+        return self.success is not None or self.own is not None
 
     def quarters(self) -> Iterator[Around]:
         """Yield the same with each independent part of the samples."""
         step = SAMPLES // PARTS
         for start in range(0, SAMPLES, step):
-            yield Around(self._common, self.expansion, slice(start, start + step))
+            yield self._with(self.success, slice(start, start + step))
 
     def extreme(self, side: float) -> tuple[Array, Array]:
         """Return the largest value in the box, shape (n,), and the polynomials there, (n, q).
 
-        The smallest for ``side`` -1. From the best of the corners and of some points inside, by
-        searches along one axis after the other.
+        The smallest for ``side`` -1; where runs fail, only where one is likelier to succeed. From
+        the best of the corners and of some points inside, by searches along one axis after the
+        other.
         """
         points, basis = self._common.starts
-        best = np.argmax(side * self.expansion @ basis.T, axis=1)
+        values = side * self.expansion @ basis.T
+        if self.success is not None:
+            values = np.where(self.success.likely_at(points), values, -np.inf)
+        best = np.argmax(values, axis=1)
         optima = points[best]
         ends = self._common.ends
         moving = np.flatnonzero(ends[:, 0] < ends[:, 1])
@@ -143,8 +288,12 @@ class Around:
         count = tried.shape[1]
         points = np.repeat(optima, count, axis=0)
         points[:, axis] = tried.reshape(-1)
-        values = moments.basis(points).reshape(len(optima), count, -1)
-        best = np.argmax(side * np.einsum("nkq,nq->nk", values, self.expansion), axis=1)
+        basis = moments.basis(points).reshape(len(optima), count, -1)
+        values = side * np.einsum("nkq,nq->nk", basis, self.expansion)
+        if self.success is not None:
+            at = points.reshape(len(optima), count, -1)
+            values = np.where(self.success.likely_at(at), values, -np.inf)
+        best = np.argmax(values, axis=1)
         optima = optima.copy()
         optima[:, axis] = tried[np.arange(len(optima)), best]
         return optima

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from pymoo_hdte.checks import InvalidInput, one_of, real_number
 from pymoo_hdte.problems._simulator.distributions import joint_distribution
-from pymoo_hdte.surrogate._sparse.axes import Axis, Scatter, noise_axis, standard_normal
+from pymoo_hdte.surrogate._sparse.axes import TAIL, Axis, Scatter, noise_axis, standard_normal
 from pymoo_hdte.surrogate._sparse.measures import Distribution, Measure
 
 MOST_INPUTS = 20
@@ -76,13 +76,15 @@ class Design:
             allowed = "'linear' unless lower is above 0 and the deviation relative"
             raise InvalidInput("scale", self.scale, allowed)
 
-    def axis(self, name: str) -> Axis:
+    def axis(self, name: str, tail: float = TAIL) -> Axis:
         """Return the variable as the surrogate sees it.
 
         Parameters
         ----------
         name : str
             Name of the variable.
+        tail : float
+            As in `Scatter`.
 
         Returns
         -------
@@ -97,7 +99,7 @@ class Design:
         given = self.tolerance if relative else self.deviation
         scatter = None
         if relative or _scatters("deviation", given):
-            scatter = _scatter(f"deviation of {name!r}", given)
+            scatter = _scatter(f"deviation of {name!r}", given, tail)
             if relative and scatter.distribution.lower <= -1.0:
                 lowest = scatter.distribution.lower
                 raise InvalidInput(f"smallest relative deviation of {name!r}", lowest, "above -1")
@@ -111,11 +113,11 @@ def _scatters(field: str, given: Any, below: float = np.inf) -> bool:
     return real_number(field, given, at_least=0.0, below=below) > 0.0
 
 
-def _scatter(field: str, given: Any) -> Scatter:
+def _scatter(field: str, given: Any, tail: float) -> Scatter:
     if not hasattr(given, "pdf"):
         given = scipy.stats.uniform(-float(given), 2.0 * float(given))
     distribution = Distribution(field, given)
-    return Scatter(distribution, Measure.of(field, distribution))
+    return Scatter(distribution, Measure.of(field, distribution), tail)
 
 
 class Inputs:
@@ -129,6 +131,10 @@ class Inputs:
         `chaospy`. Dependent variables are functions of independent standard normal ones (inverse
         Rosenblatt transformation), in which the surrogate is a polynomial: of degree one for
         `chaospy.MvNormal`. Its moments are exact, and its error is part of the estimated one.
+    tail : float
+        Share of the probability beyond the reach of an unbounded scatter on either side.
+    designed : bool
+        Whether there has to be a design.
 
     Attributes
     ----------
@@ -146,19 +152,25 @@ class Inputs:
         distribution is not allowed.
     """
 
-    def __init__(self, designs: Mapping[str, Design], noise: Mapping[Any, Any]) -> None:
-        if not isinstance(designs, Mapping) or not designs:
+    def __init__(
+        self,
+        designs: Mapping[str, Design],
+        noise: Mapping[Any, Any],
+        tail: float = TAIL,
+        designed: bool = True,
+    ) -> None:
+        if not isinstance(designs, Mapping) or (designed and not designs):
             raise InvalidInput("designs", designs, "a mapping of one or more names to a Design")
         if not isinstance(noise, Mapping):
             raise InvalidInput("noise", noise, "a mapping of names to distributions")
-        self.designs, self.noise = dict(designs), dict(noise)
+        self.designs, self.noise, self.tail = dict(designs), dict(noise), tail
         self.axes: list[Axis] = []
         names: list[str] = []
         for name, design in designs.items():
             if not isinstance(design, Design):
                 raise InvalidInput(f"designs[{name!r}]", design, "a Design")
             names.append(name)
-            self.axes.append(design.axis(name))
+            self.axes.append(design.axis(name, tail))
         self._joint: list[tuple[int, Any]] = []
         for key, given in noise.items():
             group = key if isinstance(key, tuple) else (key,)
@@ -170,16 +182,20 @@ class Inputs:
             raise InvalidInput("names of the inputs", tuple(names), allowed)
         self.names = tuple(names)
 
+    def __deepcopy__(self, memo: dict[int, Any]) -> Inputs:
+        """Return itself: nothing in it changes."""
+        return self
+
     def _add_noise(self, group: Sequence[str], given: Any, start: int) -> None:
         if len(group) == 1:
-            self.axes.append(noise_axis(group[0], _noise(group[0], given)))
+            self.axes.append(noise_axis(group[0], _noise(group[0], given, self.tail)))
             return
         given = joint_distribution(f"noise[{group!r}]", given, len(group))
         if not given.stochastic_dependent:
             for place, name in enumerate(group):
                 self._add_noise((name,), given[place], start + place)
             return
-        self.axes += [Axis(name, standard_normal()) for name in group]
+        self.axes += [Axis(name, standard_normal(self.tail)) for name in group]
         self._joint.append((start, given))
 
     @property
@@ -197,6 +213,20 @@ class Inputs:
             )
         return np.column_stack(columns)
 
+    def cube(self, values: Array) -> Array:
+        """Return the points of -1..1 of inputs in their units, both shape (n, d).
+
+        Values beyond the reach are beyond -1..1, infinite or NaN.
+        """
+        columns = list(values.T)
+        for start, joint in self._joint:
+            place = slice(start, start + len(joint))
+            shares = np.asarray(joint.fwd(np.array(columns[place])))
+            columns[place] = list(scipy.special.ndtri(shares))
+        with np.errstate(invalid="ignore", divide="ignore"):
+            cubes = [axis.cube(v) for axis, v in zip(self.axes, columns, strict=True)]
+        return np.column_stack(cubes)
+
     def reach(self) -> dict[str, tuple[float, float]]:
         """Return smallest and largest value at which the simulator will be called, by name.
 
@@ -208,7 +238,7 @@ class Inputs:
         return dict(zip(self.names, zip(lows, highs, strict=True), strict=True))
 
 
-def _noise(name: str, given: Any) -> Scatter:
+def _noise(name: str, given: Any, tail: float) -> Scatter:
     field = f"noise[{name!r}]"
     distribution = Distribution(field, given)
-    return Scatter(distribution, Measure.of(field, distribution))
+    return Scatter(distribution, Measure.of(field, distribution), tail)

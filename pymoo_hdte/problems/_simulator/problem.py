@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -11,14 +12,18 @@ from numpy.typing import ArrayLike, NDArray
 from pymoo.core.problem import Problem
 
 from pymoo_hdte.checks import InvalidInput, finite_array
-from pymoo_hdte.problems._simulator.around import Around, CommonSamples
+from pymoo_hdte.problems._simulator.around import RESOLVED, Around, CommonSamples
+from pymoo_hdte.problems._simulator.crashes import CrashProbability, SuccessMoments
+from pymoo_hdte.problems._simulator.data import Runs
 from pymoo_hdte.problems._simulator.inputs import Inputs
+from pymoo_hdte.problems._simulator.replicates import OwnMoments
 from pymoo_hdte.problems._simulator.requested import by_moments, place_of, requested_of
 from pymoo_hdte.problems._simulator.statistics import RobustConstraint, Statistic
 from pymoo_hdte.problems._simulator.stored import read_problem, write_problem
 from pymoo_hdte.surrogate._sparse.adaptive import AdaptiveFit
 from pymoo_hdte.surrogate._sparse.draws import draw_designs
 from pymoo_hdte.surrogate.box import Box
+from pymoo_hdte.surrogate.moments import divide_or_zero
 from pymoo_hdte.surrogate.sensitivity import SobolIndices
 
 Array = NDArray[np.float64]
@@ -34,7 +39,9 @@ class SimulatorProblem(Problem):
 
     An ordinary vectorised `Problem` of pymoo. Ask for ``dF`` and ``dG`` in ``return_values_of`` to
     get gradients, shape (n, n_obj, n_var), exact for the surrogate, and for ``F_band`` to get the
-    estimated half-width of the error of F, NaN for a `WorstCase`.
+    estimated half-width of the error of F, NaN for a `WorstCase`. Where runs fail, statistics are
+    those of the runs that succeed, there are no gradients, and a `CrashProbability` tells how often
+    they fail.
 
     Parameters
     ----------
@@ -50,6 +57,10 @@ class SimulatorProblem(Problem):
         Constraints to be met.
     n_runs : int
         Runs of the simulator that were made.
+    refusal : str, optional
+        Why the surrogate is not what was asked for.
+    replicates : Runs, optional
+        All runs of a random simulator, of whose means and variances the surrogate is.
 
     Attributes
     ----------
@@ -61,8 +72,14 @@ class SimulatorProblem(Problem):
     response_errors : dict of str to float
         Estimated error of each response as a share of its scatter, the larger one of mean and
         deviation; large perhaps for a response that no objective and no constraint names.
+    trusted : bool
+        Whether the surrogate is as accurate as was asked for; False only with ``accept="best"``.
+    refusal : str or None
+        Why it is not trusted.
+    runs : Runs or None
+        Inputs X and responses Y of all runs; None for a problem that was loaded.
     failed : ndarray, shape (k, d)
-        Inputs in their units at which the simulator failed; the fit goes on without them.
+        Inputs in their units at which the simulator failed.
     var_names, obj_names, input_names : tuple of str
         In the order of X, in that of F, and of all inputs of the simulator, the designs first.
     design_box : Box
@@ -87,8 +104,10 @@ class SimulatorProblem(Problem):
         objectives: Sequence[Statistic],
         constraints: Sequence[RobustConstraint],
         n_runs: int,
+        refusal: str | None = None,
+        replicates: Runs | None = None,
     ) -> None:
-        self._inputs = inputs
+        self._inputs, self.refusal, self._replicates = inputs, refusal, replicates
         bounds = np.array([axis.design for axis in inputs.axes if axis.designed])
         self.design_box = Box(inputs.designed, *bounds.T)
         self.objectives, self.constraints = tuple(objectives), tuple(constraints)
@@ -104,10 +123,28 @@ class SimulatorProblem(Problem):
         self.var_names, self.input_names = inputs.designed, inputs.names
         self.obj_names = tuple(statistic.name for statistic in objectives)
         self._common = CommonSamples(fit.moments, seed=1)
+        self._success = self._own = None
+        if fit.own is not None:
+            self._own = OwnMoments(fit.own, inputs.axes, self._common.scatter)
+        if fit.success is not None:
+            self._success = SuccessMoments(fit.success, inputs.axes, self._common.scatter)
         self.failed = inputs.values(fit.failed) if len(fit.failed) else fit.failed
-        self.accuracy = self._accuracy()
         errors = fit.errors.max(axis=0).tolist()
         self.response_errors = dict(zip(responses, errors, strict=True))
+
+    @property
+    def trusted(self) -> bool:
+        """Whether the surrogate is as accurate as was asked for."""
+        return self.refusal is None
+
+    @property
+    def runs(self) -> Runs | None:
+        """Inputs and responses of all runs; None for a problem that was loaded."""
+        if not len(self._fit.points):
+            return None
+        if self._replicates is not None:
+            return self._replicates
+        return Runs(self._inputs.values(self._fit.points), self._fit.truth.copy())
 
     @property
     def degrees(self) -> dict[str, int]:
@@ -124,7 +161,7 @@ class SimulatorProblem(Problem):
         OSError
             If the file cannot be written.
         """
-        parts = self.responses, self.objectives, self.constraints, self.n_runs
+        parts = self.responses, self.objectives, self.constraints, self.n_runs, self.refusal
         write_problem(path, self._inputs, self._fit, *parts)
 
     @classmethod
@@ -169,14 +206,41 @@ class SimulatorProblem(Problem):
         parts = [self._band(self._around(X[start : start + _AT_ONCE])) for start in blocks]
         return np.concatenate(parts) if parts else np.empty((0, self.n_obj))
 
+    def crash_probability(self, designs: ArrayLike) -> tuple[Array, Array]:
+        """Return how likely a run around each design fails, and the half-width of its error.
+
+        Parameters
+        ----------
+        designs : array_like, shape (n, n_var)
+            In the variables' units.
+
+        Returns
+        -------
+        probability, half_width : ndarray, shape (n,)
+            Dimensionless; the band is of 95 %.
+
+        Raises
+        ------
+        ExtrapolationError
+            If a design lies outside the box.
+        InvalidInput
+            If ``designs`` is no array of numbers of shape (n, n_var).
+        """
+        X, statistic = self.design_box.settle(designs), CrashProbability()
+        parts = []
+        for start in range(0, len(X), _AT_ONCE):
+            around = self._around(X[start : start + _AT_ONCE])[0]
+            parts.append([statistic.value(around)[0], _half_width(statistic, around)])
+        probability, half_width = np.concatenate(parts, axis=1) if parts else np.empty((2, 0))
+        return probability, half_width
+
     def predict(self, values: ArrayLike) -> Array:
         """Return the surrogate of all responses, shape (n, r), in their units.
 
         Parameters
         ----------
         values : array_like, shape (n, d)
-            All inputs in the order of ``input_names`` and in their units, within their reach; not
-            for noise that is dependent or in its normal coordinate.
+            All inputs in the order of ``input_names`` and in their units, within their reach.
 
         Raises
         ------
@@ -184,8 +248,7 @@ class SimulatorProblem(Problem):
             If ``values`` is no array of finite numbers of shape (n, d).
         """
         points = finite_array("values", values, (None, len(self.input_names)))
-        columns = [axis.cube(v) for axis, v in zip(self._inputs.axes, points.T, strict=True)]
-        return self._fit.polynomial(np.column_stack(columns))
+        return self._fit.polynomial(self._inputs.cube(points))
 
     def sobol_indices(self, design: ArrayLike, response: str | None = None) -> SobolIndices:
         """Return how the variance of a response around a design divides among its inputs.
@@ -223,17 +286,34 @@ class SimulatorProblem(Problem):
     def _around(self, X: Array) -> list[Around]:
         """Return the expansion of each response around the designs."""
         expansion = self._fit.moments.expansion(X)
-        return [Around(self._common, expansion[:, k]) for k in range(len(self.responses))]
+        success = None if self._success is None else self._success.around(X)
+        owns: Sequence[Any] = [None] * len(self.responses)
+        if self._own is not None:
+            owns = self._own.around(X)
+        around = [
+            Around(self._common, expansion[:, k], success=success, own=own)
+            for k, own in enumerate(owns)
+        ]
+        beside: dict[str | None, Around] = dict(zip(self.responses, around, strict=True))
+        if len(around) == 1:
+            beside[None] = around[0]
+        for place, response in enumerate(around):
+            scatter = np.maximum(response.std, self._fit.smallest_scatter[place])
+            response.mean_error = self._fit.mean_error[place] * scatter
+            response.std_error = self._fit.std_error[place] * scatter
+            response.beside, response.n_runs = beside, self.n_runs
+        return around
 
     def _band(self, around: list[Around]) -> Array:
         columns = []
         for statistic, _, _, place in self._requested[: self.n_obj]:
-            scatter = np.maximum(around[place].std, self._fit.smallest_scatter[place])
-            errors = self._fit.mean_error[place] * scatter, self._fit.std_error[place] * scatter
-            columns.append(statistic.half_width(*errors, around[place]))
+            response = around[place]
+            columns.append(_half_width(statistic, response))
         return np.column_stack(columns)
 
-    def _accuracy(self) -> Array:
+    @cached_property
+    def accuracy(self) -> Array:
+        """Estimated error of each objective, as the class says, shape (n_obj,)."""
         designs = draw_designs(self._inputs.axes, _JUDGED, np.random.default_rng(1))
         around = self._around(designs)
         shares = self._band(around)
@@ -256,7 +336,9 @@ class SimulatorProblem(Problem):
         x = self.design_box.settle(x)
         slopes: list[str] = [key for key in ("dF", "dG") if key in out]
         blocks = range(0, len(x), _AT_ONCE)
-        quick = None if slopes else by_moments(self._requested, self._fit.moments, x)
+        quick = None
+        if not slopes and self._success is None and self._own is None:
+            quick = by_moments(self._requested, self._fit.moments, x)
         if quick is not None:
             parts = [{"F": quick[:, : self.n_obj], "G": quick[:, self.n_obj :]}]
         else:
@@ -274,7 +356,7 @@ class SimulatorProblem(Problem):
             value, slope = statistic.value(around[place])
             values.append(sign * value - bound)
             if slopes:
-                gradients.append(sign * self._gradient(x, statistic, slope, place))
+                gradients.append(sign * self._gradient(x, statistic, slope, around[place], place))
         F, G = np.split(np.column_stack(values), [self.n_obj], axis=1)
         outputs = {"F": F, "G": G}
         if slopes:
@@ -282,9 +364,36 @@ class SimulatorProblem(Problem):
             outputs |= {"dF": dF, "dG": dG}
         return outputs
 
-    def _gradient(self, x: Array, statistic: Statistic, slope: Array, place: int) -> Array:
+    def _gradient(
+        self, x: Array, statistic: Statistic, slope: Array, around: Around, place: int
+    ) -> Array:
         if not statistic.has_gradient:
             raise InvalidInput("dF or dG", statistic, "statistics that have a gradient")
+        if self._success is not None:
+            allowed = "no gradient: runs fail, and what their share changes by is not computed"
+            raise InvalidInput("dF or dG", statistic, allowed)
         weights = np.zeros((len(x), len(self.responses), slope.shape[1]))
         weights[:, place] = slope
-        return self._fit.moments.pulled_back(x, weights)[:, place]
+        gradient = self._fit.moments.pulled_back(x, weights)[:, place]
+        if around.own is None or self._own is None:
+            return gradient
+        if statistic.weights is None:
+            allowed = "mean, deviation or their sum for a random simulator"
+            raise InvalidInput("dF or dG", statistic, allowed)
+        # Of the own variance, as far as it is above 0.
+        shape = len(x), len(self.responses), around.own.expansion.shape[1]
+        weights = np.zeros(shape)
+        half = np.where(around.own.expansion[:, 0] > 0.0, 0.5, 0.0)
+        weights[:, place, 0] = statistic.weights[1] * divide_or_zero(half, around.std)
+        return gradient + self._own.moments.pulled_back(x, weights)[:, place]
+
+
+def _half_width(statistic: Statistic, around: Around) -> Array:
+    """Return the half-width of a statistic's band, what is not known of failures included.
+
+    Infinite for a quantile beyond what the samples resolve that know of failures and own scatter.
+    """
+    if around.common_alone and statistic.relative_to_scatter and statistic.rarest() < RESOLVED:
+        return np.full(len(around.mean), np.inf)
+    uncertain = around.error_of_success(lambda other: statistic.value(other)[0])
+    return statistic.half_width(around.mean_error, around.std_error, around) + uncertain

@@ -9,26 +9,49 @@ from numpy.typing import NDArray
 
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.problems._simulator.statistics import RobustConstraint, Statistic
+from pymoo_hdte.problems._simulator.tails import tail_of
 from pymoo_hdte.surrogate._sparse.moments import SparseMoments
-from pymoo_hdte.surrogate.threads import ENOUGH_FOR_THREADS
+from pymoo_hdte.surrogate.threads import ENOUGH_TO_COMPILE
 
 Requested = tuple[Statistic, float, float, int]
 """Statistic, factor, bound and place of the response."""
 
 
 def place_of(statistic: Statistic, responses: tuple[str, ...]) -> int:
-    """Return the position of the statistic's response.
+    """Return the position of the statistic's response, of several the first, of none 0.
+
+    Raises
+    ------
+    InvalidInput
+        As `places_of`.
+    """
+    return (places_of(statistic, responses) or [0])[0]
+
+
+def places_of(statistic: Statistic, responses: tuple[str, ...]) -> list[int]:
+    """Return the positions of the statistic's responses.
 
     Raises
     ------
     InvalidInput
         If there is none of that name, or none is named and there are several.
     """
-    if statistic.response is None and len(responses) == 1:
-        return 0
-    if statistic.response not in responses:
-        raise InvalidInput("response of a statistic", statistic.response, f"one of {responses}")
-    return responses.index(statistic.response)
+    places = []
+    for name in statistic.responses:
+        if name is None and len(responses) == 1:
+            places.append(0)
+        elif name in responses:
+            places.append(responses.index(name))
+        else:
+            raise InvalidInput("response of a statistic", name, f"one of {responses}")
+    return places
+
+
+def least_tail(objectives: Sequence[Statistic], constraints: Sequence[RobustConstraint]) -> float:
+    """Return the tail of the inputs that statistics need, as in `Axis`."""
+    rarest = [statistic.rarest() for statistic in objectives]
+    rarest += [constraint.rarest for constraint in constraints]
+    return tail_of(min(rarest, default=0.5))
 
 
 def requested_of(
@@ -55,12 +78,12 @@ def requested_of(
 def by_moments(
     requested: Sequence[Requested], moments: SparseMoments, x: NDArray[np.float64]
 ) -> NDArray[np.float64] | None:
-    """Return the requested values at very many designs, shape (n, n_requested).
+    """Return the requested values at many designs, shape (n, n_requested).
 
     None if there are few designs, or if mean and deviation do not suffice.
     """
     weights = [weight for statistic, *_ in requested if (weight := statistic.weights) is not None]
-    if len(x) < ENOUGH_FOR_THREADS or len(weights) < len(requested):
+    if len(x) < ENOUGH_TO_COMPILE or len(weights) < len(requested):
         return None
     mean, std = moments(x)
     values = np.empty((len(x), len(requested)))

@@ -14,13 +14,16 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from pymoo_hdte.checks import InvalidInput, real_number, whole_number
+from pymoo_hdte.checks import InvalidInput, one_of, real_number, whole_number
+from pymoo_hdte.problems._simulator.crashes import CrashProbability
+from pymoo_hdte.problems._simulator.data import read_data
 from pymoo_hdte.problems._simulator.identity import identity
 from pymoo_hdte.problems._simulator.inputs import Design, Inputs
 from pymoo_hdte.problems._simulator.problem import SimulatorProblem
-from pymoo_hdte.problems._simulator.requested import place_of
+from pymoo_hdte.problems._simulator.replicates import SEED, Replicates
+from pymoo_hdte.problems._simulator.requested import least_tail, places_of
 from pymoo_hdte.problems._simulator.run_file import RunFile
-from pymoo_hdte.problems._simulator.runs import Simulator
+from pymoo_hdte.problems._simulator.runs import Simulator, no_simulator
 from pymoo_hdte.problems._simulator.statistics import (
     Mean,
     RobustConstraint,
@@ -34,11 +37,11 @@ from pymoo_hdte.problems._simulator.trust import (
     negative_somewhere,
     positive_places,
     random,
+    unresolved,
 )
 from pymoo_hdte.problems._simulator.workers import Workers
 from pymoo_hdte.surrogate._sparse.adaptive import (
     IN_A_ROW,
-    LOOSEST,
     AdaptiveFit,
     fit_adaptively,
     least_runs,
@@ -51,8 +54,11 @@ _NUMBERS_PER_TERM = 4096 + 2048
 """Values of a term at common samples, and in arrays for the designs of a block."""
 
 
+ACCEPTED = ("accurate", "best")
+
+
 def robust_problem(
-    simulator: Callable[..., Any],
+    simulator: Callable[..., Any] | None,
     designs: Mapping[str, Design],
     noise: Mapping[Any, Any] | None = None,
     objectives: Sequence[Statistic] = (Mean(), Std()),
@@ -68,6 +74,10 @@ def robust_problem(
     cache: str | os.PathLike[str] | None = None,
     seed: int = 1,
     progress: bool = True,
+    accept: str = "accurate",
+    data: tuple[Any, Any] | None = None,
+    replicates: int | None = None,
+    surrogate: str = "auto",
 ) -> SimulatorProblem:
     """Return the robust design problem of a simulator.
 
@@ -89,9 +99,9 @@ def robust_problem(
 
     Parameters
     ----------
-    simulator : callable
+    simulator : callable or None
         Takes all designs and all noise by name; returns a number, a mapping of names to numbers, or
-        a sequence.
+        a sequence. None where ``data`` is all there is.
     designs : mapping of str to Design
         Design variables with their bounds and scatter.
     noise : mapping, optional
@@ -117,11 +127,11 @@ def robust_problem(
     at_once : int
         Least number of runs that are chosen together; the number of workers of the executor.
     tries : int
-        How often a run is made that raises or gives NaN, before it is left out. What a vectorised
-        simulator raises is passed on.
+        How often a run is made that raises or gives NaN, before it counts as failed. Where a
+        vectorised simulator raises, its runs are made one by one.
     time_limit : float, optional
-        Seconds after which a run is ended and left out, imports not counted; it then has a process
-        of its own beside the worker, and may crash there.
+        Seconds after which a run is ended and has failed, imports not counted; it then has a
+        process of its own beside the worker, and may crash there.
     cache : path, optional
         File of finished and of failed runs: with it, none is made twice, though the process be
         killed. The
@@ -133,6 +143,24 @@ def robust_problem(
         Seed of the positions of the runs.
     progress : bool
         Whether to tell runs and memory on the error stream before the first run, and show a bar.
+    accept : {"accurate", "best"}
+        ``"best"`` returns the problem even where the surrogate is not as accurate as asked for, or
+        a positive response becomes negative; its ``trusted`` then is False, ``refusal`` says
+        why, and its band is as wide as its errors are.
+    data : tuple of array_like or of tables, optional
+        Runs in hand, which the budget does not count: inputs X, shape (n, d), in the order of
+        designs and noise, and responses Y, shape (n,) or (n, r), NaN where a run failed; or both as
+        mappings or data frames of columns by name. ``runs`` of a problem or of a refusal fits.
+        One of them is made again, to see whether they are this simulator's.
+    replicates : int, optional
+        Runs at each point of a random simulator, 2 or more; each counts in the budget. A simulator
+        that takes an argument ``seed``, which is no design and no noise, is given a whole number
+        there and has 2 by default. What it scatters by itself is part of standard deviations and,
+        as a normal deviation, of quantiles and probabilities; a `WorstCase` is that of the mean.
+        A point at which one of its runs fails has failed.
+    surrogate : {"auto", "polynomial"}
+        With ``"auto"``, a polynomial of the response's logarithm or logit, or a normal process
+        (needs scikit-learn, extra ``process``), is taken where it predicts runs left out better.
 
     Returns
     -------
@@ -145,15 +173,19 @@ def robust_problem(
         For an argument that is not allowed, or a simulator that is random.
     UntrustedSurrogate
         If the budget is spent and the error is still larger than asked for, a positive response
-        becomes negative, or more than a fifth of the runs fail; tells where.
+        becomes negative, or runs around some design are likelier to fail than to succeed and no
+        `CrashProbability` is asked for; tells where. It holds all ``runs``
+        and the ``problem`` on the surrogate that is refused.
     SimulatorFailed
         If every run so far failed.
 
     Warns
     -----
     RuntimeWarning
-        If runs failed; their inputs are in ``failed`` of the result. If the budget is spent before
-        an error that is small enough was confirmed.
+        If runs failed; their inputs are in ``failed`` of the result, whose statistics are those of
+        the runs that succeed. If the budget is spent before
+        an error that is small enough was confirmed. If ``accept="best"`` accepts what is refused
+        otherwise.
 
     Examples
     --------
@@ -166,75 +198,120 @@ def robust_problem(
     >>> print(f"{problem.evaluate(np.array([[1.0]]))[0, 0]:.2f}")
     5.02
     """
-    inputs = Inputs(designs, {} if noise is None else noise)
-    _check_signature(simulator, inputs.names)
-    accuracy = _share("accuracy", accuracy)
-    least = least_runs(len(inputs.axes))
-    budget = whole_number("budget", budget, least)
     _check_statistics(objectives, constraints)
-    file = None if cache is None else RunFile(cache, inputs.names, identity(simulator))
+    one_of("surrogate", surrogate, ("auto", "polynomial"))
+    inputs = Inputs(designs, {} if noise is None else noise, least_tail(objectives, constraints))
+    accuracy = _share("accuracy", accuracy)
+    one_of("accept", accept, ACCEPTED)
+    least = least_runs(len(inputs.axes))
+    given = None if data is None else read_data(data, inputs)
+    takes_seed = _takes_seed(simulator, inputs.names, replicates)
+    if takes_seed is not None:
+        replicates = whole_number("replicates", 2 if replicates is None else replicates, 2)
+    each, names = replicates or 1, (*inputs.names, *([SEED] if takes_seed is not None else []))
+    least = max(0, each * least - (0 if given is None else len(given.points)))
+    if simulator is None and given is not None and not least:
+        simulator, vectorised, budget, cache = no_simulator, False, 0, None
+    else:
+        simulator = _checked_signature(simulator, names if takes_seed else inputs.names)
+        budget = whole_number("budget", budget, least)
+    file = None if cache is None else RunFile(cache, names, identity(simulator))
     count, batch = whole_number("tries", tries, 1), whole_number("at_once", at_once, 1)
     random_state = np.random.default_rng(whole_number("seed", seed, 0))
     if vectorised and time_limit is not None:
         raise InvalidInput("time_limit", time_limit, "None for a vectorised simulator")
     bar = _announce(inputs, least, budget) if progress else tqdm(disable=True)
     with bar, closing(Workers(executor, time_limit)) as workers:
-        simulate = Simulator(simulator, inputs.names, vectorised, workers, count, file, bar)
+        simulate = Simulator(simulator, names, vectorised, workers, count, file, bar, takes_seed)
+        at_points: Callable[[Array], Array] = simulate
+        in_hand = None if given is None else (given.points, given.values)
+        if given is not None:
+            simulate.check_data(inputs.values(given.points), given.values, given.responses)
+        repeated = None if takes_seed is None else Replicates(simulate, each, seed)
+        if repeated is not None:
+            at_points = repeated
+            if given is not None:
+                repeated.keep(inputs.values(given.points), given.values)
+                in_hand = repeated.grouped(given)
         statistics = [*objectives, *(limit.statistic for limit in constraints)]
 
         def requested_places() -> list[int]:
-            return sorted({place_of(statistic, simulate.responses) for statistic in statistics})
+            return _places(statistics, simulate.responses)
 
         fit = fit_adaptively(
             inputs.axes,
-            lambda cube: simulate(inputs.values(cube)),
+            lambda cube: at_points(inputs.values(cube)),
             accuracy,
-            budget,
+            budget // each,
             random_state,
             lambda fit: (
                 not negative_somewhere(inputs, fit, positive_places(positive, simulate.responses))
             ),
-            batch,
+            -(-batch // each),
             lambda fit: largest_error(fit, requested_places())[0],
+            in_hand,
+            repeated is not None,
+            surrogate == "auto",
         )
-        _refuse_untrusted(inputs, fit, accuracy, simulate, positive, requested_places())
+        refusal = _refusal(inputs, fit, accuracy, simulate, positive, (objectives, constraints))
+    responses = simulate.responses
+    runs = None if repeated is None else repeated.runs
+    n_runs = fit.n_runs if runs is None else len(runs.X)
+    parts = inputs, fit, responses, objectives, constraints, n_runs
+    problem = SimulatorProblem(*parts, str(refusal) if refusal else None, runs)
+    if refusal is not None and accept == "accurate":
+        refusal.problem, refusal.runs = problem, problem.runs
+        raise refusal
     if file:
         file.finish()
-    responses = simulate.responses
-    problem = SimulatorProblem(inputs, fit, responses, objectives, constraints, fit.n_runs)
     _warn_of_failures(problem)
-    if not fit.confirmed:
+    if refusal:
+        warnings.warn(f"accepted as the best there is: {refusal}", RuntimeWarning, stacklevel=2)
+    elif not fit.confirmed:
         _warn_of_budget(fit, responses, requested_places())
     return problem
 
 
-def _refuse_untrusted(
+def _places(statistics: Sequence[Statistic], responses: tuple[str, ...]) -> list[int]:
+    """Return the positions of the responses that statistics belong to; all if they name none."""
+    named = {place for statistic in statistics for place in places_of(statistic, responses)}
+    return sorted(named) or list(range(len(responses)))
+
+
+def _refusal(
     inputs: Inputs,
     fit: AdaptiveFit,
     accuracy: float,
     simulate: Simulator,
     positive: Sequence[str] | bool,
-    places: Sequence[int],
-) -> None:
+    requested: tuple[Sequence[Statistic], Sequence[RobustConstraint]],
+) -> UntrustedSurrogate | None:
+    """Return why the surrogate is not what was asked for, or None."""
+    objectives, constraints = requested
+    statistics = [*objectives, *(limit.statistic for limit in constraints)]
+    # Of a probability as an objective, the band tells what is resolved.
+    rarest = [entry.rarest() for entry in objectives if entry.relative_to_scatter]
+    rarest += [limit.rarest for limit in constraints]
     responses = simulate.responses
+    places = _places(statistics, responses)
+    limited = any(isinstance(statistic, CrashProbability) for statistic in statistics)
     unsure = inaccurate(inputs, fit, accuracy, responses, places)
-    if unsure and (cause := random(inputs, fit, accuracy, responses, simulate.again)):
-        raise cause
-    refusal = (
-        failing(inputs, fit)
+    reason = (
+        (unsure and fit.own is None and random(inputs, fit, accuracy, responses, simulate.again))
+        or (None if limited else failing(inputs, fit))
+        or unresolved(fit, min(rarest, default=0.5))
         or unsure
         or negative_somewhere(inputs, fit, positive_places(positive, responses))
     )
-    if refusal:
-        raise UntrustedSurrogate(*refusal)
+    return UntrustedSurrogate(*reason) if reason else None
 
 
 def _warn_of_budget(fit: AdaptiveFit, responses: tuple[str, ...], places: Sequence[int]) -> None:
     error, _, place = largest_error(fit, places)
     message = (
         f"the budget of {fit.n_runs} runs is used up: the error of {responses[place]!r} is "
-        f"{error:.2g} of its scatter, no more than asked for, but not confirmed: {IN_A_ROW} checks "
-        f"in a row have to find that, and at most {LOOSEST:g}"
+        f"{error:.2g} of its scatter, no more than asked for, but that is not confirmed by "
+        f"{IN_A_ROW} checks in a row"
     )
     warnings.warn(message, RuntimeWarning, stacklevel=3)
 
@@ -259,15 +336,35 @@ def _share(field: str, given: Any) -> float:
     return share
 
 
-def _check_signature(simulator: Callable[..., Any], names: Sequence[str]) -> None:
-    """Refuse a simulator that cannot be called with these inputs, as far as it tells."""
+def _takes_seed(
+    simulator: Callable[..., Any] | None, names: Sequence[str], replicates: int | None
+) -> bool | None:
+    """Return whether a random simulator takes a seed; None for one that is not random."""
+    if SEED in names or simulator is None:
+        takes = False
+    else:
+        try:
+            parameters = inspect.signature(simulator, follow_wrapped=False).parameters
+        except (TypeError, ValueError):
+            parameters = {}  # type: ignore[assignment]
+        parameter = parameters.get(SEED)
+        # One with a default is a random simulator whose seed was fixed, unless runs are repeated.
+        takes = parameter is not None and (parameter.default is parameter.empty or bool(replicates))
+    return takes if takes or replicates is not None else None
+
+
+def _checked_signature(
+    simulator: Callable[..., Any] | None, names: Sequence[str]
+) -> Callable[..., Any]:
+    """Return a simulator that can be called with these inputs, as far as it tells."""
     if not callable(simulator):
-        raise InvalidInput("simulator", simulator, "a function of the designs and the noise")
+        allowed = "a function of the designs and the noise, or None where data have runs enough"
+        raise InvalidInput("simulator", simulator, allowed)
     try:
         # What a decorator wraps is not what is called.
         signature = inspect.signature(simulator, follow_wrapped=False)
     except (TypeError, ValueError):
-        return
+        return simulator
     parameters = signature.parameters.values()
     named = [
         parameter
@@ -290,6 +387,7 @@ def _check_signature(simulator: Callable[..., Any], names: Sequence[str]) -> Non
         reasons += [f"it needs {', '.join(missing)}"] if missing else []
         allowed = f"those of designs and noise ({', '.join(names)}); {' and '.join(reasons)}"
         raise InvalidInput("arguments of the simulator", str(signature), allowed)
+    return simulator
 
 
 def _check_statistics(
@@ -329,5 +427,8 @@ def _warn_of_failures(problem: SimulatorProblem) -> None:
         for row in problem.failed[:5]
     ]
     ending = "" if len(problem.failed) <= len(rows) else ", .."
-    message = f"{len(problem.failed)} runs failed and are left out: {'; '.join(rows)}{ending}"
+    message = (
+        f"{len(problem.failed)} of {problem.n_runs} runs failed: {'; '.join(rows)}{ending}. "
+        "Statistics are those of the runs that succeed; CrashProbability tells how often they fail"
+    )
     warnings.warn(message, RuntimeWarning, stacklevel=3)

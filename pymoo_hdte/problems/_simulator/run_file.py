@@ -9,7 +9,7 @@ import stat
 import sys
 import warnings
 import weakref
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -232,17 +232,7 @@ class RunFile:
         InvalidInput
             If it gives something else, or the first five of the file fail.
         """
-        allowed = "runs of this simulator; delete the file"
-        for row, stored in islice(self.runs.items(), _RERUNS):
-            gave = again(row)
-            if gave is not None:
-                same = len(gave) == len(stored) and np.allclose(gave, stored, rtol=_SAME, atol=0.0)
-                if not same:
-                    raise InvalidInput("cache", str(self.path), allowed)
-                return
-        if self.runs:
-            allowed += f", if it fails now at the first {_RERUNS} of them by right"
-            raise InvalidInput("cache", str(self.path), allowed)
+        check_again("cache", self.runs.items(), again, f"{self.path}", "; delete the file")
 
     def finish(self) -> None:
         """Note in the file that the study has ended."""
@@ -255,6 +245,33 @@ class RunFile:
         while remaining:
             remaining = remaining[os.write(self._descriptor, remaining) :]
         os.fsync(self._descriptor)
+
+
+def check_again(
+    field: str,
+    runs: Iterable[tuple[tuple[float, ...], Any]],
+    again: Callable[[tuple[float, ...]], Any],
+    shown: str,
+    ending: str = "",
+) -> None:
+    """Make one of some runs again: they may be those of another simulator.
+
+    Raises
+    ------
+    InvalidInput
+        If it gives something else, or the first five fail.
+    """
+    allowed, row = f"runs of this simulator{ending}", None
+    for row, stored in islice(runs, _RERUNS):
+        gave = again(row)
+        if gave is not None:
+            same = len(gave) == len(stored) and np.allclose(gave, stored, rtol=_SAME, atol=0.0)
+            if not same:
+                raise InvalidInput(field, shown, allowed)
+            return
+    if row is not None:
+        allowed += f", if it fails now at the first {_RERUNS} of them by right"
+        raise InvalidInput(field, shown, allowed)
 
 
 def _texts(given: Any) -> list[str]:

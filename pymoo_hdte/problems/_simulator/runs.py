@@ -12,8 +12,8 @@ from tqdm import tqdm
 
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.problems._simulator.children import TOO_LONG, Failure
-from pymoo_hdte.problems._simulator.run_file import RunFile
-from pymoo_hdte.problems._simulator.workers import Workers
+from pymoo_hdte.problems._simulator.run_file import RunFile, check_again
+from pymoo_hdte.problems._simulator.workers import Workers, failure_of
 
 Array = NDArray[np.float64]
 
@@ -39,6 +39,17 @@ class SimulatorFailed(RuntimeError):
     """
 
 
+def no_simulator(**inputs: Any) -> Any:
+    """Stand for the simulator where runs in hand are all there is.
+
+    Raises
+    ------
+    RuntimeError
+        Always.
+    """
+    raise RuntimeError("there is no simulator")
+
+
 class Simulator:
     """A user's function as one of arrays, shape (n, d) to (n, r), NaN where it failed.
 
@@ -59,6 +70,8 @@ class Simulator:
         File of finished runs.
     progress : tqdm
         A bar to move.
+    takes_seed : bool, optional
+        Where the last input is the seed of a random function, whether that takes it.
 
     Raises
     ------
@@ -80,9 +93,10 @@ class Simulator:
         tries: int,
         file: RunFile | None,
         progress: tqdm,
+        takes_seed: bool | None = None,
     ) -> None:
         self.function, self.names, self.vectorised = function, names, vectorised
-        self.workers, self.tries = workers, tries
+        self.workers, self.tries, self.takes_seed = workers, tries, takes_seed
         self.file, self.progress = file, progress
         self.responses = file.responses if file else ()
         self._ran = self._sized = False
@@ -91,8 +105,45 @@ class Simulator:
         if file and file.goes_on:
             file.retry_within(workers.time_limit)
             self._given_up |= set(file.failures)
-        elif file:
+        elif file and takes_seed is not False:
             file.check(self.again)
+
+    def check_data(self, X: Array, Y: Array, responses: tuple[str, ...]) -> None:
+        """Take the names of the responses from runs in hand, and make one of them again.
+
+        Parameters
+        ----------
+        X : ndarray, shape (n, d)
+            Inputs in their units.
+        Y : ndarray, shape (n, r)
+            Responses, NaN where a run failed.
+        responses : tuple of str
+            Their names; empty if they are not known.
+
+        Raises
+        ------
+        InvalidInput
+            If the simulator gives something else, or the squares of responses would lose digits.
+        """
+        if self.responses and responses not in ((), self.responses):
+            raise InvalidInput("responses in data", responses, str(self.responses))
+        self.responses = self.responses or responses
+        whole = np.isfinite(Y).all(axis=1)
+        if self.takes_seed is not None and self.function is not no_simulator:
+            # Another run of a random function gives something else; only its names are of use.
+            self.again((*X[0].tolist(), 0.0))
+        elif self.function is not no_simulator:
+            rows = zip(map(tuple, X[whole].tolist()), Y[whole], strict=True)
+            check_again("data", rows, self.again, f"an array of shape {Y.shape}")
+        if not self.responses:
+            count = Y.shape[1]
+            one = ("response",)
+            self.responses = one if count == 1 else tuple(f"response_{k + 1}" for k in range(count))
+        if whole.any():
+            self._ran = True
+            self._check_sizes(Y)
+        elif self.function is no_simulator:
+            raise InvalidInput("runs of data that did not fail", 0, "one or more")
 
     def again(self, row: tuple[float, ...]) -> Any:
         """Return the result of a new run, whatever the file has; None if it fails."""
@@ -153,7 +204,8 @@ class Simulator:
     def _check_sizes(self, table: Array) -> None:
         """Refuse the first runs if squares of their responses would lose digits."""
         self._sized = True
-        for name, size in zip(self.responses, np.nanmax(np.abs(table), axis=0), strict=True):
+        whole = table[np.isfinite(table).all(axis=1)]
+        for name, size in zip(self.responses, np.max(np.abs(whole), axis=0), strict=True):
             if size and not (size > SMALLEST and size < LARGEST):
                 allowed = f"0 or {SMALLEST:g} to {LARGEST:g}: choose another unit"
                 raise InvalidInput(f"size of {name!r}", float(size), allowed)
@@ -165,11 +217,32 @@ class Simulator:
 
     def _run(self, rows: Sequence[tuple[float, ...]]) -> Iterable[tuple[tuple[float, ...], Any]]:
         if self.vectorised:
-            columns = dict(zip(self.names, np.array(rows).T, strict=True))
-            table = self._table(self.function(**columns), len(rows))
-            yield from zip(rows, table.tolist(), strict=True)
+            yield from self._together(rows)
         else:
             yield from self._on_workers(rows)
+
+    def _together(
+        self, rows: Sequence[tuple[float, ...]]
+    ) -> list[tuple[tuple[float, ...], list[float] | None]]:
+        """Make runs of a vectorised simulator; one by one where it raises."""
+        try:
+            gave = self.function(**self._inputs(np.array(rows).T))
+        except Exception as error:  # A user's simulator may raise anything.
+            self._last_failure = failure_of(error)
+            if len(rows) == 1:
+                return [(rows[0], None)]
+            return [run for row in rows for run in self._together([row])]
+        return list(zip(rows, self._table(gave, len(rows)).tolist(), strict=True))
+
+    def _inputs(self, values: Any) -> dict[str, Any]:
+        """Return numbers or columns by the names of the inputs, as the function takes them."""
+        inputs: dict[str, Any] = dict(zip(self.names, values, strict=True))
+        if self.takes_seed is not None:
+            seed = inputs.pop(self.names[-1])
+            if self.takes_seed:
+                single = np.ndim(seed) == 0
+                inputs[self.names[-1]] = int(seed) if single else np.asarray(seed, dtype=int)
+        return inputs
 
     def _on_workers(
         self, rows: Sequence[tuple[float, ...]]
@@ -177,7 +250,7 @@ class Simulator:
         """Yield runs as they end, so that a finished one is kept whatever happens to the others."""
         try:
             for row in rows:
-                inputs = dict(zip(self.names, row, strict=True))
+                inputs = self._inputs(row)
                 # Not by a function of ours: processes beside workers would import our package.
                 self.workers.start(row, partial(self.function, **inputs))
             for _ in rows:

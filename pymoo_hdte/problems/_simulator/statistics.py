@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pymoo_hdte.checks import one_of, real_number
-from pymoo_hdte.problems._simulator.around import Around
 from pymoo_hdte.surrogate.moments import divide_or_zero
+
+if TYPE_CHECKING:
+    from pymoo_hdte.problems._simulator.around import Around
 
 Array = NDArray[np.float64]
 S = TypeVar("S", bound="Statistic")
@@ -45,6 +47,21 @@ class Statistic:
 
     def _bound(self, bound: float) -> float:
         return real_number("bound", bound)
+
+    @property
+    def responses(self) -> tuple[str | None, ...]:
+        """Names of the responses it belongs to; None for the only one."""
+        return (self.response,)
+
+    def rarest(self, bound: float | None = None) -> float:
+        """Return the least probability that it asks for, dimensionless.
+
+        Parameters
+        ----------
+        bound : float, optional
+            As which constraint it is met, in its unit.
+        """
+        return 0.5
 
     @property
     def name(self) -> str:
@@ -125,6 +142,11 @@ class RobustConstraint:
     statistic: Statistic
     bound: float
     side: float
+
+    @property
+    def rarest(self) -> float:
+        """The least probability that it asks for, dimensionless."""
+        return self.statistic.rarest(self.bound)
 
 
 @dataclass(frozen=True)

@@ -12,8 +12,10 @@ from numpy.typing import NDArray
 
 from pymoo_hdte._io.archive import FileFormat
 from pymoo_hdte.checks import InvalidInput, whole_number
+from pymoo_hdte.problems._simulator.crashes import CrashProbability
 from pymoo_hdte.problems._simulator.distributions import described, rebuilt
 from pymoo_hdte.problems._simulator.inputs import Design, Inputs
+from pymoo_hdte.problems._simulator.requested import least_tail
 from pymoo_hdte.problems._simulator.sampled_statistics import CVaR, FailureProbability, Quantile
 from pymoo_hdte.problems._simulator.statistics import (
     Mean,
@@ -23,27 +25,90 @@ from pymoo_hdte.problems._simulator.statistics import (
     Std,
     WorstCase,
 )
+from pymoo_hdte.surrogate._rare.events import Event, event_from
 from pymoo_hdte.surrogate._sparse.adaptive import AdaptiveFit
 from pymoo_hdte.surrogate._sparse.moments import SparseMoments
 from pymoo_hdte.surrogate._sparse.polynomial import SparsePolynomial
+from pymoo_hdte.surrogate._sparse.success import DRAWN, Success, rows_of
+from pymoo_hdte.surrogate._sparse.terms import closed
 
 Array = NDArray[np.float64]
 
 STATISTICS: dict[str, type[Statistic]] = {
     kind.__name__: kind
-    for kind in (Mean, Std, MeanPlusStd, WorstCase, Quantile, CVaR, FailureProbability)
+    for kind in (
+        *(Mean, Std, MeanPlusStd, WorstCase),
+        *(Quantile, CVaR, FailureProbability, CrashProbability),
+    )
 }
 HIGHEST_DEGREE = 100
 """Largest degree that is read from a file; surrogates have 60 at most."""
 _OF_RESPONSES = ("mean_error", "std_error", "smallest_scatter")
-_OF_POINTS = ("failed", "held_out_points")
+_OF_SUCCESS = ("success_indices", "success_coefficients", "success_draws")
+_OF_OWN = ("own_indices", "own_coefficients")
+_OF_POINTS = ("failed", "held_out_points", "points")
 
 FORMAT = FileFormat(
     "pymoo_hdte robust problem",
-    version=1,
-    fields=("designs", "noise", "responses", "objectives", "constraints", "n_runs", "tails"),
-    arrays=("indices", "coefficients", *_OF_RESPONSES, *_OF_POINTS, "held_out_error"),
+    version=2,
+    fields=(
+        *("designs", "noise", "responses", "objectives", "constraints", "n_runs", "tails"),
+        "refusal",
+    ),
+    arrays=(
+        *("indices", "coefficients", *_OF_RESPONSES, *_OF_POINTS, "held_out_error", "truth"),
+        *(*_OF_SUCCESS, *_OF_OWN),
+    ),
+    later=dict.fromkeys(("refusal", "points", "truth", *_OF_SUCCESS, *_OF_OWN), (2, None)),
 )
+
+
+_OF_FIT = (*_OF_RESPONSES, *_OF_POINTS, "held_out_error", "truth")
+
+
+def _of_success(fit: AdaptiveFit) -> dict[str, Array]:
+    """Return the latent polynomial and its draws on the terms of the latter; nothing for None."""
+    if fit.success is None:
+        none = np.empty((0, 0))
+        return {name: none for name in _OF_SUCCESS}
+    draws, mode = fit.success.draws, fit.success.polynomial
+    places = {tuple(row): place for place, row in enumerate(draws.indices.tolist())}
+    coefficients = np.zeros((1, len(draws.indices)))
+    coefficients[0, [places[tuple(row)] for row in mode.indices.tolist()]] = mode.coefficients[0]
+    parts = draws.indices.astype(float), coefficients, draws.coefficients
+    return dict(zip(_OF_SUCCESS, parts, strict=True))
+
+
+def _read_success(arrays: dict[str, Array], inputs: int) -> Success | None:
+    indices, mode, draws = (arrays[name] for name in _OF_SUCCESS)
+    if indices is None or not len(indices):
+        return None
+    shapes = (len(indices), inputs), (1, len(indices)), (DRAWN, len(indices))
+    for name, shape in zip(_OF_SUCCESS, shapes, strict=True):
+        if arrays[name].shape != shape:
+            raise InvalidInput(f"shape of {name}", arrays[name].shape, str(shape))
+        if not np.all(np.isfinite(arrays[name])):
+            raise InvalidInput(f"{name} of the file", arrays[name].tolist(), "finite")
+    _check_indices(indices)
+    whole = indices.astype(int)
+    stays = np.isin(rows_of(whole), rows_of(closed(whole[mode[0] != 0.0])))
+    polynomial = SparsePolynomial(whole[stays], mode[:, stays])
+    return Success(polynomial, SparsePolynomial(whole, draws), np.empty(0))
+
+
+def _read_own(arrays: dict[str, Array], inputs: int, responses: int) -> SparsePolynomial | None:
+    indices, coefficients = arrays["own_indices"], arrays["own_coefficients"]
+    if indices is None or not len(indices):
+        return None
+    for name, shape in zip(
+        _OF_OWN, ((len(indices), inputs), (responses, len(indices))), strict=True
+    ):
+        if arrays[name].shape != shape:
+            raise InvalidInput(f"shape of {name}", arrays[name].shape, str(shape))
+    _check_indices(indices)
+    if not np.all(np.isfinite(coefficients)):
+        raise InvalidInput("own_coefficients of the file", coefficients.tolist(), "finite")
+    return SparsePolynomial(indices.astype(int), coefficients)
 
 
 def write_problem(
@@ -54,6 +119,7 @@ def write_problem(
     objectives: Sequence[Statistic],
     constraints: Sequence[RobustConstraint],
     n_runs: int,
+    refusal: str | None = None,
 ) -> None:
     """Write the parts of a `SimulatorProblem`, replacing the file in one step.
 
@@ -83,8 +149,16 @@ def write_problem(
         ],
         "n_runs": n_runs,
         "tails": _with_tails(fit),
+        "refusal": refusal,
     }
-    arrays = {name: getattr(fit, name) for name in FORMAT.arrays[2:]}
+    arrays = {name: getattr(fit, name) for name in _OF_FIT} | _of_success(fit)
+    none = np.empty((0, 0))
+    arrays |= {"own_indices": none, "own_coefficients": none}
+    if fit.own is not None:
+        arrays |= {
+            "own_indices": fit.own.indices.astype(float),
+            "own_coefficients": fit.own.coefficients,
+        }
     polynomial = {
         "indices": fit.polynomial.indices.astype(float),
         "coefficients": fit.polynomial.coefficients,
@@ -94,7 +168,15 @@ def write_problem(
 
 def read_problem(
     path: str | os.PathLike[str],
-) -> tuple[Inputs, AdaptiveFit, tuple[str, ...], list[Statistic], list[RobustConstraint], int]:
+) -> tuple[
+    Inputs,
+    AdaptiveFit,
+    tuple[str, ...],
+    list[Statistic],
+    list[RobustConstraint],
+    int,
+    str | None,
+]:
     """Return the parts from a file that `write_problem` made.
 
     Raises
@@ -107,20 +189,27 @@ def read_problem(
     header, arrays = FORMAT.read(path)
     # The parts check themselves; whatever else is wrong with a part is said as it comes.
     try:
-        inputs = Inputs(_designs(header["designs"]), _noise(header["noise"]))
         objectives = [_read_statistic(entry) for entry in header["objectives"]]
         constraints = [_read_constraint(entry) for entry in header["constraints"]]
+        tail = least_tail(objectives, constraints)
+        inputs = Inputs(_designs(header["designs"]), _noise(header["noise"]), tail)
         if not objectives:
             raise ValueError("objectives are missing")
         responses = _responses(header["responses"])
         n_runs = whole_number("n_runs", header["n_runs"], 0)
+        refusal = header["refusal"]
+        if not isinstance(refusal, str | None):
+            raise InvalidInput("refusal", refusal, "a text or nothing")
+        for name, columns in (("points", len(inputs.axes)), ("truth", len(responses))):
+            if arrays[name] is None:
+                arrays[name] = np.empty((0, columns))
         fit = _read_fit(inputs, len(responses), n_runs, header["tails"], arrays)
     except InvalidInput:
         raise
     except Exception as error:
         allowed = f"a file of format {FORMAT.name!r} ({type(error).__name__}: {error})"
         raise InvalidInput("path", str(path), allowed) from error
-    return inputs, fit, responses, objectives, constraints, n_runs
+    return inputs, fit, responses, objectives, constraints, n_runs, refusal
 
 
 def _design(name: str, design: Design) -> dict[str, Any]:
@@ -169,9 +258,10 @@ def _statistic(statistic: Statistic) -> dict[str, Any]:
     kind = type(statistic).__name__
     if STATISTICS.get(kind) is not type(statistic):
         raise InvalidInput("statistic", statistic, f"one of {', '.join(STATISTICS)}")
-    return {"kind": kind} | {
-        field.name: getattr(statistic, field.name) for field in fields(statistic)
-    }
+    table = {field.name: getattr(statistic, field.name) for field in fields(statistic)}
+    if isinstance(table.get("event"), Event):
+        table["event"] = table["event"].table()
+    return {"kind": kind} | table
 
 
 def _read_statistic(table: Mapping[str, Any]) -> Statistic:
@@ -179,6 +269,10 @@ def _read_statistic(table: Mapping[str, Any]) -> Statistic:
     kind = given.pop("kind", None)
     if kind not in STATISTICS:
         raise InvalidInput("statistic of the file", kind, f"one of {', '.join(STATISTICS)}")
+    if kind == FailureProbability.__name__:
+        # Files of the first version have no joint events.
+        event = given.setdefault("event", None)
+        given["event"] = event if event is None else event_from(event)
     _check_fields(kind, given, STATISTICS[kind])
     _check_sign("sign of a statistic", given["sign"])
     return STATISTICS[kind](**given)
@@ -228,6 +322,7 @@ def _read_fit(
         **dict.fromkeys(_OF_RESPONSES, (responses,)),
         **dict.fromkeys(_OF_POINTS, (None, len(axes))),
         "held_out_error": (held_out, responses),
+        "truth": (len(arrays["points"]), responses),
     }
     for name, shape in shapes.items():
         actual_shape = arrays[name].shape
@@ -247,6 +342,8 @@ def _read_fit(
     polynomial = SparsePolynomial(indices.astype(int), coefficients)
     pairs = zip(axes, tails, strict=True)
     measures = [axis.measure if has_tail else axis.cut for axis, has_tail in pairs]
-    others: dict[str, Any] = {name: np.array(arrays[name]) for name in FORMAT.arrays[2:]}
+    others: dict[str, Any] = {name: np.array(arrays[name]) for name in _OF_FIT}
+    others["success"] = _read_success(arrays, len(axes))
+    others["own"] = _read_own(arrays, len(axes), responses)
     moments = SparseMoments(polynomial, axes, measures)
     return AdaptiveFit(polynomial=polynomial, moments=moments, n_runs=n_runs, **others)

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pymoo_hdte.checks import InvalidInput
+from pymoo_hdte.problems._simulator.around import RESOLVED
 from pymoo_hdte.problems._simulator.inputs import Inputs
 from pymoo_hdte.surrogate._sparse.adaptive import AdaptiveFit
 from pymoo_hdte.surrogate._sparse.draws import draw_around, draw_designs
@@ -15,8 +16,8 @@ from pymoo_hdte.surrogate.trust import region_of
 
 Array = NDArray[np.float64]
 
-MOST_FAILED = 0.2
-"""Largest share of failed runs that are left out: what they would have given is extrapolated."""
+MOST_FAILED = 0.5
+"""Largest probability of failing at a design where it is not limited: more fail than succeed."""
 _LIKE_THE_WORST = 0.3
 """Share of the largest error above which a point belongs to the region of the error."""
 _OF_ACCURACY = 0.1
@@ -30,12 +31,34 @@ Refusal = tuple[str, float, str, dict[str, tuple[float, float]]]
 
 
 def failing(inputs: Inputs, fit: AdaptiveFit) -> Refusal | None:
-    """Return where the simulator fails, if it does so too often to leave the runs out, or None."""
-    share = len(fit.failed) / fit.n_runs
-    if share <= MOST_FAILED:
+    """Return where runs around a design are likelier to fail than to succeed, or None.
+
+    Its mean and deviation, of the runs that succeed, would look like those of any other design.
+    """
+    if fit.success is None:
         return None
-    region = region_of(inputs.names, inputs.values(fit.failed), reach(inputs))
-    return "share of runs that failed", share, f"at most {MOST_FAILED:g}", region
+    random_state = np.random.default_rng(0)
+    designs = draw_designs(inputs.axes, _LOOKED_AT // 4, random_state)
+    points, weights = draw_around(inputs.axes, designs, 64, random_state)
+    likely = fit.success.probability(points.reshape(-1, len(inputs.axes))).reshape(weights.shape)
+    share = 1.0 - np.sum(weights * likely, axis=1)
+    if not (bad := share > MOST_FAILED).any():
+        return None
+    bounds = np.array([axis.design for axis in inputs.axes if axis.designed]).T
+    region = region_of(inputs.designed, designs[bad], bounds)
+    allowed = f"at most {MOST_FAILED:g} at every design, or CrashProbability() limited or minimised"
+    return "probability of failing runs", float(f"{share.max():.3g}"), allowed, region
+
+
+def unresolved(fit: AdaptiveFit, rarest: float) -> Refusal | None:
+    """Return why a probability is too small where runs fail or are random, or None.
+
+    Only common samples know of failures and of own scatter.
+    """
+    if rarest >= RESOLVED or (fit.success is None and fit.own is None):
+        return None
+    allowed = f"at least {RESOLVED:.4g} from 0 and from 1 for a simulator that fails or is random"
+    return "probability of a statistic", rarest, allowed, {}
 
 
 def largest_error(fit: AdaptiveFit, places: Sequence[int]) -> tuple[float, int, int]:
@@ -74,8 +97,8 @@ def random(
     accuracy: float,
     responses: tuple[str, ...],
     again: Callable[[tuple[float, ...]], Sequence[float] | None],
-) -> InvalidInput | None:
-    """Return the error of a simulator that gives two values for the same inputs, or None.
+) -> Refusal | None:
+    """Return why a simulator that gives two values for the same inputs is refused, or None.
 
     Looked at where a surrogate is refused, by three runs at one point: what differs by less than a
     tenth of the accuracy asked for, as a share of what the surrogate spreads, is not the cause.
@@ -91,12 +114,12 @@ def random(
         responses, np.min(runs, axis=0), np.max(runs, axis=0), spread, strict=True
     ):
         if high - low > _OF_ACCURACY * accuracy * size:
-            return InvalidInput(
-                f"{name!r} of runs with the same inputs",
-                f"{low:.6g} to {high:.6g}",
-                "one value: the simulator must not be random; fix its seed, or return "
-                "the mean of enough runs",
+            field = f"difference between values of {name!r} with the same inputs"
+            allowed = (
+                f"0, not {low:.6g} and {high:.6g}: the simulator is random; fix its seed, or say "
+                "replicates=2, which makes its own scatter part of mean, deviation and quantiles"
             )
+            return field, float(f"{high - low:.3g}"), allowed, {}
     return None
 
 

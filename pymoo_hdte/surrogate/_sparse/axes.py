@@ -7,14 +7,12 @@ one of s, whose expectations are sums over a Gauss rule, exact to rounding.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 
 # Its statistics load when they are first used.
 import scipy
 from numpy.typing import NDArray
-from scipy.special import ndtr
+from scipy.special import ndtr, ndtri
 
 from pymoo_hdte.surrogate._sparse.measures import Distribution, Measure
 
@@ -40,28 +38,39 @@ class Scatter:
         Distribution of the variable.
     measure : Measure
         The same as weighted nodes.
+    tail : float
+        Share of the probability beyond the interval of an unbounded variable on either side.
 
     Attributes
     ----------
     lower, upper : float
-        Interval: the support, or the quantiles of `TAIL` where that goes on for long.
+        Interval: the support, or the quantiles of ``tail`` where that goes on for long.
+    box : tuple of float
+        The interval for `TAIL`: what counts as the worst case.
     cut : Measure
         The measure inside that interval, where there are runs.
     ended : Measure
         The measure with all that lies beyond the interval moved to its ends.
     """
 
-    def __init__(self, distribution: Distribution, measure: Measure) -> None:
+    def __init__(self, distribution: Distribution, measure: Measure, tail: float = TAIL) -> None:
         self.distribution = distribution
         self.measure = measure
-        p = np.array([1e-3, 0.5, 1.0 - 1e-3, TAIL, 1.0 - TAIL])
-        low, middle, high, tail_low, tail_high = distribution.quantile(p).tolist()
-        self.lower, self.upper = distribution.lower, distribution.upper
-        if middle - self.lower > 2.0 * (middle - low):
-            self.lower = tail_low
-        if self.upper - middle > 2.0 * (high - middle):
-            self.upper = tail_high
+        self.tail = tail
+        self.box = self._between(TAIL)
+        self.lower, self.upper = self._between(tail)
         self.cut, self.ended = measure.inside(self.lower, self.upper)
+
+    def _between(self, tail: float) -> tuple[float, float]:
+        """Return the ends of the support, or quantiles of ``tail`` where it goes on for long."""
+        p = np.array([1e-3, 0.5, 1.0 - 1e-3, tail, 1.0 - tail])
+        low, middle, high, tail_low, tail_high = self.distribution.quantile(p).tolist()
+        lower, upper = self.distribution.lower, self.distribution.upper
+        if middle - lower > 2.0 * (middle - low):
+            lower = tail_low
+        if upper - middle > 2.0 * (high - middle):
+            upper = tail_high
+        return lower, upper
 
     @property
     def is_heavy(self) -> bool:
@@ -76,10 +85,10 @@ class Scatter:
         )
 
 
-def standard_normal() -> Scatter:
+def standard_normal(tail: float = TAIL) -> Scatter:
     """Return the scatter of a normal variable of mean 0 and deviation 1."""
     distribution = Distribution("standard normal", scipy.stats.norm())
-    return Scatter(distribution, Measure.of("standard normal", distribution))
+    return Scatter(distribution, Measure.of("standard normal", distribution), tail)
 
 
 class Axis:
@@ -98,8 +107,8 @@ class Axis:
     logarithmic : bool
         Whether the coordinate is the logarithm; only for a positive design that scatters
         relatively or not at all.
-    from_normal : callable, optional
-        Turns the standard normal coordinate of a noise variable into the variable.
+    from_normal : FromNormal, optional
+        Turns the standard normal coordinate of a noise variable into the variable, and back.
 
     Attributes
     ----------
@@ -114,7 +123,7 @@ class Axis:
         design: tuple[float, float] | None = None,
         relative: bool = False,
         logarithmic: bool = False,
-        from_normal: Callable[[Array], Array] | None = None,
+        from_normal: FromNormal | None = None,
     ) -> None:
         self.name = name
         self.scatter, self.design = scatter, design
@@ -146,7 +155,9 @@ class Axis:
         return tuple((np.log(ends) if self.logarithmic else ends).tolist())
 
     def cube(self, values: Array) -> Array:
-        """Return the coordinate of values of a designed variable, same shape."""
+        """Return the coordinate of values of the variable, same shape."""
+        if self._from_normal is not None:
+            values = self._from_normal.inverse(values)
         values = np.log(values) if self.logarithmic else values
         return (values - self.centre) / self.half_width
 
@@ -191,7 +202,7 @@ class Axis:
         """Smallest and largest s of the box around a design."""
         if self.scatter is None:
             return 0.0, 0.0
-        ends = np.array([self.scatter.lower, self.scatter.upper])
+        ends = np.array(self.scatter.box)
         return tuple((np.log1p(ends) if self.logarithmic else ends).tolist())
 
 
@@ -199,10 +210,10 @@ def noise_axis(name: str, scatter: Scatter) -> Axis:
     """Return the axis of a noise variable, in the normal coordinate if its tail is heavy."""
     if not scatter.is_heavy:
         return Axis(name, scatter)
-    return Axis(name, standard_normal(), from_normal=_FromNormal(scatter.distribution))
+    return Axis(name, standard_normal(scatter.tail), from_normal=FromNormal(scatter.distribution))
 
 
-class _FromNormal:
+class FromNormal:
     """The value of a variable at that of the standard normal one of the same probability."""
 
     def __init__(self, distribution: Distribution) -> None:
@@ -210,3 +221,7 @@ class _FromNormal:
 
     def __call__(self, w: Array) -> Array:
         return self._distribution.quantile(ndtr(w))
+
+    def inverse(self, values: Array) -> Array:
+        """Return the standard normal values of the same probability as these, same shape."""
+        return ndtri(self._distribution.share_below(values))

@@ -105,6 +105,11 @@ class Distribution:
         values = np.asarray(self._quantile(np.asarray(p, dtype=float)), dtype=float)
         return np.clip(values.reshape(np.shape(p)), self.lower, self.upper)
 
+    def share_below(self, x: ArrayLike) -> NDArray[np.float64]:
+        """Return the probability of smaller values, same shape, dimensionless."""
+        points = np.asarray(x, dtype=float)
+        return np.asarray(self._given.cdf(points), dtype=float).reshape(points.shape)
+
     def density(self, x: ArrayLike) -> NDArray[np.float64]:
         """Return the probability density, same shape, in 1 over the variable's unit."""
         points = np.asarray(x, dtype=float)

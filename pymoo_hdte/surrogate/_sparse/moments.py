@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.polynomial.chebyshev import chebder
@@ -23,7 +24,7 @@ from pymoo_hdte.surrogate._sparse.measures import Measure, OrthonormalPolynomial
 from pymoo_hdte.surrogate._sparse.polynomial import SparsePolynomial
 from pymoo_hdte.surrogate.moments import divide_or_zero
 from pymoo_hdte.surrogate.tensor import chebyshev_basis
-from pymoo_hdte.surrogate.threads import ENOUGH_FOR_THREADS, in_blocks
+from pymoo_hdte.surrogate.threads import ENOUGH_FOR_THREADS, ENOUGH_TO_COMPILE, in_blocks
 
 Array = NDArray[np.float64]
 
@@ -79,6 +80,10 @@ class SparseMoments:
         largest = max(step.size for step in self._steps)
         self._at_once = max(1, _AT_ONCE // (largest * coefficients.shape[1]))
 
+    def __deepcopy__(self, memo: dict[int, Any]) -> SparseMoments:
+        """Return itself: nothing in it changes."""
+        return self
+
     def expansion(self, designs: Array) -> Array:
         """Return the coefficients around designs of shape (n, m), shape (n, r, q)."""
         parts = [self._stages(designs[block])[-1] for block in self._blocks(len(designs))]
@@ -86,7 +91,7 @@ class SparseMoments:
 
     def __call__(self, designs: Array) -> tuple[Array, Array]:
         """Return mean and standard deviation, shape (n, r) each, in the responses' units."""
-        if COMPILES and len(designs) >= ENOUGH_FOR_THREADS:
+        if COMPILES and len(designs) >= ENOUGH_TO_COMPILE:
             return self._many_moments(designs)
         expansion = self.expansion(designs)
         return expansion[..., 0], deviation(expansion)

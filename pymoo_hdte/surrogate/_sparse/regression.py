@@ -7,6 +7,8 @@ for Machine Learning, 2006, sections 5.4.1 and 5.4.2).
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 # Its linear algebra and optimisers load when they are first used.
@@ -30,6 +32,11 @@ NUGGET = 1e-10
 MOST_LEARNT = 300
 """Runs from which the parameters are learnt at most; the polynomial is of all."""
 _ITERATIONS = 60
+NOISE = (np.log(1e-8), np.log(1e-4), np.log(10.0))
+"""Logarithms of the least variance of the runs' own scatter, where its search starts, and the most.
+
+As shares of the prior variance of the response's mean.
+"""
 
 
 class Regression:
@@ -45,6 +52,10 @@ class Regression:
         How much every run counts in ``surprise``.
     parameters : ndarray, shape (d, 3), optional
         Where to start learning them.
+    shares : ndarray, shape (n,), optional
+        Variance of every run's own scatter over that of one run; 1 by default.
+    noisy : bool
+        Whether runs may scatter by themselves.
 
     Attributes
     ----------
@@ -55,6 +66,15 @@ class Regression:
         Every run minus what the others predict there, in the response's unit.
     surprise : float
         Root mean square of that over the standard deviation of the prediction.
+    noise : float
+        Variance by which runs scatter by themselves (mesh, tolerance of a solver), as a share of
+        the prior's unit; 0 unless the runs tell of it.
+    noise_std : float
+        The same as a standard deviation of one run, in the response's unit.
+
+    Notes
+    -----
+    Runs scatter by themselves where that makes them more probable.
     """
 
     def __init__(
@@ -63,19 +83,24 @@ class Regression:
         values: Array,
         relevance: Array,
         parameters: Array | None = None,
+        shares: Array | None = None,
+        noisy: bool = True,
     ) -> None:
         self.centre = float(values.mean())
         self.unit = float(values.std()) or 1.0
         self._features = features
         standard = (values - self.centre) / self.unit
         start = np.tile(START, (len(features), 1)) if parameters is None else parameters
-        self.parameters = _learnt(features, standard, start)
+        shares = np.ones(len(values)) if shares is None else shares
+        self.parameters, self.noise = _learnt(features, standard, start, shares, noisy)
         self.variance, _ = variances(self.parameters, len(features[0]))
-        matrix = _with_nugget(covariance(features, features, self.variance))
+        self._noises = self.noise * shares
+        matrix = _with_nugget(covariance(features, features, self.variance), self._noises)
         self._lower = cholesky(matrix, lower=True)
         self._inverse = cho_solve((self._lower, True), np.eye(len(values)))
         self.weights = self._inverse @ standard
         self.size = float(standard @ self.weights) / len(values)
+        self.noise_std = self.unit * float(np.sqrt(max(self.size, 0.0) * self.noise))
         diagonal = np.diag(self._inverse)
         left_out = self.weights / diagonal
         expected = np.sqrt(max(self.size, np.finfo(float).tiny) / diagonal)
@@ -87,6 +112,22 @@ class Regression:
         """Return the mean, shape (m,), at points of these features, in the response's unit."""
         across = covariance(features, self._features, self.variance)
         return self.centre + self.unit * (across @ self.weights)
+
+    def whitened(self, across: Array) -> Array:
+        """Return what the runs tell, shape (n, m), from their covariances with m points, (n, m).
+
+        Its squares, summed over the runs, are what the prior variance shrinks by.
+        """
+        return np.asarray(solve_triangular(self._lower, across, lower=True))
+
+    def spread_by_noise(self, features: list[Array], functionals: Array) -> Array:
+        """Return what of `spread` is due to the runs' own scatter, the same shape and unit.
+
+        A sum over points is one over runs, each of which scatters independently of the others.
+        """
+        across = covariance(self._features, features, self.variance)
+        of_runs = self._inverse @ (across @ functionals.T)
+        return self.unit * np.sqrt(self.size * (self._noises @ of_runs**2))
 
     def spread(self, features: list[Array], functionals: Array) -> Array:
         """Return the standard deviation of sums over points, shape (f,), in the response's unit.
@@ -101,53 +142,81 @@ class Regression:
         inside = covariance(features, features, self.variance)
         across = covariance(self._features, features, self.variance)
         prior = np.einsum("fm,mn,fn->f", functionals, inside, functionals, optimize=True)
-        known = solve_triangular(self._lower, across @ functionals.T, lower=True)
+        known = self.whitened(across @ functionals.T)
         variance = np.maximum(prior - np.sum(known**2, axis=0), 0.0)
         return self.unit * np.sqrt(self.size * variance)
 
 
-def _with_nugget(matrix: Array) -> Array:
-    matrix[np.diag_indices(len(matrix))] += NUGGET * np.trace(matrix) / len(matrix)
+def _with_nugget(matrix: Array, noise: Array | float = 0.0) -> Array:
+    matrix[np.diag_indices(len(matrix))] += NUGGET * np.trace(matrix) / len(matrix) + noise
     return matrix
 
 
-def _learnt(features: list[Array], standard: Array, start: Array) -> Array:
-    """Return the most probable parameters: by the marginal likelihood and what is expected."""
+def _learnt(
+    features: list[Array], standard: Array, start: Array, shares: Array, noisy: bool
+) -> tuple[Array, float]:
+    """Return the most probable parameters, by the marginal likelihood and what is expected.
+
+    Shape (d, 3), and the variance of the runs' own scatter, 0 if they do not tell of any.
+    """
     count = min(len(standard), MOST_LEARNT)
     features, standard = [feature[:, :count] for feature in features], standard[:count]
+    shares = shares[:count]
+    middle = np.tile(START, len(features)).ravel()
+    expected = np.tile(EXPECTED, len(features)).ravel()
     bounds = [end for _ in features for end in ENDS]
 
     def loss(flat: Array) -> tuple[float, Array]:
-        value, slope = _misfit(features, standard, flat.reshape(start.shape))
-        off = (flat.reshape(start.shape) - START) / EXPECTED
-        return value + 0.5 * float(np.sum(off**2)), (slope + off / EXPECTED).ravel()
+        noise = np.exp(flat[middle.size :])
+        value, slope = _misfit(features, standard, flat[: middle.size], noise, shares)
+        off = (flat[: middle.size] - middle) / expected
+        slope[: middle.size] += off / expected
+        return value + 0.5 * float(off @ off), slope
 
-    options = {"maxiter": _ITERATIONS, "maxcor": 20}
-    optimum = scipy.optimize.minimize(
-        loss, start.ravel(), jac=True, method="L-BFGS-B", bounds=bounds, options=options
-    )
-    return np.array(optimum.x).reshape(start.shape)
+    def optimum(flat: Array, ends: list[tuple[float, float]]) -> Any:
+        options = {"maxiter": _ITERATIONS, "maxcor": 20}
+        return scipy.optimize.minimize(
+            loss, flat, jac=True, method="L-BFGS-B", bounds=ends, options=options
+        )
+
+    without = optimum(start.ravel(), bounds)
+    if not noisy:
+        return np.array(without.x).reshape(start.shape), 0.0
+    least, first, most = NOISE
+    # From the start: what explains the scatter without noise is no way to what does with it.
+    both = optimum(np.append(middle, first), [*bounds, (least, most)])
+    if both.fun >= without.fun:
+        return np.array(without.x).reshape(start.shape), 0.0
+    return np.array(both.x[:-1]).reshape(start.shape), float(np.exp(both.x[-1]))
 
 
-def _misfit(features: list[Array], standard: Array, parameters: Array) -> tuple[float, Array]:
-    """Return the negative logarithm of the marginal likelihood and its slope, shape (d, 3)."""
+def _misfit(
+    features: list[Array], standard: Array, flat: Array, noise: Array, shares: Array
+) -> tuple[float, Array]:
+    """Return the negative logarithm of the marginal likelihood and its slope.
+
+    In the parameters, shape (3 d,), and in the logarithm of the noise, shape (0,) or (1,).
+    """
+    parameters = flat.reshape(len(features), -1)
     variance, slopes = variances(parameters, len(features[0]))
     of_axes = factors(features, features, variance)
     product = np.prod(of_axes, axis=0) if len(of_axes) < 3 else _product(of_axes)
     try:
-        lower = cholesky(_with_nugget(product.copy()), lower=True)
+        lower = cholesky(_with_nugget(product.copy(), noise.sum() * shares), lower=True)
     except np.linalg.LinAlgError:
-        return 1e10, np.zeros_like(parameters)
+        return 1e10, np.zeros(flat.size + noise.size)
     inverse = cho_solve((lower, True), np.eye(len(standard)))
     weights = inverse @ standard
     size = max(float(standard @ weights) / len(standard), np.finfo(float).tiny)
     value = 0.5 * len(standard) * np.log(size) + float(np.log(np.diag(lower)).sum())
-    outer = 0.5 * (inverse - np.outer(weights, weights) / size) * product
+    whole = 0.5 * (inverse - np.outer(weights, weights) / size)
+    outer = whole * product
     gradient = np.empty_like(parameters)
     for j, (feature, factor) in enumerate(zip(features, of_axes, strict=True)):
         by_degree = np.einsum("kn,kn->k", feature @ (outer / factor), feature)
         gradient[j] = slopes[:, j] @ by_degree
-    return value, gradient
+    of_noise = noise * float(np.diag(whole) @ shares)
+    return value, np.append(gradient.ravel(), of_noise)
 
 
 def _product(of_axes: list[Array]) -> Array:

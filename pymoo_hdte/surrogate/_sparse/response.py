@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,6 +10,7 @@ from numpy.typing import NDArray
 
 from pymoo_hdte.surrogate._sparse.kernel import EvenPolynomials
 from pymoo_hdte.surrogate._sparse.regression import Regression
+from pymoo_hdte.surrogate._sparse.second import Linked, Process, Surrogate, better
 from pymoo_hdte.surrogate._sparse.terms import closed, largest, likely_terms, products
 
 Array = NDArray[np.float64]
@@ -21,6 +23,11 @@ COVERAGE = 4.0
 together, and larger towards corners. With 3, 91 % of 40 designs of the borehole with a scatter of
 5 % were covered. Chosen on that and the six functions that `experiments robust` names.
 """
+COVERAGE_OF_DRAWS = 2.0
+"""The same of what runs of a random simulator scatter: a sum of independent draws is normal.
+
+Noise of a mesh is none: its errors belong to one function, too.
+"""
 LEAST_SURPRISE = 0.3
 """Runs that are predicted better than expected make errors smaller by no more than this factor."""
 LOST = 0.05
@@ -31,6 +38,13 @@ EXACT = 1e-3
 They are chosen by all runs, so that their own error is told too small; polynomials of low degree
 give ratios of 1e-6 and less.
 """
+LEAST_JUDGED = 1e-2
+"""Scatter below which errors of two surrogates are compared as if it were this.
+
+As a share of the response's deviation over all runs.
+"""
+MOST_CONVERTED = 3000
+"""Terms that are looked at where another surrogate is made a polynomial."""
 MOST_FITTED = 0.4
 """Largest number of such terms as a share of the runs."""
 
@@ -64,7 +78,7 @@ class ResponseFit:
 
     Attributes
     ----------
-    regression : Regression
+    regression : Regression, Linked or Process
     indices : ndarray of int, shape (p, d)
         Degrees of the terms, a downward-closed set.
     coefficients : ndarray, shape (p,)
@@ -75,13 +89,18 @@ class ResponseFit:
         Whether the terms are fitted alone, without the prior.
     """
 
-    regression: Regression
+    regression: Surrogate
     indices: Indices
     coefficients: Array
     left_out: Array
     alone: bool
 
-    def errors(self, judged: Judged, least: float) -> tuple[Array, Array]:
+    @property
+    def plain(self) -> bool:
+        """Whether it is a polynomial of the response itself."""
+        return isinstance(self.regression, Regression)
+
+    def errors(self, judged: Judged, least: float, counted: bool = False) -> tuple[Array, Array]:
         """Return expected errors of mean and deviation as shares of the scatter, shape (v,) each.
 
         Parameters
@@ -89,6 +108,8 @@ class ResponseFit:
         judged : Judged
         least : float
             Scatter below which it counts as this, in the response's unit.
+        counted : bool
+            Whether what runs scatter by themselves is counted elsewhere.
         """
         errors = []
         for features, weights in zip(judged.features, judged.weights, strict=True):
@@ -102,9 +123,15 @@ class ResponseFit:
             off = self.regression.predict(features) - values
             functionals = np.array([weights, weights * deviation / scatter])
             expected = self.regression.spread(features, functionals)
+            by_noise = self.regression.spread_by_noise(features, functionals)
+            expected = COVERAGE * np.sqrt(np.maximum(expected**2 - by_noise**2, 0.0))
+            expected = np.hypot(expected, (COVERAGE_OF_DRAWS if counted else COVERAGE) * by_noise)
             expected = expected * max(self.regression.surprise, LEAST_SURPRISE)
             cut = np.array([abs(float(weights @ off)), _std(off, weights)])
-            errors.append(tuple((COVERAGE * expected + cut) / scatter))
+            # What runs scatter by themselves may as well be a part of the response.
+            if not counted:
+                cut[1] += np.hypot(scatter, self.regression.noise_std) - scatter
+            errors.append(tuple((expected + cut) / scatter))
         mean, std = np.array(errors).T
         return mean, std
 
@@ -116,6 +143,8 @@ def fitted(
     judged: Judged,
     lost: float,
     start: Array | None,
+    dense: Callable[[], list[Array]] | None = None,
+    process: bool = False,
 ) -> ResponseFit:
     """Return the surrogate of one response.
 
@@ -132,8 +161,38 @@ def fitted(
         Largest change by terms left out, as a share of the least scatter.
     start : ndarray, shape (d, 3), or None
         Parameters of the regression to start from.
+    dense : callable, optional
+        Returns features of very many points, at which other surrogates of the response are made a
+        polynomial; without it, there are no others.
+    process : bool
+        Whether a normal process is tried.
     """
     regression = Regression(features, values, relevance, start)
+    plain = _plain(features, values, regression, judged, lost)
+    left_out = float(np.sqrt(np.mean(regression.left_out**2)))
+    if plain.alone or dense is None or left_out <= lost * float(np.std(values)):
+        return plain
+    other = better(features, values, relevance, regression, start, process)
+    if other is None:
+        return plain
+    converted = _converted(other, dense(), judged, lost)
+    # A polynomial may follow it less well than it follows the response.
+    least = LEAST_JUDGED * float(np.std(values))
+
+    def error(fit: ResponseFit) -> float:
+        return float(np.max(np.sqrt(np.mean(np.square(fit.errors(judged, least)), axis=1))))
+
+    return min((plain, converted), key=error)
+
+
+def _plain(
+    features: list[Array],
+    values: Array,
+    regression: Regression,
+    judged: Judged,
+    lost: float,
+) -> ResponseFit:
+    """Return the most probable polynomial of the response itself."""
     scatters = [
         _std(regression.predict(features), weights)
         for features, weights in zip(judged.features, judged.weights, strict=True)
@@ -152,6 +211,24 @@ def fitted(
         regression.left_out,
         alone=False,
     )
+
+
+def _converted(
+    surrogate: Linked | Process, dense: list[Array], judged: Judged, lost: float
+) -> ResponseFit:
+    """Return a polynomial of another surrogate."""
+    values = surrogate.predict(dense)
+    regression = Regression(dense, values, np.ones(len(values)), noisy=False)
+    scatters = [
+        _std(surrogate.predict(features), weights)
+        for features, weights in zip(judged.features, judged.weights, strict=True)
+    ]
+    looked_at = likely_terms(regression.variance, MOST_CONVERTED)
+    coefficients = _posterior(regression, dense, looked_at)
+    essential = largest(coefficients, lost * float(np.quantile(scatters, 0.1)))
+    indices = closed(looked_at[essential])
+    own = _posterior(regression, dense, indices)
+    return ResponseFit(surrogate, indices, own, surrogate.left_out, alone=False)
 
 
 def _std(values: Array, weights: Array) -> float:

@@ -15,6 +15,7 @@ from pymoo_hdte.discrepancy._answers.descriptive_model import DESCRIPTIVE_FILE
 from pymoo_hdte.discrepancy._verdicts.mechanism_simulation import laws_of
 from pymoo_hdte.mechanism import BelievedValue, Input, Mechanism, Port, Record
 from pymoo_hdte.mechanism.balances import ForceBalance, quantity_names
+from pymoo_hdte.mechanism.port_motion import PortMotion, law_force
 
 LOGS = SHARED / "cases" / "real"
 INERTIA, VISCOUS, DRY, WEIGHT, PHASE, OFFSET = 0.02, 0.05, 0.3, 0.8, 0.4, 0.15
@@ -122,6 +123,32 @@ def test_what_a_verdict_accepts_is_kept_where_it_predicts_best():
     assert "hardening_stiffness" in [effect.name for effect, _ in described.effects]
     for held_out in described.held_out:
         assert held_out.descriptive <= 1.1 * held_out.accepted
+
+
+def test_no_term_is_large_where_nothing_was_measured():
+    """Of a friction that falls at speeds where those of the library have long faded."""
+    generator = np.random.default_rng(3)
+    time = np.arange(0.0, 12.0, 0.005)
+    tones = np.arange(1, 9) * 0.37
+    angles = np.outer(time, 2.0 * np.pi * tones) + generator.uniform(0.0, 6.3, 8)
+    q = 1.5 * time + np.sin(angles) @ (0.02 / tones)
+    v = 1.5 + np.cos(angles) @ np.full(8, 2.0 * np.pi * 0.02)
+    a = -np.sin(angles) @ (4.0 * np.pi**2 * 0.02 * tones)
+    dry = DRY + 0.05 * np.exp(-((v - v.min()) / 0.1))
+    noise = generator.standard_normal((2, len(time)))
+    channels = {
+        "q": q + 1e-6 * noise[0],
+        "torque": INERTIA * a + VISCOUS * v + dry + 1e-3 * noise[1],
+    }
+    halves = [
+        Record(role, role, time[rows], {name: one[rows] for name, one in channels.items()})
+        for role, rows in (("train", slice(0, 1400)), ("held_out", slice(1400, 2400)))
+    ]
+    described = analyse(MeasuredMechanism(ARM, halves, 5.0)).descriptive_model()
+    slow = PortMotion(q[:400], np.linspace(0.01, v.max(), 400))
+    for effect, _ in described.effects:
+        size = np.abs(law_force(effect.law, slow, 0.0)).max()
+        assert size < 3.0 * np.abs(channels["torque"]).max()
 
 
 @pytest.mark.nightly

@@ -33,9 +33,9 @@ NAMES = {
     "coulomb_friction", "stribeck_friction", "position_dependent_friction", "nonlinear_drag",
     "mesh_stiffness_variation", "kinematic_error", "kinematic_reaction", "eccentricity",
     "torque_ripple", "load_dependent_friction", "load_inertia", "damping_reference",
-    "thermal_drift", "presliding_friction",
+    "thermal_drift", "presliding_friction", "uneven_load_sharing",
 }  # fmt: skip
-"""Of design section 7, "Words", and the friction before breakaway that a sweep shows."""
+"""Of design section 7, "Words", with the friction before breakaway and the half stiffness."""
 SEEN = [3.0, 6.0, 46.0 / BELIEVED.ratio]
 LISTED = drive_candidates(
     port_sizes(BELIEVED, [*ORDERS, *SEEN, 2.0 * 46.0 / BELIEVED.ratio], SEEN, SCALES)
@@ -55,7 +55,7 @@ def values_of(candidate):
 def orders_of(candidate):
     """Orders, in cycles per input turn, of the effects of a candidate that is a line."""
     effects = candidate.build(candidate.starts[-1])
-    slower = BELIEVED.ratio if candidate.port == "sensor" else 1.0
+    slower = BELIEVED.ratio if candidate.port in ("load", "sensor") else 1.0
     return [getattr(effect, "law", effect).order / slower for effect in effects]
 
 
@@ -67,6 +67,19 @@ def test_what_is_not_listed_is_the_encoder_s_alone():
     assert {(one.name, one.port) for one in LISTED if not one.listed} == {
         ("encoder_line", "sensor")
     }
+
+
+@pytest.mark.parametrize("swept", [True, False])
+def test_the_play_where_the_input_was_locked_is_sought_with_a_sweep_only(swept):
+    """No other record knows it: it would end at a bound by chance."""
+    sizes = port_sizes(BELIEVED, ORDERS.tolist(), [], replace(SCALES, swept=swept))
+    plays = [one for one in drive_candidates(sizes) if "narrowest" in names_of(one)]
+    assert {one.name for one in plays} == {"clearance_variation", "uneven_load_sharing"}
+    assert {"locked" in names_of(one) for one in plays} == {swept}
+
+
+def names_of(candidate):
+    return [parameter.name for parameter in candidate.parameters]
 
 
 def test_labels_tell_candidates_apart():

@@ -241,7 +241,12 @@ def several(folder, rates=(200.0, 200.0), rows=(2400, 2400), timed=False):
         ("column = 3", 'column = "Joint"'),
         ("column = 9", 'column = "Joint"'),
         (", divided_by = 101.0", ""),
-        ('file = "log.csv"', 'files = { joint = "a.csv", current = "b.csv" }'),
+        (
+            'file = "log.csv"',
+            'role = "train"\nfiles = { joint = "a.csv", current = "b.csv" }\nshare = [0.0, 0.6]\n'
+            '[[records]]\nrole = "held_out"\nshare = [0.6, 1.0]\n'
+            'files = { joint = "a.csv", current = "b.csv" }',
+        ),
     )
 
 

@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from made_verdicts import with_status
 
-from pymoo_hdte._reports.html import digits, number
+from pymoo_hdte._reports.html import digits, number, percent
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy._answers.next_test_drive import Proposal
 from pymoo_hdte.discrepancy._answers.revision_drive import drive_model, revised_model
@@ -178,6 +178,17 @@ def test_a_next_best_that_explains_the_same_share_is_told_apart_by_its_bic(rippl
     said = how_sure(replace(ripple, verdict=foreign))
     assert "97.3 %" in said
     assert "BIC" not in said
+
+
+@pytest.mark.parametrize(("gap", "told"), [(9.0, True), (-9.0, False)])
+def test_a_set_with_more_that_the_evidence_prefers_is_told(ripple, gap, told):
+    chosen, verdict = ripple.verdict.chosen, ripple.verdict
+    more = replace(chosen.candidates[0], name="another")
+    fit = replace(chosen.fit, candidates=(*chosen.candidates, more))
+    richer = replace(chosen, fit=fit, bic=chosen.bic - gap, explained=0.9876)
+    verdict = replace(verdict, equivalent=(), alternatives=(richer,))
+    said = how_sure(replace(ripple, verdict=verdict))
+    assert (percent(0.9876) in said) == (f"BIC is {number(abs(gap))} below" in said) == told
 
 
 @pytest.mark.parametrize(("deviations", "told"), [(2.9, False), (3.1, True)])

@@ -3,6 +3,7 @@
 The motion is a sum of sines, so that its derivatives and the torque have a closed form.
 """
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -279,6 +280,5 @@ def test_gravity_is_the_slope_of_its_energy():
     energy = [3.0 * np.sin(angle + by - 0.3) for by in (-step, step)]
     assert response.torque == pytest.approx((energy[1] - energy[0]) / (2.0 * step), abs=1e-8)
     # After a turn it is the same, and half a turn on the opposite.
-    turned = PortState(angle + np.pi, 0.0 * angle, periodic_phase(angle), np.zeros(1))
+    turned = replace(state, phase=periodic_phase(angle + np.pi))
     assert law.respond(turned).torque == pytest.approx(-response.torque)
-    assert law.respond(turned).slope == pytest.approx(-response.slope)

@@ -77,12 +77,13 @@ def test_the_held_out_test_does_not_depend_on_the_stated_stiffness():
     [
         pytest.param(Hidden(), {"motor": -1.0}, "motor is -0.999", marks=pytest.mark.nightly),
         pytest.param(Hidden(), {"motor": 1.01}, "motor is 1.009", marks=pytest.mark.nightly),
+        (Hidden(), {"motor": 121.0 / 101.0}, "agree at a ratio of 121 for 101."),
         pytest.param(
             Hidden(), {"torque": -1.0}, "falls as the torque rises", marks=pytest.mark.nightly
         ),
         (Hidden(late=-1e-3), {}, "motor may be read 1 ms after"),
     ],
-    ids=("sign", "ratio", "torque", "late"),
+    ids=("sign", "ratio", "another ratio", "torque", "late"),
 )
 def test_what_is_wrong_with_the_encoders_is_said_and_no_effect_is_certain(hidden, instead, words):
     joint, train = joint_of(believed()), record(hidden, "train")

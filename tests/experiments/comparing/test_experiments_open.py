@@ -24,7 +24,7 @@ from experiments.runner.campaign import Campaign
 from experiments.runner.provenance import fingerprint
 from experiments.runner.registry import Context
 from experiments.runner.setting import Setting
-from pymoo_hdte.algorithms import ElitistSwarm
+from pymoo_hdte.algorithms import CompactSwarm, ElitistSwarm
 from pymoo_hdte.algorithms.crowding import least_crowded
 from pymoo_hdte.checks import InvalidInput
 
@@ -211,11 +211,12 @@ def test_the_command_of_a_page_gives_the_same_setting_again(monkeypatch, tmp_pat
     [
         pytest.param("NSGA3", NSGA3, 20, marks=pytest.mark.nightly),
         ("ElitistSwarm", ElitistSwarm, 20),
+        ("CompactSwarm", CompactSwarm, 100),
         ("NSGA-II", NSGA2, 20),
     ],
 )
-def test_algorithms_get_the_population_that_was_asked_for(name, kind, size):
-    algorithm = algorithm_named(name, size, "dtlz2")
+def test_algorithms_get_the_population_that_was_asked_for_or_choose_it(name, kind, size):
+    algorithm = algorithm_named(name, 20, "dtlz2")
     assert isinstance(algorithm, kind)
     assert algorithm.pop_size == size
 

@@ -47,12 +47,16 @@ def test_cores_are_those_the_scheduler_leaves(monkeypatch):
 
 
 def test_the_time_of_measured_rigs_is_shown_beside_what_is_allowed():
-    rows = [["one", "workflow", "3.5"], ["two", "workflow", "21"], ["two", "other", "99"]]
-    table = real.cpu_table(rows)
-    assert table.rows[0] == ("one", "workflow", 3.5)
-    (finding,) = table.findings
-    assert not finding.agrees
-    assert "21 s of CPU (two); 20 are allowed" in finding.sentence
+    taken = [("one", "workflow", "3.5"), ("two", "workflow", "21"), ("two", "other", "99")]
+    rows = [[*row, "a machine"] for row in (*taken, ("two", real.COMMAND, "30"))]
+    table = real.seconds_table(rows, [["two", "a maker", "2", "3", "a = 1", "right", "x"]])
+    assert table.rows[0] == ("one", "workflow", 3.5, "a machine")
+    workflow, command = table.findings
+    assert not workflow.agrees
+    assert "21 s of CPU (two); 20 are allowed" in workflow.sentence
+    assert command.agrees
+    assert "at most 30 s" in command.sentence
+    assert "at most 3 lines" in command.sentence
 
 
 @pytest.mark.nightly

@@ -3,6 +3,7 @@
 import copy
 import math
 import pickle
+import tracemalloc
 from functools import partial, wraps
 
 import chaospy
@@ -98,6 +99,27 @@ def test_it_is_an_ordinary_problem_of_pymoo(beam):
     assert result.X[0] == pytest.approx([0.05, 0.05], rel=0.02)
     with pytest.raises(ExtrapolationError, match="h is"):
         beam.evaluate(np.array([[0.03, 0.06]]))
+
+
+def test_copies_and_pickles_hold_no_samples(beam):
+    """A history of 100 generations held 100 copies of 8 MB of samples."""
+    noise = {"F": FORCE, "E": MODULUS}
+    tails = [Quantile(0.95), Quantile(0.05)]
+    problem = quiet(cantilever, SIZES, noise, objectives=tails, accuracy=0.05)
+    X = designs_of(problem, 5)
+    expected = problem.evaluate(X)
+    assert np.array_equal(pickle.loads(pickle.dumps(problem)).evaluate(X), expected)
+    assert len(pickle.dumps(problem)) < 1e6
+    tracemalloc.start()
+    try:
+        copies = [copy.deepcopy(problem) for _ in range(10)]
+        held, _ = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert held < 10 * 5e4
+    copies[0].xl[:] = 0.0
+    assert np.all(problem.xl > 0.0)
+    assert np.array_equal(copies[1].evaluate(X), expected)
 
 
 def test_prediction_is_near_the_simulator(beam):

@@ -193,7 +193,9 @@ def changed(parts, path, **changes):
     header, arrays = (dict(part) for part in parts)
     header |= {key: changes[key] for key in changes if key in header}
     arrays |= {key: changes[key] for key in changes if key in arrays}
-    FileFormat(FORMAT.name, 1, FORMAT.fields, FORMAT.arrays).write(path, header, **arrays)
+    FileFormat(FORMAT.name, FORMAT.version, FORMAT.fields, FORMAT.arrays).write(
+        path, header, **arrays
+    )
     return path
 
 

@@ -8,7 +8,7 @@ from threadpoolctl import threadpool_info, threadpool_limits
 from pymoo_hdte._one_thread import ONE_THREAD
 from pymoo_hdte.problems import Design
 from pymoo_hdte.problems._simulator.inputs import Inputs
-from pymoo_hdte.surrogate._sparse import adaptive
+from pymoo_hdte.surrogate._sparse import adaptive, components
 from pymoo_hdte.surrogate._sparse import regression as module
 from pymoo_hdte.surrogate._sparse.adaptive import fit_adaptively
 from pymoo_hdte.surrogate._sparse.draws import SpreadPoints, draw_around, draw_designs
@@ -60,13 +60,43 @@ def test_a_run_left_out_is_predicted_as_if_it_had_not_been_made():
 def test_the_slope_of_the_likelihood_equals_differences():
     points, values = runs(20)
     features, standard = POLYNOMIALS(points), values - values.mean()
-    parameters = np.random.default_rng(3).normal(-1.0, 0.5, (3, 3))
-    _, slope = module._misfit(features, standard, parameters)
-    for place in np.ndindex(3, 3):
-        step = np.zeros((3, 3))
-        step[place] = 1e-5
-        ends = [module._misfit(features, standard, parameters + one)[0] for one in (step, -step)]
-        assert slope[place] == pytest.approx((ends[0] - ends[1]) / 2e-5, rel=1e-4, abs=1e-5)
+    start = np.append(np.random.default_rng(3).normal(-1.0, 0.5, 9), -3.0)
+    shares = np.linspace(0.5, 1.0, 20)
+
+    def misfit(flat):
+        return module._misfit(features, standard, flat[:9], np.exp(flat[9:]), shares)
+
+    _, slope = misfit(start)
+    for j in range(10):
+        step = np.zeros(10)
+        step[j] = 1e-5
+        difference = (misfit(start + step)[0] - misfit(start - step)[0]) / 2e-5
+        assert slope[j] == pytest.approx(difference, rel=1e-4, abs=1e-6)
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_runs_that_scatter_by_themselves_are_told_from_those_that_do_not(seed):
+    points, values = runs(120)
+    features = EvenPolynomials(24)(points)
+    assert Regression(features, values, np.ones(120)).noise == 0.0
+    noisy = values + np.random.default_rng(seed).normal(0.0, 0.01, 120)
+    fitted = Regression(features, noisy, np.ones(120))
+    # Of some hundred values, the deviation is known to 7 %.
+    assert fitted.noise_std == pytest.approx(0.01, rel=0.25)
+    # What is left is less than the noise: of 120 runs, some 60 coefficients have to be told.
+    assert np.std(fitted.predict(features) - values) < 0.008
+
+
+def test_the_mean_of_replicates_scatters_less():
+    points, values = runs(80)
+    features = EvenPolynomials(24)(points)
+    shares = np.where(np.arange(80) < 40, 1.0, 0.01)
+    rng = np.random.default_rng(5)
+    noisy = values + rng.normal(0.0, 0.05, 80) * np.sqrt(shares)
+    fitted = Regression(features, noisy, np.ones(80), shares=shares)
+    assert fitted.noise_std == pytest.approx(0.05, rel=0.3)
+    off = np.abs(fitted.predict(features) - values)
+    assert off[40:].mean() < 0.015
 
 
 def test_draws_weigh_as_the_scatter_does():
@@ -106,8 +136,8 @@ def test_growth_fits_on_one_thread_and_leaves_the_function_its_own(monkeypatch):
         return np.exp(cube.sum(axis=1, keepdims=True))
 
     # A fit that itself calls what runs on one thread is no other.
-    nested = ONE_THREAD(noted("fit", adaptive.fitted))
-    monkeypatch.setattr(adaptive, "fitted", nested)
+    nested = ONE_THREAD(noted("fit", components.fitted))
+    monkeypatch.setattr(components, "fitted", nested)
     with threadpool_limits(2):
         rng = np.random.default_rng(8)
         adaptive.fit_adaptively(INPUTS.axes, noted("function", function), 0.1, 40, rng)

@@ -1,28 +1,20 @@
 """Delay between a force and the motion that it causes, by the phase of the force balance.
 
 A delay turns the phase of a force in proportion to frequency, which no mass, damper, spring or
-friction does. It is fitted with the base, and with friction, gravity and a constant force at each
-port, so that what the base lacks does not pass for a delay (as sensor delays in MuJoCo's
-``sysid``). Where the ranges of frequency do not agree on it, its interval is wide.
+friction does; see `input_fit` for what is fitted beside it. Where the ranges of frequency do not
+agree on it, or where much is unexplained, its interval is wide.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.stats import t
 
 from pymoo_hdte.discrepancy._evidence.force_balances.evidence import MeasuredData
+from pymoo_hdte.discrepancy._evidence.force_balances.input_fit import InputFit, Rows
 from pymoo_hdte.mechanism import LawAt
-from pymoo_hdte.mechanism.balances import ForceBalance
 
-Values = NDArray[np.float64]
-
-_RANGES = 10
-"""Ranges of frequency, each of which is left out once."""
 _ROUNDS = 20
 _SETTLED = 1e-4
 """Change of a delay, in periods of the cutoff, below which it is found."""
@@ -42,7 +34,8 @@ class Delay:
     value : float
         s; negative where the record is late.
     spread : float
-        Half the width of its 95 % interval, s.
+        Half the width of its interval, s: of 95 % by chance, or all that a disturbance of the size
+        of the residual can do.
     samples : float
         The value in samples of the slowest record.
     """
@@ -68,7 +61,7 @@ def delays(data: MeasuredData, effects: tuple[LawAt, ...] = ()) -> list[Delay]:
     effects : tuple of LawAt
         Laws that were found, whose sizes are fitted with the delay.
     """
-    found = (_delay(data, one.name, (*data.known, *effects)) for one in data.mechanism.inputs)
+    found = (_delay(data, one.name, effects) for one in data.mechanism.inputs)
     return [one for one in found if one is not None]
 
 
@@ -77,81 +70,36 @@ def _delay(data: MeasuredData, name: str, laws: tuple[LawAt, ...]) -> Delay | No
 
     The best fit is found by the method of Gauss and Newton.
     """
-    columns = _columns(data, name, laws)
+    fitted = InputFit(data, name, laws)
     every = np.arange(len(data.frequency))
     period = 1.0 / data.spectra[0].cutoff
     half, value = _QUOTIENT * period, 0.0
+
+    def change(rows: Rows) -> float:
+        sizes = fitted.coefficients(force, rows)
+        moved = fitted.beyond(slope, sizes, rows)
+        left = force[rows] - fitted.columns[rows] @ sizes
+        power = float(moved @ moved)
+        return -float(moved @ left) / power if power else float("nan")
+
     for _ in range(_ROUNDS):
-        early, late = _force(data, name, value - half), _force(data, name, value + half)
-        force, slope = _force(data, name, value), (late - early) / (2.0 * half)
-        change = _change(force, slope, columns, every)
-        value += float(np.clip(change, -0.25 * period, 0.25 * period))
+        early, late = fitted.force(value - half), fitted.force(value + half)
+        force, slope = fitted.force(value), (late - early) / (2.0 * half)
+        step = change(every)
+        value += float(np.clip(step, -0.25 * period, 0.25 * period))
         if not abs(value) < _LONGEST * period:
             return None
-        if abs(change) < _SETTLED * period:
+        if abs(step) < _SETTLED * period:
             break
     else:
         return None
-    # Without each range in turn (Tukey's jackknife), because the residual of a model is not white.
-    ranges = np.array_split(np.argsort(data.frequency, kind="stable"), _RANGES)
-    changes = np.array([_change(force, slope, columns, np.setdiff1d(every, one)) for one in ranges])
-    variance = (_RANGES - 1.0) / _RANGES * np.sum((changes - changes.mean()) ** 2)
-    spread = float(t.ppf(0.975, _RANGES - 1) * variance**0.5)
+    _, chance = fitted.jackknifed(change)
+    sizes = fitted.coefficients(force, every)
+    if not fitted.possible(sizes):
+        return None
+    bias = fitted.disturbance(force - fitted.columns @ sizes) / float(
+        np.linalg.norm(fitted.beyond(slope, sizes, every))
+    )
+    spread = max(float(chance), bias)
     slowest = max(one.record.step for one in data.spectra)
     return Delay(name, value, spread, value / slowest) if spread < period else None
-
-
-def _change(force: Values, slope: Values, columns: Values, rows: NDArray[np.int_]) -> float:
-    """Return by how much a delay, s, has to change to fit rows of a whitened force, (n,)."""
-    basis, _ = np.linalg.qr(columns[rows])
-    unexplained = force[rows] - basis @ (basis.T @ force[rows])
-    moved = slope[rows] - basis @ (basis.T @ slope[rows])
-    power = float(moved @ moved)
-    return -float(moved @ unexplained) / power if power else float("nan")
-
-
-def _force(data: MeasuredData, name: str, delay: float) -> Values:
-    """Return the whitened force of an input, (n,), at its believed gain."""
-    (gain,) = (one.gain.value for one in data.mechanism.inputs if one.name == name)
-    return _whitened(data, [gain * one.of_input(name, delay) for one in data.spectra])
-
-
-def _columns(data: MeasuredData, name: str, laws: tuple[LawAt, ...]) -> Values:
-    """Return the whitened forces, (n, columns), of all that is fitted with a delay."""
-    quantities = [one.name for one in data.base if one.name != f"gain of {name}"]
-    slopes = [
-        data._linear[1][:, place] for place, one in enumerate(data.base) if one.name in quantities
-    ]
-    forces = [_whitened(data, [one.forces([law]) for one in data.spectra]) for law in laws]
-    shapes = [list(_shapes(one, data)) for one in data.spectra]
-    forces += [_whitened(data, list(each)) for each in zip(*shapes, strict=True)]
-    for other in data.mechanism.inputs:
-        if other.name != name:
-            forces.append(_force(data, other.name, 0.0))
-    columns = np.column_stack([*slopes, *forces])
-    scale = np.linalg.norm(columns, axis=0)
-    return np.asarray(columns[:, scale > 0.0] / scale[scale > 0.0])
-
-
-def _shapes(balance: ForceBalance, data: MeasuredData) -> Iterator[Values]:
-    """Yield dry friction, gravity and a constant force at each port that is not read."""
-    for port in data.mechanism.ports:
-        if not port.read:
-            motion = balance.ports[port.name]
-            yield balance.of_port(port.name, np.sign(motion.speed))
-            yield balance.of_port(port.name, np.ones_like(motion.speed))
-            if data.mechanism.turns(port):
-                yield balance.of_port(port.name, np.sin(motion.position))
-                yield balance.of_port(port.name, np.cos(motion.position))
-
-
-def _whitened(data: MeasuredData, coefficients: list[Values]) -> Values:
-    """Return coefficients (n_balances, n_bins) of each record in units of its noise, (n,)."""
-    return np.concatenate(
-        [
-            (one / deviation)[balance.kept]
-            for one, balance, deviation in zip(
-                coefficients, data.spectra, data.deviation, strict=True
-            )
-        ]
-    )

@@ -195,7 +195,7 @@ def _with_channels(
     """Return a record with the named channels only, some of them replaced."""
     channels = {name: record.channel(name) for name in sorted(names)} | (instead or {})
     noise = {name: level for name, level in record.noise.items() if name in channels}
-    treatment = record.dropped, record.remarks, record.interpolated
+    treatment = record.dropped, record.remarks, record.interpolated, record.context
     return Record(record.name, record.role, record.time, channels, noise, *treatment)
 
 

@@ -52,6 +52,26 @@ def position_orders(data: MeasuredData, base: Fit) -> dict[str, tuple[float, ...
     return orders
 
 
+def periods_within(band: float, position: Values, step: float, orders: Values) -> Values:
+    """Return how many periods of orders pass while their frequency is within a band, (n_orders,).
+
+    Parameters
+    ----------
+    band : float
+        Hz.
+    position : ndarray, shape (n,)
+        rad or m.
+    step : float
+        s.
+    orders : ndarray, shape (n_orders,)
+        Cycles per turn, or rad/m.
+    """
+    ways = np.sort(np.abs(np.diff(position)))
+    travelled = np.r_[0.0, np.cumsum(ways)]
+    slow = np.searchsorted(ways, 2.0 * np.pi * band * step / orders, side="right")
+    return np.asarray(travelled[slow] * orders / (2.0 * np.pi))
+
+
 def _detrended(signal: Values) -> Values:
     """Return a signal without a polynomial of third degree in time."""
     time = np.linspace(-1.0, 1.0, len(signal))

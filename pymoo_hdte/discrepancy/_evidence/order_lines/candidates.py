@@ -18,14 +18,18 @@ from pymoo_hdte.effects.unknowns import Parameter
 
 
 def drive_candidates(
-    sizes: Mapping[str, DriveSizes], believed: Sequence[DriveEffect] = ()
+    sizes: Mapping[str, DriveSizes],
+    believed: Sequence[DriveEffect] = (),
+    bench: Sequence[Candidate] = (),
 ) -> list[Candidate]:
     """Return all candidates for a drive, for the sizes of each of its ports.
 
     None of them stands where the drive is believed to have the same effect, in whatever form: dry
     friction acts there once, bending or not, and hysteresis once, of springs or of Bouc and Wen.
+    Nor does a nuisance of the ``bench`` in any form.
     """
     known = {_place_of_main_form(place_of(effect)) for effect in believed}
+    known |= {_place_of_main_form(place) for nuisance in bench for place in nuisance.places}
     candidates = [
         candidate_of(effect, guess, port, "torque", _at_port, sizes[port].slower)
         for effect in drive_effects()

@@ -19,11 +19,12 @@ from pymoo_hdte.discrepancy._evidence.order_lines.observations import (
     cell_degrees_of_freedom,
 )
 from pymoo_hdte.discrepancy._evidence.order_lines.parameters import base_parameters
+from pymoo_hdte.discrepancy._evidence.order_lines.prediction import with_readings
 from pymoo_hdte.discrepancy._evidence.order_lines.steady_states import SCREENING
 from pymoo_hdte.discrepancy._evidence.order_lines.torsion_curve import torsion_points
 from pymoo_hdte.discrepancy._records.campaign import Campaign
 from pymoo_hdte.discrepancy._records.line_fit import CHANNELS
-from pymoo_hdte.discrepancy._selection.candidate import Candidate
+from pymoo_hdte.discrepancy._selection.candidate import Candidate, Layout
 from pymoo_hdte.discrepancy._selection.excess import Excess, HeldOutTest
 from pymoo_hdte.discrepancy._selection.fitting import Fit, Response
 from pymoo_hdte.discrepancy._selection.rules import RULES, Rules
@@ -64,13 +65,20 @@ class Data(Observations):
         """Return how the whitened residuals of a fit respond to further effects."""
         base = fitted.values[None, : len(self.base)]
         unchanged = self.prediction(base, fitted.effects)
+        input_gain = 1.0 + float(base[0, Layout(self.base).index("input_torque_gain")])
         before = self.features.of_prediction(unchanged)
         before_torsion = self.torsion_residuals(base, fitted.effects)
         priors = np.zeros(len(fitted.residuals) - before.size - before_torsion.size)
 
         def change(added: Sequence[DriveEffect]) -> Vector:
             effects = (*fitted.effects, *added)
-            moved = self.prediction(base, effects, unchanged.balance, SCREENING)
+            if all(getattr(effect, "only_reads", False) for effect in added):
+                moved = with_readings(
+                    unchanged, added, self.features.conditions,
+                    self.features.orders.tolist(), self.campaign.believed.ratio, input_gain,
+                )  # fmt: skip
+            else:
+                moved = self.prediction(base, effects, unchanged.balance, SCREENING)
             # A record without a steady state says nothing about the effect.
             steady = (moved.balance.converged & unchanged.balance.converged)[:, None]
             changed = self.features.of_prediction(moved) - before

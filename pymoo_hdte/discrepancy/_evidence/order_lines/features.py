@@ -15,15 +15,28 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import chi2
 
 from pymoo_hdte.discrepancy._evidence.order_lines.prediction import Conditions, Prediction
 from pymoo_hdte.discrepancy._records.believed import Rig
 from pymoo_hdte.discrepancy._records.campaign import Campaign
-from pymoo_hdte.discrepancy._records.line_fit import CHANNELS, OrderLines, order_lines
+from pymoo_hdte.discrepancy._records.line_fit import (
+    CHANNELS,
+    OrderLines,
+    order_lines,
+    unsteady_lines,
+)
 from pymoo_hdte.discrepancy._records.records import RunningRecord
 from pymoo_hdte.discrepancy._records.residual_spectrum import residual_spectrum
 from pymoo_hdte.discrepancy._selection.rules import RULES, Rules
 
+_NEIGHBOURS = 4
+"""Multiples of 1/N on either side of a line that tell the noise there: a mean of sixteen squares,
+which is known to a quarter."""
+_GUARD = 2
+"""Neighbours on either side that a line may leak into."""
+_WHOLE = 1e-6
+"""Distance from a whole order by rounding."""
 MEANS = (0, 1)
 """Channels whose mean is a feature; the others' means are conditions."""
 
@@ -43,6 +56,12 @@ class Features:
         Covariance of the sensors' noise only.
     shown : ndarray of bool, shape (r, m), optional
         Which lines each record shows; by default all.
+    wander : ndarray, shape (r, m), optional
+        Variance of the lines of the input angle by what the motor does beside its loop, rad2: see
+        `_wander`; by default none.
+    ends : complex ndarray, shape (r, 2, m), optional
+        Lines of the input's acceleration by what is not known of its speed at either end of a
+        record, rad/s2: see `unsteady_lines`; by default none.
     """
 
     records: tuple[RunningRecord, ...]
@@ -51,6 +70,8 @@ class Features:
     values: NDArray[np.float64]
     covariance: NDArray[np.float64]
     shown: NDArray[np.bool_] | None = None
+    wander: NDArray[np.float64] | None = None
+    ends: NDArray[np.complex128] | None = None
 
     def rows(self, rows: NDArray[np.int_]) -> Features:
         """Return the features of some of the records."""
@@ -61,6 +82,8 @@ class Features:
             self.values[rows],
             self.covariance[rows],
             None if self.shown is None else self.shown[rows],
+            None if self.wander is None else self.wander[rows],
+            None if self.ends is None else self.ends[rows],
         )
 
     def of_prediction(self, prediction: Prediction) -> NDArray[np.float64]:
@@ -100,11 +123,13 @@ def measure(
     ratio, rig = campaign.believed.ratio, campaign.rig
     all_orders = np.array(orders)
     shown = np.array([all_orders <= shown_order(record, rules) for record in records])
-    lines = [
-        _at_all_orders(
-            order_lines(record, rig, ratio, all_orders[of_record]), all_orders, of_record
-        )
+    measured = [
+        order_lines(record, rig, ratio, all_orders[of_record])
         for record, of_record in zip(records, shown, strict=True)
+    ]
+    lines = [
+        _at_all_orders(line, all_orders, of_record)
+        for line, of_record in zip(measured, shown, strict=True)
     ]
     conditions = Conditions(
         input_speed=np.array([line.slope[3] for line in lines]),
@@ -118,14 +143,72 @@ def measure(
             [abs(record.input_angle[-1] - record.input_angle[0]) for record in records]
         ),
     )
+    wander = np.zeros(shown.shape)
+    unsteady, ends = np.zeros((2, len(records), 2, len(all_orders)), dtype=complex)
+    for row, (record, line, of_record) in enumerate(zip(records, measured, shown, strict=True)):
+        wander[row, of_record] = _wander(record, campaign, line, rules)
+        if wander[row].any():
+            rates = unsteady_lines(record, ratio, line)
+            unsteady[row][:, of_record], ends[row][:, of_record] = rates
+    noise = np.array([_line_variances(line) for line in lines])
+    conditions = replace(
+        conditions,
+        lead=np.array([line.phasors[3] for line in lines]),
+        lead_share=wander / (wander + noise),
+        unsteady=unsteady,
+    )
     values = np.array([stack(line.mean, line.phasors) for line in lines])
     stiffness = campaign.believed.stiffness
     covariance = np.array([_sensor_covariance(line, rig, stiffness) for line in lines])
     # The load is the measured output torque, whose error also shifts the predicted input torque.
     covariance[:, 1, 1] += [_load_variance(record) / ratio**2 for record in records]
     return Features(
-        tuple(records), conditions, all_orders, values, covariance, None if shown.all() else shown
+        tuple(records),
+        conditions,
+        all_orders,
+        values,
+        covariance,
+        None if shown.all() else shown,
+        wander,
+        ends,
     )
+
+
+def _line_variances(line: OrderLines) -> NDArray[np.float64]:
+    """Return the variances of the lines of the input angle by its sensor, rad2, shape (m,)."""
+    variances = np.diag(line.covariance[3])[1:]
+    return np.asarray((variances[: len(line.orders)] + variances[len(line.orders) :]) / 2.0)
+
+
+def _wander(
+    record: RunningRecord,
+    campaign: Campaign,
+    line: OrderLines,
+    rules: Rules,
+) -> NDArray[np.float64]:
+    """Return the variance of the lines of the input angle beside their noise, rad2, shape (m,).
+
+    Nobody holds a set speed exactly. What the input does between the lines, it does in them as
+    well: the neighbours tell how much. A set point that goes in steps has a speed whose power falls
+    as the square of the frequency, and an angle as its fourth power.
+    """
+    orders = line.orders
+    searched, amplitudes = residual_spectrum(
+        record, campaign.rig, campaign.believed.ratio, orders, rules.highest_order
+    )
+    power, variances = amplitudes[3] ** 2, _line_variances(line)
+    excess, seen = np.zeros(len(orders)), np.zeros(len(orders), dtype=bool)
+    for place, order in enumerate(orders):
+        middle = int(np.searchsorted(searched, order))
+        near = slice(max(middle - _NEIGHBOURS, 0), middle + _NEIGHBOURS)
+        count = len(searched[near])
+        if not count:
+            continue
+        # The power of each neighbour is exponential under noise, with mean 1.
+        chance = rules.unexpected_line_chance / len(orders)
+        seen[place] = power[near].sum() > chi2.isf(chance, 2 * count) / 2.0
+        excess[place] = np.mean((power[near] - 1.0) * (searched[near] / order) ** 4)
+    return np.maximum(excess, 0.0) * variances if seen.any() else np.zeros(len(orders))
 
 
 def _at_all_orders(
@@ -201,6 +284,8 @@ def unexpected_lines(
     """Return the lines outside the features' orders at which each record exceeds the noise.
 
     Each record has a mapping of orders, in cycles per input turn, to powers summed over channels.
+    The input moves as it likes, so that what it alone does counts only as what a motor may do: in
+    whole cycles of its turn, and beyond what it does beside them.
     """
     lines = []
     for record in features.records:
@@ -209,10 +294,30 @@ def unexpected_lines(
         )
         power = amplitudes**2
         threshold = np.log(power.size * len(features.records) / rules.unexpected_line_chance)
-        beyond = np.flatnonzero(power.max(axis=0) > threshold)
+        of_motor = np.abs(orders - orders.round()) < _WHOLE
+        of_motor &= power[3] > threshold * _level(power[3], threshold)
+        beyond = np.flatnonzero((power[:3] > threshold).any(axis=0) | of_motor)
         sizes = power[:, beyond].sum(axis=0)
         lines.append(dict(zip(orders[beyond].round(9).tolist(), sizes.tolist(), strict=True)))
     return lines
+
+
+def _level(power: NDArray[np.float64], threshold: float) -> NDArray[np.float64]:
+    """Return by how much the noise exceeds the stated one around each line, shape (k,).
+
+    1 where the neighbours show no more than noise. A mean of n of them is not exact: a line exceeds
+    c times it by chance in (1 + c / n)^-n of all cases, not in exp(-c), so that it is the larger.
+    """
+    levels = np.ones(len(power))
+    for place in range(len(power)):
+        near = np.r_[
+            power[max(place - _GUARD - _NEIGHBOURS, 0) : max(place - _GUARD, 0)],
+            power[place + _GUARD + 1 : place + _GUARD + 1 + _NEIGHBOURS],
+        ]
+        if near.size and near.sum() > chi2.isf(np.exp(-threshold), 2 * near.size) / 2.0:
+            larger = near.size * np.expm1(threshold / near.size)
+            levels[place] = near.mean() * larger / threshold
+    return levels
 
 
 def unexpected_orders(

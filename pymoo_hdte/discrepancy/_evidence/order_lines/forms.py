@@ -34,7 +34,7 @@ from pymoo_hdte.drive._effects import (
 from pymoo_hdte.effects.effect import AS_LISTED
 from pymoo_hdte.effects.friction import smoothed_sign
 from pymoo_hdte.effects.hysteresis import MaxwellSlip
-from pymoo_hdte.effects.law import PortState, Response, Values
+from pymoo_hdte.effects.law import OUTPUT_SHAFT, PortState, Response, Values
 from pymoo_hdte.effects.ripple import PeriodicTorque
 from pymoo_hdte.effects.stiffness import HardeningStiffness, PeriodicStiffness, SoftWindup
 
@@ -103,7 +103,7 @@ class Ranges:
 
     def slower(self, port: str) -> float:
         """Return turns of the input per turn of a port."""
-        return self.ratio if port == "output" else 1.0
+        return self.ratio if port in OUTPUT_SHAFT else 1.0
 
 
 def corrections(candidate: Candidate, ranges: Ranges) -> list[DriveEffect]:
@@ -220,13 +220,14 @@ def _stiffness_wave(candidate: Candidate, ranges: Ranges) -> list[DriveEffect]:
 
 
 def _ripple(candidate: Candidate, ranges: Ranges) -> list[DriveEffect]:
-    size, order = _SHARE * ranges.torque / ranges.ratio, candidate.order or 1.0
+    port, slower = candidate.port, ranges.slower(candidate.port)
+    size, order = _SHARE * ranges.torque / ranges.ratio * slower, candidate.order or 1.0 / slower
     orders = ranges.multiples(order)
     # A ripple moves its own angle, so that each harmonic also shows at the next lower one.
     shown = {round(multiple / order) for multiple in orders}
     orders += [(k + 1) * order for k in shown if k < ranges.terms and k + 1 not in shown]
     return [
-        Correction("input", PeriodicTorque(order, phase, size))
+        Correction(port, PeriodicTorque(slower * order, phase, size))
         for order in orders
         for phase in _PARTS
     ]

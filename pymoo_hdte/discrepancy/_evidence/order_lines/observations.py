@@ -10,11 +10,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg.lapack import dtrtrs
 
+from pymoo_hdte.discrepancy._evidence.order_lines.bench import IDEAL, Bench
 from pymoo_hdte.discrepancy._evidence.order_lines.features import (
     MEANS,
     Features,
@@ -29,7 +31,7 @@ from pymoo_hdte.discrepancy._evidence.order_lines.torsion_curve import TorsionPo
 from pymoo_hdte.discrepancy._records.campaign import Campaign
 from pymoo_hdte.discrepancy._records.known_values import of_equal_numbers
 from pymoo_hdte.discrepancy._records.line_fit import CHANNELS
-from pymoo_hdte.discrepancy._selection.candidate import Layout
+from pymoo_hdte.discrepancy._selection.candidate import Candidate, Layout
 from pymoo_hdte.drive import DriveEffect, LawAtPort, SteadyMotion, mean_torsion
 from pymoo_hdte.effects.unknowns import Parameter
 
@@ -57,6 +59,8 @@ class Observations:
     reference_effects : tuple of DriveEffect
         Effects included in this response: they may move a resonance, which amplifies the
         repeatability.
+    bench : Bench
+        Nuisances that are fitted with the base, whose unknowns are the last of ``base``.
     """
 
     campaign: Campaign
@@ -65,6 +69,16 @@ class Observations:
     torsion: tuple[TorsionPoints, ...] = ()
     reference: Vector | None = None
     reference_effects: tuple[DriveEffect, ...] = ()
+    bench: Bench = IDEAL
+
+    def on_bench(self, nuisance: Candidate, begin: Sequence[float]) -> Self:
+        """Return the observations on a bench with one more nuisance, whose fits begin at values."""
+        bench = self.bench.with_nuisance(nuisance, begin)
+        own = len(self.base) - len(self.bench.parameters)
+        reference = None if self.reference is None else np.append(self.reference, begin)
+        return replace(
+            self, bench=bench, base=(*self.base[:own], *bench.parameters), reference=reference
+        )
 
     @cached_property
     def whiteners(self) -> NDArray[np.float64]:
@@ -80,8 +94,43 @@ class Observations:
         """
         layout = Layout(self.base)
         start = layout.array("start") if self.reference is None else self.reference
-        known = self.features.covariance + self._repeatability(layout, start)
+        known = self._of_sensors(start) + self._repeatability(layout, start)
         return known + self._creep(float(start[layout.index("stiffness")]))
+
+    def _of_sensors(self, start: Vector) -> NDArray[np.float64]:
+        """Return the covariance by the noise of the sensors, (r, f, f).
+
+        Where the measured lead excites the drive, its noise also moves what is predicted of the
+        other channels; where the loop's does, what the motor does beside its loop. This may be as
+        fast as a line, or slow; the drive answers to either differently.
+        """
+        features = self.features
+        response = self.prediction(start[None], self.reference_effects).response
+        if response is None:
+            return features.covariance
+        share = features.conditions.lead_share
+        share = np.ones(response.rate.shape) if share is None else share
+        count, size = features.values.shape
+        by_noise, of_lead = np.tile(np.eye(size), (count, 1, 1)), features.places(3)
+        fast, slow = np.zeros((2, count, size, size))
+        _set_blocks(fast, of_lead, of_lead, np.ones_like(share))
+        by_ends = np.zeros((count, 2, size))
+        for channel, by_lead in enumerate(np.moveaxis(response.channels, 1, 0)):
+            places, by_rates = features.places(channel), response.slow[:, channel, :, None]
+            as_slow = by_rates[:, 0] * response.rate + by_rates[:, 1] * response.rate**2
+            _set_blocks(by_noise, places, of_lead, -share * by_lead)
+            _set_blocks(fast, places, of_lead, (1.0 - share) * by_lead)
+            _set_blocks(slow, places, of_lead, by_lead - as_slow)
+            if features.ends is not None:
+                lines = by_rates[:, 1:] * features.ends
+                by_ends[..., places] = np.stack([lines.real, lines.imag], axis=-1)
+        covariance = by_noise @ features.covariance @ by_noise.swapaxes(1, 2)
+        if features.wander is not None:
+            deviations = np.zeros((count, 1, size))
+            deviations[:, 0, of_lead] = np.sqrt(features.wander)[..., None]
+            for moved in (fast * deviations, slow * deviations):
+                covariance += moved @ moved.swapaxes(1, 2)
+        return np.asarray(covariance + by_ends.swapaxes(1, 2) @ by_ends)
 
     @property
     def creep(self) -> float:
@@ -151,7 +200,9 @@ class Observations:
         features = self.features
         orders = features.orders.tolist()
         conditions = features.conditions
-        return predict(believed, rig, conditions, orders, values, effects, start, effort)
+        return predict(
+            believed, rig, conditions, orders, values, effects, start, effort, self.bench
+        )
 
     def _values_by_name(self, vectors: Vector) -> dict[str, Vector]:
         return {p.name: column for p, column in zip(self.base, vectors.T, strict=True)}
@@ -227,6 +278,19 @@ class Observations:
             solved, _ = dtrtrs(triangle.T, part, trans=True)
             white[..., record, :] = solved.T.reshape(differences[..., record, :].shape)
         return white.reshape(*differences.shape[:-2], -1)
+
+
+def _set_blocks(
+    matrices: NDArray[np.float64],
+    rows: NDArray[np.int_],
+    columns: NDArray[np.int_],
+    factors: NDArray[np.complex128] | NDArray[np.float64],
+) -> None:
+    """Let matrices (r, f, f) multiply lines by ``factors`` (r, m), from places (m, 2) to others."""
+    (real, imaginary), (of_real, of_imaginary) = rows.T, columns.T
+    matrices[:, real, of_real] = matrices[:, imaginary, of_imaginary] = factors.real
+    matrices[:, real, of_imaginary] = -factors.imag
+    matrices[:, imaginary, of_real] = factors.imag
 
 
 def cell_degrees_of_freedom(data: Observations) -> Values:

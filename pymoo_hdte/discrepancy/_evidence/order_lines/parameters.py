@@ -43,10 +43,14 @@ _UNITS = {
     "input_torque_zero": "N.m",
     "output_torque_gain": "1",
     "output_torque_zero": "N.m",
+    "loop_gain": "1",
+    "loop_lag": "s",
 }
 """SI units of the base parameters, by name; those of lines without their number."""
 ACTING_AT = {"input_damping": "input", "output_damping": "output"}
 """Ports at which base parameters act as friction, as a law there does."""
+_LOOP_GAIN = 0.1
+"""Makers state the torque constant of a motor, which is part of both gains, to 10 %."""
 _OF_LINES = ("error_amplitude", "error_phase")
 
 
@@ -137,12 +141,28 @@ def base_parameters(
     locked = _bounded("locked_stiffness", 1.0, believed.tolerance_of("stiffness"))
     # The prior only determines it where no sweep does.
     parameters.append(replace(locked, prior=locked.scale))
-    for name in READING[1:]:
-        # The stated limit of a sensor error is taken as a standard deviation, since sensors exceed
-        # it.
-        size = max(float(getattr(rig, name)), 1e-9)
-        parameters.append(Parameter(name, 0.0, -10.0 * size, 10.0 * size, size, prior=size))
-    return tuple(parameters)
+    # The stated limit of a sensor error is taken as a standard deviation, since sensors exceed it.
+    parameters += [_error(name, float(getattr(rig, name))) for name in READING[1:]]
+    return (*parameters, *_of_loop(believed, rig))
+
+
+def _of_loop(believed: BelievedDrive, rig: Rig) -> tuple[Parameter, Parameter]:
+    """Return the unknowns of the speed loop, whose torque is never that of its gains exactly.
+
+    A loop that lags by the time constant of the speed that it controls has a phase margin of 33
+    degrees: the largest lag with which it is of use, taken as a standard deviation.
+    """
+    of_output = believed.output_inertia + believed.load_inertia
+    driven = believed.input_inertia + of_output / believed.ratio**2
+    lag = driven / rig.proportional if rig.proportional else 0.0
+    # Ten deviations away there would be no loop, and an effect beside it would show in nothing.
+    return _error("loop_gain", _LOOP_GAIN, 3.0), _error("loop_lag", lag, 3.0)
+
+
+def _error(name: str, deviation: float, most: float = 10.0) -> Parameter:
+    """Return an unknown of mean zero, up to ``most`` deviations away."""
+    size = max(deviation, 1e-9)
+    return Parameter(name, 0.0, -most * size, most * size, size, prior=size)
 
 
 def _bounded(name: str, value: float, tolerance: float) -> Parameter:

@@ -14,14 +14,15 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from pymoo_hdte.discrepancy._evidence.order_lines.bench import IDEAL, Bench
 from pymoo_hdte.discrepancy._evidence.order_lines.steady_states import (
     PREDICTION,
     Effort,
+    Lead,
     merged,
     steady_motions,
 )
 from pymoo_hdte.discrepancy._records.believed import MECHANICAL, BelievedDrive, Rig
-from pymoo_hdte.discrepancy._records.known_values import of_equal_numbers
 from pymoo_hdte.discrepancy._records.line_fit import CHANNELS
 from pymoo_hdte.drive import (
     Coefficients,
@@ -29,8 +30,12 @@ from pymoo_hdte.drive import (
     SteadyMotion,
 )
 from pymoo_hdte.drive._effects import Session
+from pymoo_hdte.drive._solve.lead_response import LeadResponse, lead_response
 from pymoo_hdte.drive._solve.order_spectrum import sine_phasor
+from pymoo_hdte.effects.law import Values
 
+LOOP = ("loop_gain", "loop_lag")
+"""Unknowns of the speed loop: the share by which it is stronger than stated, and its lag in s."""
 _SAME = 1e-8
 """Orders nearer to each other are one; those of a torus are sums of rounded numbers."""
 _UNRESOLVED = 0.1
@@ -59,6 +64,15 @@ class Conditions:
         default 0.
     fading : complex ndarray, shape (r, k, 1 + m), optional
         Contribution of what fades within a record, see `OrderLines`; by default nothing fades.
+    lead : complex ndarray, shape (r, m), optional
+        Measured lines of the input angle, rad, near which the input moves; by default it moves as
+        the speed loop lets it.
+    lead_share : ndarray, shape (r, m), optional
+        Weight of these lines against those of the loop, which together excite the drive; by default
+        1: the measured motion excites, whatever the loop does.
+    unsteady : complex ndarray, shape (r, 2, m), optional
+        Lines of the input's speed and acceleration beyond those of a steady motion, rad/s and
+        rad/s2: see `unsteady_lines`; by default none.
     """
 
     input_speed: NDArray[np.float64]
@@ -69,6 +83,9 @@ class Conditions:
     input_angle: NDArray[np.float64] | None = None
     travel: NDArray[np.float64] | None = None
     fading: NDArray[np.complex128] | None = None
+    lead: NDArray[np.complex128] | None = None
+    lead_share: NDArray[np.float64] | None = None
+    unsteady: NDArray[np.complex128] | None = None
 
     def rows(self, rows: NDArray[np.int_]) -> Conditions:
         """Return the conditions of some of the records."""
@@ -84,13 +101,16 @@ class Conditions:
 class Prediction:
     """Means, shape (v, r, 4), and phasors, (v, r, 4, m), of `CHANNELS` for v vectors, r records.
 
-    SI. The mean of the output torque and of the input angle are conditions, not predictions.
+    SI. The mean of the output torque and of the input angle are conditions, not predictions. Where
+    the measured lead excites, that of the loop is predicted beside it (`_loop_lead`), and
+    ``response`` (v r rows) is how the other channels follow the lead.
     ``balance`` has the steady states, vectors outermost.
     """
 
     mean: NDArray[np.float64]
     phasors: NDArray[np.complex128]
     balance: SteadyMotion
+    response: LeadResponse | None = None
 
 
 def predict(
@@ -102,6 +122,7 @@ def predict(
     effects: Sequence[DriveEffect] = (),
     start: SteadyMotion | None = None,
     effort: Effort = PREDICTION,
+    bench: Bench = IDEAL,
 ) -> Prediction:
     """Return the predicted readings of the sensors.
 
@@ -121,9 +142,11 @@ def predict(
         Steady states of the records for nearby values, to begin from.
     effort : Effort
         How far the steady states are searched for.
+    bench : Bench
+        Nuisances, whose unknowns are among the values.
     """
     parts = []
-    groups = of_equal_numbers(believed.effects, values)
+    groups = bench.groups(believed.effects, values)
     for rows, known in groups:
         group = {name: column[rows] for name, column in values.items()}
         present = (*known, *effects)
@@ -148,29 +171,84 @@ def _predict_group(
     """Return the prediction of vectors that share all effects ``present``."""
     count, records = len(values["offset"]), len(conditions)
     gain = 1.0 + values["output_torque_gain"][:, None]
-    load = (conditions.output_torque - values["output_torque_zero"][:, None]) / gain
+    of_torques = _torque_readings(present, conditions)
+    load = conditions.output_torque - of_torques[1] - values["output_torque_zero"][:, None]
+    load = load / gain
     coefficients = coefficients_of(believed, values, present, records)
+    coefficients = replace(coefficients, elapsed=np.tile(conditions.elapsed, count))
     if conditions.temperature is not None:
         coefficients = replace(coefficients, temperature=np.tile(conditions.temperature, count))
     nearby = None if start is None else start.rows(np.tile(np.arange(records), count))
     speed = np.tile(conditions.input_speed, count)
-    balance = steady_motions(coefficients, speed, load.ravel(), rig, nearby, effort)
-    output_torque = balance.coupling_torque
-    if rig.output_torque_at == "brake":
-        # Behind the load inertia there is only the torque of the load, which is constant.
-        output_torque = output_torque * (np.arange(output_torque.shape[1]) == 0)
+    lead = None
+    if conditions.lead is not None:
+        lead = Lead(np.array(orders, dtype=float), np.tile(conditions.lead, (count, 1)))
+    balance = steady_motions(coefficients, speed, load.ravel(), rig, nearby, effort, lead)
+    at_brake = rig.output_torque_at == "brake"
+    output_torque = balance.brake_torque if at_brake else balance.coupling_torque
+    error = balance.transmission_error
+    for effect in present:
+        turned = effect.turned_back(balance.torus.orders * speed[:, None])
+        error = error if turned is None else error + turned * balance.coupling_torque
     channels = [
-        balance.transmission_error,
-        balance.motor_torque + _motor_ripple(balance, coefficients),
+        error,
+        balance.motor_torque,
         output_torque,
         balance.lead,
+        _motor_ripple(balance, coefficients) + np.zeros_like(balance.lead),
+        balance.slower,
     ]
     lines = _lines(balance, channels, orders, believed.ratio, conditions)
-    means = np.array([channel[:, 0].real for channel in channels])
+    response = None
+    if lead is not None:
+        response = lead_response(coefficients.at_loads(load.ravel()), balance.slopes, speed, orders)
+        if rig.output_torque_at == "brake":
+            response = response.without_load()
+        _follow_lead(lines, response, lead, balance)
+        if conditions.unsteady is not None:
+            unsteady = np.tile(conditions.unsteady, (count, 1, 1))
+            lines[:, :3] += np.einsum("nck,nkm->ncm", response.slow, unsteady)
+        loop = {name: np.repeat(values[name], records) for name in LOOP}
+        lines[:, 3] = _loop_lead(lines, response, lead, rig, loop)
+        if conditions.lead_share is not None:
+            rest = np.tile(1.0 - conditions.lead_share, (count, 1))
+            lines[:, :3] += response.channels * (rest * (lines[:, 3] - lead.phasors))[:, None]
+    lines[:, 1] += lines[:, 4]
+    lines = lines[:, : len(CHANNELS)]
+    means = np.array([channel[:, 0].real for channel in channels[: len(CHANNELS)]])
     phasors = lines.reshape(count, records, len(CHANNELS), len(orders))
     mean = means.T.reshape(count, records, len(CHANNELS))
+    mean[..., 1:3] += of_torques.T
     _add_sensor_errors(believed.ratio, conditions, orders, values, present, mean, phasors)
-    return Prediction(mean, phasors, balance)
+    return Prediction(mean, phasors, balance, response)
+
+
+def _follow_lead(
+    lines: NDArray[np.complex128], response: LeadResponse, lead: Lead, balance: SteadyMotion
+) -> None:
+    """Add to lines (n, 6, m) what follows the lead at orders that the torus does not hold."""
+    beyond = [balance.torus.find(order) is None for order in lead.orders.tolist()]
+    phasors = np.where(beyond, lead.phasors, 0.0)
+    lines[:, :3] += response.channels * phasors[:, None]
+    lines[:, 5] -= response.rate * phasors
+
+
+def _loop_lead(
+    lines: NDArray[np.complex128],
+    response: LeadResponse,
+    lead: Lead,
+    rig: Rig,
+    loop: dict[str, NDArray[np.float64]],
+) -> NDArray[np.complex128]:
+    """Return the lead (n, m), rad, at which the loop's torque would be the one that it takes.
+
+    One step of Newton's method from the measured lead: exact for a drive that is linear in it.
+    """
+    gain, lag = (1.0 + loop["loop_gain"])[:, None], loop["loop_lag"][:, None]
+    answer = gain / (1.0 + lag * response.rate)
+    commanded = answer * (rig.proportional * lines[:, 5] - rig.integral * lead.phasors)
+    stiffness = response.motor_torque + answer * (rig.proportional * response.rate + rig.integral)
+    return np.asarray(lead.phasors - (lines[:, 1] - commanded) / stiffness)
 
 
 def _in_order(
@@ -181,7 +259,11 @@ def _in_order(
     mean = np.concatenate([part.mean for part in parts])[order]
     phasors = np.concatenate([part.phasors for part in parts])[order]
     cases = [np.add.outer(records * rows, np.arange(records)).ravel() for rows in places]
-    return Prediction(mean, phasors, merged([part.balance for part in parts], cases))
+    balance = merged([part.balance for part in parts], cases)
+    responses = [part.response for part in parts if part.response is not None]
+    rows = np.argsort(np.concatenate(cases))
+    response = LeadResponse.joined(responses, rows) if responses else None
+    return Prediction(mean, phasors, balance, response)
 
 
 def coefficients_of(
@@ -224,7 +306,7 @@ def _lines(
     ratio: float,
     conditions: Conditions,
 ) -> NDArray[np.complex128]:
-    """Return the phasors of all channels at analysed orders, (n, 4, m), records innermost.
+    """Return the phasors of k channels at analysed orders, (n, k, m), records innermost.
 
     A case that has diverged is NaN in all its harmonics, and so at all orders.
     """
@@ -287,6 +369,44 @@ def _motor_ripple(balance: SteadyMotion, coefficients: Coefficients) -> NDArray[
     return total
 
 
+def _torque_readings(effects: Sequence[DriveEffect], conditions: Conditions) -> Values:
+    """Return what effects add to the readings of both torques in each record, N.m, shape (2, r)."""
+    added = np.zeros((2, len(conditions)))
+    for effect in effects:
+        reading = effect.torque_reading(conditions.elapsed)
+        added += 0.0 if reading is None else reading
+    return added
+
+
+def with_readings(
+    prediction: Prediction,
+    effects: Sequence[DriveEffect],
+    conditions: Conditions,
+    orders: Sequence[float],
+    ratio: float,
+    input_gain: float,
+) -> Prediction:
+    """Return the prediction of one vector with effects that only change what is read."""
+    mean, phasors = prediction.mean.copy(), prediction.phasors.copy()
+    session = Session(orders, ratio, conditions.elapsed, conditions.bends)
+    _add_angle_readings(effects, session, mean, phasors)
+    mean[..., 1] += input_gain * _torque_readings(effects, conditions)[0]
+    return replace(prediction, mean=mean, phasors=phasors)
+
+
+def _add_angle_readings(
+    effects: Sequence[DriveEffect],
+    session: Session,
+    mean: NDArray[np.float64],
+    phasors: NDArray[np.complex128],
+) -> None:
+    for effect in effects:
+        added = effect.reading_lines(session)
+        if added is not None:
+            mean[..., 0] -= added[0]
+            phasors[..., 0, :] -= added[1]
+
+
 def _add_sensor_errors(
     ratio: float,
     conditions: Conditions,
@@ -299,11 +419,7 @@ def _add_sensor_errors(
     """Add the errors of the sensors in place: offset, drift, eccentricity, gains and zeros."""
     mean[..., 0] += values["offset"][:, None]
     session = Session(orders, ratio, conditions.elapsed, conditions.bends)
-    for effect in effects:
-        added = effect.reading_lines(session)
-        if added is not None:
-            mean[..., 0] -= added[0]
-            phasors[..., 0, :] -= added[1]
+    _add_angle_readings(effects, session, mean, phasors)
     for channel, name in ((1, "input_torque"), (2, "output_torque")):
         gain = 1.0 + values[f"{name}_gain"][:, None]
         mean[..., channel] = gain * mean[..., channel] + values[f"{name}_zero"][:, None]

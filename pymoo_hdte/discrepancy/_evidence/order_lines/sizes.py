@@ -24,7 +24,9 @@ LARGEST = 5.0
 """Largest missing line of the transmission error, in units of the residual of the base: the base
 absorbs no line, but because of a resonance a line may be several times smaller in one record than
 in another."""
-_SHAFTS = {"input": (1.0, 2.0), "output": (1.0,), "mesh": (1.0, 2.0), "sensor": (1.0,)}
+_SHAFTS = {
+    "input": (1.0, 2.0), "output": (1.0,), "mesh": (1.0, 2.0), "sensor": (1.0,), "load": (1.0,),
+}  # fmt: skip
 """Orders at which a shaft varies by design or manufacture: once a turn, and twice for the wave
 generator, which has two lobes."""
 
@@ -43,6 +45,8 @@ class Scales:
         Time from the first record of the session to the last, s.
     changes : tuple of float
         Times between records, none of them near the ends of the session, s.
+    series : tuple of float
+        Those between series of measurements, all if the records state no series.
     swept : bool
         Whether there is a torsion sweep.
     error, input_torque, output_torque : float
@@ -66,6 +70,7 @@ class Scales:
     driven: bool = False
     temperature: float = 0.0
     changes: tuple[float, ...] = ()
+    series: tuple[float, ...] = ()
     swept: bool = False
     loads_differ: bool = False
 
@@ -101,6 +106,7 @@ def scales_of(data: Data, base: Fit) -> Scales:
         driven=bool(braking.max() > least and braking.min() < -least),
         temperature=_temperature(data),
         changes=_changes(when.elapsed),
+        series=_series(features),
         swept=bool(data.torsion),
         loads_differ=bool(np.ptp(when.output_torque) > least),
     )
@@ -119,6 +125,19 @@ def _changes(elapsed: NDArray[np.float64]) -> tuple[float, ...]:
     ordered = np.sort(elapsed)
     late = places_of_change(ordered)
     return tuple(((ordered[late - 1] + ordered[late]) / 2.0).tolist())
+
+
+def _series(features: Features) -> tuple[float, ...]:
+    """Return the times between stated series of measurements, or between all records."""
+    elapsed = features.conditions.elapsed
+    series = np.array([record.series for record in features.records])
+    changes = _changes(elapsed)
+    if np.all(series == series[0]):
+        return changes
+    ordered = series[np.argsort(elapsed, kind="stable")]
+    middle = np.sort(elapsed)
+    between = (middle[:-1] + middle[1:])[ordered[:-1] != ordered[1:]] / 2.0
+    return tuple(time for time in changes if time in between)
 
 
 def _size(features: Features, values: NDArray[np.float64], channel: int) -> float:
@@ -142,6 +161,7 @@ def port_sizes(
     seen: Sequence[float],
     scales: Scales,
     clear: Sequence[float] = (),
+    highest: float = 0.0,
 ) -> dict[str, DriveSizes]:
     """Return the sizes of each port.
 
@@ -155,6 +175,8 @@ def port_sizes(
     scales : Scales
     clear : sequence of float
         Orders of all significant lines, which may be harmonics of an effect.
+    highest : float
+        Order up to which lines are looked for.
     """
     at_output = max(scales.output_torque, believed.ratio * scales.input_torque)
     residual = {
@@ -164,6 +186,7 @@ def port_sizes(
         # A missing torsion is converted into a torque by the stiffness.
         "mesh": max(at_output, believed.stiffness * scales.error),
         "sensor": 0.0,
+        "load": at_output,
     }
     # Friction cannot exceed the whole torque, whatever part of it the base absorbs.
     largest = {
@@ -171,6 +194,7 @@ def port_sizes(
         "output": believed.ratio * scales.motor_torque,
         "mesh": scales.torque,
         "sensor": 0.0,
+        "load": believed.ratio * scales.motor_torque,
     }
     damping = dict.fromkeys(residual, 0.0)
     damping |= {"input": believed.input_damping, "mesh": believed.damping}
@@ -187,6 +211,7 @@ def port_sizes(
         seen=tuple(sorted(seen)),
         clear=tuple(clear),
         shown=tuple(orders),
+        highest=highest,
         error=scales.error,
         largest_error=LARGEST * scales.error,
         # A line believed to have amplitude zero may be missing.
@@ -196,9 +221,12 @@ def port_sizes(
         duration=scales.duration,
         temperature=scales.temperature,
         changes=scales.changes,
+        series=scales.series,
         loads_differ=scales.loads_differ,
+        readings=(scales.input_torque, scales.output_torque),
+        largest_readings=(LARGEST * scales.input_torque, LARGEST * scales.output_torque),
     )
-    slower = {"input": 1.0, "mesh": 1.0, "output": believed.ratio, "sensor": believed.ratio}
+    slower = {port: 1.0 if port in ("input", "mesh") else believed.ratio for port in residual}
     return {
         port: replace(
             shared,
@@ -210,7 +238,11 @@ def port_sizes(
             speed=shared.speed / slower[port],
             damping=damping[port],
             load=scales.torque / believed.ratio if port == "input" else 0.0,
-            swept=scales.swept and port == "output",
+            # The output turns as far as the mesh is twisted.
+            swept=scales.swept and port in ("output", "mesh"),
+            turns=port == "load",
+            coupling=port in ("input", "output", "load"),
+            braked=scales.torque if port == "load" else 0.0,
             slower=slower[port],
             expected=_SHAFTS[port],
         )

@@ -57,8 +57,9 @@ def steady_motions(
     rig: Rig,
     start: SteadyMotion | None = None,
     effort: Effort = PREDICTION,
+    lead: Lead | None = None,
 ) -> SteadyMotion:
-    """Return the steady state of all rows.
+    """Return the steady state of all rows, with the input held by its loop or moving as measured.
 
     Where the load does not hold the flanks of a clearance together, the drive rattles and has no
     steady state. A record without a steady state is no evidence for or against the laws: it is
@@ -66,8 +67,10 @@ def steady_motions(
     """
     motor = SpeedLoop(rig.proportional, rig.integral)
     origin = start if effort.slopes else None
+    bare, torus = replace(coefficients, laws=()), torus_of(coefficients)
+    moving = None if lead is None else lead.on(torus)
 
-    def solve(coefficients: Coefficients, rows: NDArray[np.int_], torus: Torus) -> SteadyMotion:
+    def solve(coefficients: Coefficients, rows: NDArray[np.int_]) -> SteadyMotion:
         return harmonic_balance(
             coefficients.rows(rows),
             input_speed=speed[rows],
@@ -78,23 +81,23 @@ def steady_motions(
             start=None if start is None else start.rows(rows),
             steps=effort.steps,
             tangents=True,
+            lead=None if moving is None else moving[rows],
         )
 
-    bare, torus = replace(coefficients, laws=()), torus_of(coefficients)
     rattles, held = False, np.ones(len(speed), dtype=bool)
     if origin is not None:
         held = origin.converged.copy()
     else:
         rattles = any(law.rattles for _, law in coefficients.laws)
     if rattles:
-        plain = solve(bare, np.arange(len(speed)), torus)
+        plain = solve(bare, np.arange(len(speed)))
         held = np.abs(plain.torsion[:, 0]) > np.abs(plain.torsion[:, 1:]).sum(axis=1)
-    balance = solve(coefficients, np.flatnonzero(held), torus)
+    balance = solve(coefficients, np.flatnonzero(held))
     held[held] = balance.converged
     if held.all():
         return balance
     lost = np.flatnonzero(~held)
-    plain = plain.rows(lost) if rattles else solve(bare, lost, torus)
+    plain = plain.rows(lost) if rattles else solve(bare, lost)
     plain = replace(plain, converged=np.zeros_like(plain.converged))
     return merged([balance.rows(balance.converged), plain], [np.flatnonzero(held), lost])
 
@@ -108,6 +111,23 @@ def merged(motions: Sequence[SteadyMotion], places: Sequence[NDArray[np.int_]]) 
     known = [motion.tangents for motion in motions if motion.tangents is not None]
     tangents = Tangents.joined(known).rows(order) if len(known) == len(motions) else None
     return SteadyMotion(motions[0].torus, *joined, tangents=tangents)
+
+
+@dataclass(frozen=True, eq=False)
+class Lead:
+    """Measured motion of the input of n rows: phasors (n, m), rad, at orders (m,)."""
+
+    orders: NDArray[np.float64]
+    phasors: NDArray[np.complex128]
+
+    def on(self, torus: Torus) -> NDArray[np.complex128]:
+        """Return the harmonics (n, n_harmonics) of a torus; those that it has not are left out."""
+        harmonics = np.zeros((len(self.phasors), len(torus.orders)), dtype=complex)
+        for order, column in zip(self.orders.tolist(), self.phasors.T, strict=True):
+            if (place := torus.find(order)) is not None:
+                index, conjugate = place
+                harmonics[:, index] = column.conj() if conjugate else column
+        return harmonics
 
 
 class Continuation:

@@ -360,7 +360,7 @@ def _records(logs: LogFolder, roles: Roles) -> list[str]:
     parts = roles_of(logs.tables, logs)
     if len(logs.tables) == 1:
         lines += remark(
-            "One record: its first 60 % are fitted, the rest is held out to validate the result. "
+            "One record: 60 % of it are fitted, the rest is held out to validate the result. "
             "A second test of another kind would say more."
         )
     else:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from experiments.studies.measured.known_answers import KNOWN_RIGS
-from experiments.studies.measured.rigs import MEASURED, RIGS
+from experiments.studies.measured.rigs import RIGS, SHARED
 from pymoo_hdte.discrepancy._records.rig_files import read_rig
 from pymoo_hdte.discrepancy._verdicts.mechanism import examine_mechanism
 
@@ -14,7 +14,7 @@ SLOWEST, FASTEST = 0.05, 1.0
 
 def verdict_on(name):
     """Return the verdict on the first part of a log, and the largest speed there."""
-    folder = MEASURED / next(rig.folder for rig in KNOWN_RIGS if rig.name == name)
+    folder = SHARED / next(rig.folder for rig in KNOWN_RIGS if rig.name == name)
     if not folder.is_dir():
         pytest.skip(f"the measurements, which are no part of this software, are not in {folder}")
     rig = read_rig(RIGS / f"{name}.toml", folder)

@@ -150,7 +150,8 @@ def high_bands(
             share = min(share, rules.interpolated_share)
         highest = share / record.step
         margin = margin_of(cutoff, record.step)
-        inner = slice(margin, len(record.time) - margin)
+        before, after = (max(margin, rows) for rows in record.context)
+        inner = slice(before, len(record.time) - after)
         count = len(record.time[inner])
         window = min(_SEGMENT, count // _SEGMENTS)
         if 2.0 * lowest > highest or window < _SEGMENTS:

@@ -1,0 +1,120 @@
+"""The bench of a drive: nuisances that are fitted together with the base, whatever else is.
+
+Their unknowns are unknowns of the base. So every hypothesis about the drive has them, each fit
+finds their values anew, and its evidence is summed over them: hypotheses never differ in them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pymoo_hdte.discrepancy._records.known_values import of_equal_numbers
+from pymoo_hdte.discrepancy._selection.candidate import Candidate
+from pymoo_hdte.discrepancy._selection.caveats import strength_is_certain
+from pymoo_hdte.discrepancy._selection.fitting import Fit
+from pymoo_hdte.discrepancy._selection.rules import Rules
+from pymoo_hdte.drive import DriveEffect
+from pymoo_hdte.effects.unknowns import Parameter
+
+Values = NDArray[np.float64]
+Group = tuple[NDArray[np.int_], tuple[DriveEffect, ...]]
+
+
+@dataclass(frozen=True, eq=False)
+class Bench:
+    """Nuisances of a bench.
+
+    Attributes
+    ----------
+    nuisances : tuple of Candidate
+    begins : tuple of tuple of float
+        For each of them the values at which a fit begins.
+    """
+
+    nuisances: tuple[Candidate, ...] = ()
+    begins: tuple[tuple[float, ...], ...] = ()
+
+    def with_nuisance(self, nuisance: Candidate, begin: Sequence[float]) -> Bench:
+        """Return the bench with one more."""
+        return Bench((*self.nuisances, nuisance), (*self.begins, tuple(map(float, begin))))
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Their unknowns, with names of their own among those of the base."""
+        return tuple(
+            replace(parameter, name=name, start=begin)
+            for nuisance, begins in zip(self.nuisances, self.begins, strict=True)
+            for parameter, name, begin in zip(
+                nuisance.parameters, names_of(nuisance), begins, strict=True
+            )
+        )
+
+    @property
+    def unknowns(self) -> tuple[str, ...]:
+        """Names of their unknowns among those of the base."""
+        return tuple(name for nuisance in self.nuisances for name in names_of(nuisance))
+
+    def shown(self, fitted: Fit, rules: Rules) -> list[tuple[Candidate, slice]]:
+        """Return the nuisances whose strength a fit shows, each with the places of its values."""
+        names = [parameter.name for parameter in fitted.parameters]
+        places = []
+        for nuisance in self.nuisances:
+            begin = names.index(names_of(nuisance)[0])
+            places.append((nuisance, slice(begin, begin + len(nuisance.parameters))))
+        return [
+            (nuisance, place)
+            for nuisance, place in places
+            if strength_is_certain(fitted, nuisance, place, rules)
+        ]
+
+    def effects(self, values: Mapping[str, float]) -> tuple[DriveEffect, ...]:
+        """Return them as effects of a drive, for values by the names of `parameters`."""
+        return tuple(
+            effect
+            for nuisance in self.nuisances
+            for effect in nuisance.build([float(values[name]) for name in names_of(nuisance)])
+        )
+
+    def groups(self, known: Sequence[DriveEffect], values: Mapping[str, Values]) -> list[Group]:
+        """Return groups of vectors that share all numbers of effects, with the effects of each.
+
+        Parameters
+        ----------
+        known : sequence of DriveEffect
+            Believed effects, whose numbers may be among the values.
+        values : mapping of str to ndarray, shape (v,)
+            Parameters of v vectors by name.
+
+        Returns
+        -------
+        list of tuple
+            Indices of the vectors of a group; its believed effects, then those of the bench.
+        """
+        names = self.unknowns
+        groups = of_equal_numbers(known, values)
+        if not names:
+            return groups
+        table = np.column_stack([values[name] for name in names])
+        parted = []
+        for rows, effects in groups:
+            numbers, places = np.unique(table[rows], axis=0, return_inverse=True)
+            for place, row in enumerate(numbers):
+                own = self.effects(dict(zip(names, row.tolist(), strict=True)))
+                parted.append((rows[places.ravel() == place], (*effects, *own)))
+        return parted
+
+
+IDEAL = Bench()
+"""A bench without any nuisance."""
+
+
+def names_of(nuisance: Candidate) -> list[str]:
+    """Return the names of the unknowns of a nuisance among those of a base."""
+    order = [] if nuisance.order is None else [f"{nuisance.order:.6g}"]
+    place = ".".join([nuisance.name, nuisance.port, *order])
+    form = f"/{nuisance.form}" if nuisance.form else ""
+    return [f"{place}{form}.{parameter.name}" for parameter in nuisance.parameters]

@@ -1,0 +1,1 @@
+"""Small probabilities: importance sampling in standard normal space, and where to run for them."""

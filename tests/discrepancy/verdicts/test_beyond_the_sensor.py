@@ -1,0 +1,35 @@
+"""What acts on the load beyond the torque sensor is told from what acts within the drive."""
+
+import json
+
+import numpy as np
+import pytest
+from quick_campaigns import CONDITIONS
+from virtual_rig_cases import BELIEVED, RIG
+
+from experiments.studies.virtual_rig.own_effects import with_effects
+from experiments.studies.virtual_rig.rig import draw_rig, run_campaign
+from pymoo_hdte.discrepancy import analyse
+from pymoo_hdte.drive import LawAtPort
+from pymoo_hdte.effects.gravity import Gravity
+from pymoo_hdte.effects.ripple import PeriodicTorque
+
+PLANTED = {
+    "torque_ripple": (PeriodicTorque(3.0, 0.7, 0.2), "amplitude", 0.2),
+    "gravity": (Gravity(0.8, 0.4), "torque", 0.8),
+}
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize("name", PLANTED)
+def test_a_hidden_torque_of_the_load_is_named_there_with_its_size(name, tmp_path):
+    rng = np.random.default_rng(5)
+    rig = draw_rig(BELIEVED, (), rng)
+    campaign = run_campaign(rig, BELIEVED, RIG, rng, CONDITIONS)
+    law, number, size = PLANTED[name]
+    analysis = analyse(with_effects(campaign, rig, [LawAtPort(name, "load", law)]))
+    analysis.report(tmp_path)
+    document = json.loads((tmp_path / "verdict.json").read_text())
+    (effect,) = [*document["effects"], *document.get("nuisances", [])]
+    assert (effect["name"], effect["port"]) == (name, "load")
+    assert effect["parameters"][number]["value"] == pytest.approx(size, rel=0.02)

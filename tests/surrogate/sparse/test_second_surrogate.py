@@ -1,0 +1,123 @@
+"""Other surrogates than polynomials of the response: when they are taken, and what they state."""
+
+import sys
+
+import numpy as np
+import pytest
+from numpy.polynomial.legendre import leggauss
+from scipy.stats import uniform
+
+from pymoo_hdte.problems import Design, Mean, Std, robust_problem
+from pymoo_hdte.surrogate._sparse.kernel import EvenPolynomials
+from pymoo_hdte.surrogate._sparse.regression import Regression
+from pymoo_hdte.surrogate._sparse.second import Linked, Process, better, links_for
+
+
+def power_law(x, a, b):
+    return np.exp(3.0 * a) * (1.0 + b) / x**2
+
+
+def uniform_moments(x):
+    """Return mean and deviation of the power law in closed form; x deviates by 0.1."""
+    low, high = x - 0.1, x + 0.1
+    first = (1.0 / low - 1.0 / high) / 0.2
+    second = (low**-3 - high**-3) / 0.6
+    mean = first * (np.exp(3.0) - 1.0) / 3.0 * 1.5
+    square = second * (np.exp(6.0) - 1.0) / 6.0 * (7.0 / 3.0)
+    return np.column_stack([mean, np.sqrt(square - mean**2)])
+
+
+def built(surrogate):
+    return robust_problem(
+        power_law,
+        {"x": Design(0.3, 0.9, deviation=0.1)},
+        {"a": uniform(), "b": uniform()},
+        [Mean(), Std()],
+        vectorised=True,
+        surrogate=surrogate,
+        progress=False,
+    )
+
+
+def test_a_power_law_takes_fewer_runs_by_its_logarithm_and_has_its_moments():
+    by_logarithm, plain = built("auto"), built("polynomial")
+    assert by_logarithm.n_runs < 0.7 * plain.n_runs
+    X = np.linspace(0.3, 0.9, 25)[:, None]
+    truth = uniform_moments(X[:, 0])
+    F, band = by_logarithm.evaluate(X, return_values_of=["F", "F_band"])
+    assert np.all(np.abs(F - truth) <= 0.01 * truth[:, 1:])
+    assert np.all(np.mean(np.abs(F - truth) <= band, axis=0) >= 0.95)
+
+
+POINTS = np.random.default_rng(0).uniform(-1.0, 1.0, (60, 2))
+FEATURES = EvenPolynomials(20)(POINTS)
+ONES = np.ones(60)
+
+
+def chosen(values):
+    return better(FEATURES, values, ONES, Regression(FEATURES, values, ONES), None, process=True)
+
+
+def test_each_kind_is_taken_where_it_predicts_better():
+    x, y = POINTS.T
+    assert isinstance(chosen(np.exp(4.0 * x + 2.0 * np.sin(3.0 * y))), Linked)
+    assert isinstance(chosen(np.maximum(x + 0.7 * y, 0.0)), Process)
+    assert chosen(x * y + x**2) is None
+
+
+def test_without_scikit_learn_there_is_no_process(monkeypatch):
+    monkeypatch.setitem(sys.modules, "sklearn.gaussian_process", None)
+    x, y = POINTS.T
+    assert chosen(np.maximum(x + 0.7 * y, 0.0)) is None
+
+
+def test_links_are_those_that_the_values_allow():
+    assert [link.name for link in links_for(np.array([0.1, 0.9]))] == ["log", "logit"]
+    assert [link.name for link in links_for(np.array([0.1, 9.0]))] == ["log"]
+    assert [link.name for link in links_for(np.array([-0.1, -9.0]))] == ["-log(-y)"]
+    assert links_for(np.array([-1.0, 1.0])) == links_for(np.zeros(3)) == []
+
+
+@pytest.mark.parametrize("share", [0.02, 0.3, 0.9])
+def test_links_are_inverse_to_their_forth_and_slopes_are_differences(share):
+    for values in (np.array([share, 0.5]), -np.array([share, 2.0])):
+        for link in links_for(values):
+            h = link.forth(values)
+            assert link.back(h) == pytest.approx(values)
+            difference = (link.back(h + 1e-6) - link.back(h - 1e-6)) / 2e-6
+            assert link.slope(h) == pytest.approx(difference, rel=1e-6)
+
+
+@pytest.mark.parametrize("kind", ["process", "linked"])
+def test_runs_left_out_are_predicted_as_if_they_had_not_been_made(kind):
+    x, y = POINTS.T
+    values = np.exp(np.sin(3.0 * x) + y) + 0.1
+    if kind == "linked":
+        (link,) = links_for(values)
+        whole = Linked(FEATURES, values, ONES, link, None)
+        h = link.forth(values)
+        expected = values - link.back(h - whole._regression.left_out)
+        assert whole.left_out == pytest.approx(expected)
+        return
+    whole = Process(FEATURES, values, ONES, None)
+    kernel, others = whole._model.kernel_, np.arange(60) != 7
+    weights = np.linalg.solve(
+        kernel(POINTS[others]), (values[others] - whole._centre) / whole._unit
+    )
+    across = whole._covariance(POINTS[[7]], POINTS[others])
+    predicted = whole._centre + whole._unit * float((across @ weights)[0])
+    assert whole.left_out[7] == pytest.approx(values[7] - predicted, rel=1e-3, abs=1e-6)
+
+
+def test_the_spread_of_a_sum_is_that_of_the_posterior():
+    x, y = POINTS.T
+    values = np.abs(x) + y
+    process = Process(FEATURES, values, ONES, None)
+    nodes, weights = leggauss(12)
+    line = np.column_stack([nodes, 0.3 * np.ones(12)])
+    features = EvenPolynomials(20)(line)
+    _, covariance = process._model.predict(line, return_cov=True)
+    # scikit-learn's has the runs' own scatter on the diagonal.
+    own = process._model.kernel_.k2.noise_level * np.eye(12)
+    expected = process._unit * np.sqrt(weights @ (covariance - own) @ weights)
+    assert process.spread(features, weights[None])[0] == pytest.approx(expected, rel=1e-4)
