@@ -132,12 +132,11 @@ def test_corrected_joint_predicts_what_was_held_out(joint):
 def test_page_lists_the_library():
     rows = re.findall(r"^\| (`\w+`.*?) \|", PAGE.split("| effect |")[1], flags=re.MULTILINE)
     listed = [name for row in rows for name in re.findall(r"`(\w+)`", row)]
-    # A clearance that varies belongs to the mesh of a drive, and is looked for there only; and what
-    # is a form of another alone is tried in drives only.
-    # So is damping by the load that a mesh passes on.
+    # Some laws belong to a drive and its bench, and are looked for there only.
     of_drives = {
         *("clearance_variation", "shear_thinning_drag", "bouc_wen_hysteresis"),
-        "load_dependent_damping",
+        *("load_dependent_damping", "uneven_load_sharing"),
+        *("brake_ripple", "cogging", "coupling_ripple", "warming"),
     }
     assert sorted(listed) == sorted({effect.name for effect in law_effects()} - of_drives)
 

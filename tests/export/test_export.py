@@ -10,6 +10,7 @@ import pytest
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy import MechanismModel
 from pymoo_hdte.drive._effects import LoadDamping
+from pymoo_hdte.drive._effects.warming import WarmingFriction
 from pymoo_hdte.effects.bouc_wen import BoucWen
 from pymoo_hdte.effects.friction import (
     CoulombFriction,
@@ -28,7 +29,7 @@ from pymoo_hdte.effects.linear import (
 )
 from pymoo_hdte.effects.load_friction import LoadFriction
 from pymoo_hdte.effects.load_sharing import UnevenSharing
-from pymoo_hdte.effects.ripple import PeriodicTorque
+from pymoo_hdte.effects.ripple import BrakeRipple, CouplingTorque, PeriodicTorque
 from pymoo_hdte.effects.shear_thinning import ShearThinningDrag
 from pymoo_hdte.effects.stiffness import DeadZone, HardeningStiffness, PeriodicClearance, SoftWindup
 from pymoo_hdte.export import to_modelica, to_mujoco, to_python, to_urdf
@@ -67,9 +68,19 @@ LAWS = {
     "backlash": DeadZone(0.05),
     "clearance_variation": PeriodicClearance(2.0, 0.3, 0.05, 0.08),
     "uneven_load_sharing": UnevenSharing(1.0, 0.3, 0.05, 0.08),
+    "brake_ripple": BrakeRipple(3.0, 0.4, 0.02),
+    "coupling_ripple": CouplingTorque(1.0, 0.4, 0.2),
+    "cogging": PeriodicTorque(6.0, 0.3, 0.1),
+    "warming": WarmingFriction(0.3, 0.2, 600.0),
 }
 """One law of each effect that a mechanism may have."""
 INERTIA, STIFFNESS, DAMPING, GAIN = 0.5, 4.0, 3.0, 7.6
+
+
+def name_of(law):
+    """Name of a law; several effects may share one type."""
+    same = [name for name, known in LAWS.items() if known == law]
+    return (same or [name for name, known in LAWS.items() if type(known) is type(law)])[0]
 
 
 def joint(*laws, **of_mechanism):
@@ -83,8 +94,7 @@ def joint(*laws, **of_mechanism):
     ]
     kinds = {"angles": ["joint"]} | of_mechanism
     mechanism = Mechanism({"joint": BelievedValue(INERTIA)}, [port], inputs, **kinds)
-    names = {type(law): name for name, law in LAWS.items()}
-    effects = tuple(LawAt(names[type(law)], "bearing", law) for law in laws)
+    effects = tuple(LawAt(name_of(law), "bearing", law) for law in laws)
     return MechanismModel("A joint, revised", mechanism, effects)
 
 
@@ -374,8 +384,7 @@ def test_mujoco_moves_as_our_simulation(share):
         Input("current", {"joint": 1.0}, BelievedValue(7.6)),
     )
     port = Port("bearing", {"joint": share}, damping=BelievedValue(3.0))
-    names = {type(law): name for name, law in LAWS.items()}
-    effects = tuple(LawAt(names[type(law)], "bearing", law) for law in laws)
+    effects = tuple(LawAt(name_of(law), "bearing", law) for law in laws)
     model = MechanismModel("m", Mechanism(inertias, [port], [driven], angles=["joint"]), effects)
     record = Record("r", "train", TIME, {"joint": np.zeros_like(TIME), "current": PUSH})
     course = simulate_mechanism(model.mechanism, record, effects, start={"joint": (0.3, 0.0)})

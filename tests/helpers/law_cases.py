@@ -9,6 +9,7 @@ from pymoo_hdte.drive._effects import (
     PreslidingFriction,
     drive_effects,
 )
+from pymoo_hdte.drive._effects.warming import WarmingFriction
 from pymoo_hdte.effects.bouc_wen import BoucWen
 from pymoo_hdte.effects.friction import (
     CoulombFriction,
@@ -20,7 +21,7 @@ from pymoo_hdte.effects.gravity import Gravity
 from pymoo_hdte.effects.hysteresis import MaxwellSlip
 from pymoo_hdte.effects.load_friction import LoadFriction
 from pymoo_hdte.effects.load_sharing import UnevenSharing
-from pymoo_hdte.effects.ripple import PeriodicTorque
+from pymoo_hdte.effects.ripple import BrakeRipple, CouplingTorque, PeriodicTorque
 from pymoo_hdte.effects.shear_thinning import ShearThinningDrag
 from pymoo_hdte.effects.stiffness import DeadZone, HardeningStiffness, PeriodicClearance, SoftWindup
 from pymoo_hdte.effects.temperature_friction import TemperatureFriction
@@ -55,6 +56,10 @@ EFFECTS = [
     # Few harmonics of an output turn are kept: they are as weak as integrators are to agree.
     LawAtPort("torque_ripple", "load", PeriodicTorque(3.0, 1.0, 0.1)),
     LawAtPort("gravity", "load", Gravity(0.1, 0.4)),
+    LawAtPort("brake_ripple", "load", BrakeRipple(3.0, 0.4, 0.0025)),
+    LawAtPort("coupling_ripple", "input", CouplingTorque(1.0, 0.4, 0.005)),
+    LawAtPort("cogging", "input", PeriodicTorque(6.0, 0.3, 0.01)),
+    LawAtPort("warming", "input", WarmingFriction(1e-4, 0.2, 600.0)),
 ]
 
 

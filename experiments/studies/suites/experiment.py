@@ -23,6 +23,7 @@ from experiments.studies.suites.demands import counted, demands_table, in_one_se
 from experiments.studies.suites.figures import how_to_choose, runtime_profiles
 from experiments.studies.suites.formulas import engineering, imop, lz09, zcat
 from experiments.studies.suites.jobs import MEASURES, BbobRun, SuiteRun
+from experiments.studies.suites.limits import limits_tables
 from experiments.studies.suites.own_time import own_time_table
 from experiments.studies.suites.parts import parts_table
 from experiments.studies.suites.peers import OURS
@@ -59,6 +60,7 @@ def run(context: Context) -> Result:
             *(table for table in (duels_table(outcome),) if table.rows),
             parts_table(outcome),
             own_time_table(),
+            *limits_tables(),
             *ranks_tables(outcome),
             rivals_table(outcome),
             *medians_tables(outcome),

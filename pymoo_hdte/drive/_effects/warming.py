@@ -13,6 +13,7 @@ from pymoo_hdte.drive._effects.base import DriveSizes
 from pymoo_hdte.effects.effect import Effect, register
 from pymoo_hdte.effects.guess import Guess
 from pymoo_hdte.effects.law import Aperiodic, Law, PortState, Response
+from pymoo_hdte.effects.portable import Formula
 from pymoo_hdte.effects.unknowns import unknown
 
 
@@ -47,6 +48,11 @@ class WarmingFriction(Aperiodic):
         lost = self.share * np.expm1(-np.asarray(state.elapsed) / self.time)
         damping = self.coefficient * lost
         return Response(damping * state.speed, damping=damping)
+
+    @property
+    def formula(self) -> Formula:
+        """Its equations once the bench has warmed up."""
+        return Formula("-coefficient * share * speed")
 
 
 def _warming(sizes: Any) -> list[Guess]:

@@ -349,11 +349,12 @@ def compliant_sensor(rng: Generator, form: int) -> Drawn:
 def load_ripple(rng: Generator, form: int) -> Drawn:
     """Draw a brake whose torque varies by 1 to 5 %, 3 to 9 times in its turn.
 
-    In no list: the library's ripple is the motor's.
+    Not to be named, as it is of the bench; no wrong name since the library has the load's port.
     """
     order, at = float(rng.integers(3, 10)), phase(rng)
     return Drawn("load_ripple", "output", "cosine", rng.uniform(0.01, 0.05), 0.2,
-                 lambda size: Hidden((element(el.LOAD_RIPPLE, size, order, at),)))  # fmt: skip
+                 lambda size: Hidden((element(el.LOAD_RIPPLE, size, order, at),)),
+                 components=("torque_ripple",))  # fmt: skip
 
 
 def speed_stiffening(rng: Generator, form: int) -> Drawn:
@@ -398,12 +399,13 @@ def creep(rng: Generator, form: int) -> Drawn:
 def load_growing_error(rng: Generator, form: int) -> Drawn:
     """Draw an error of order 1 or 3 that grows with the load, 2 to 6 % of the torsion.
 
-    In no list: the library's stiffness varies with the two lobes of the wave generator, of even
-    orders, and its errors of other orders do not know the load.
+    Not to be named: the library's stiffness varies with the two lobes of the wave generator, of
+    even orders. Its error that grows with the load is the same line, and no wrong name.
     """
     order, at = float(rng.choice([1.0, 3.0])), phase(rng)
     return Drawn("load_growing_error", "mesh", f"order {order:g}", rng.uniform(0.02, 0.06), 0.15,
-                 lambda size: Hidden((element(el.STIFFNESS_WAVE, size, order, at),)))  # fmt: skip
+                 lambda size: Hidden((element(el.STIFFNESS_WAVE, size, order, at),)),
+                 components=("load_dependent_error",))  # fmt: skip
 
 
 def warming_friction(rng: Generator, form: int) -> Drawn:
