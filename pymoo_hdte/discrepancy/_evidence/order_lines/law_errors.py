@@ -42,7 +42,8 @@ known at the others to a ten-thousandth, which no error of a law is.
 _SMALLEST = 1e-9
 """Least share of the variance of a process for which a direction counts."""
 REPEATABLE = (0.03, 30.0)
-"""Range of what a record's mean is off by, in standard deviations of its noise."""
+"""Range of what a record is off by: in standard deviations of the noise of a mean, or as a multiple
+of what is stated of the static error."""
 _FREQUENCY_LENGTH = 0.3
 """Length over which a response errs, where the logarithm of the frequency runs from -1 to 1."""
 _STEP = 0.01
@@ -190,7 +191,25 @@ class LawErrors:
             sized.append(
                 Sized(f"repeatability of {CHANNELS[channel]}", columns, *REPEATABLE, none, none > 0)
             )
-        return tuple(sized)
+        return (*sized, self._of_error)
+
+    @property
+    def _of_error(self) -> Sized:
+        """By how much the static error of each record differs beyond what is stated.
+
+        In the directions in which the covariance of the features exceeds that of the sensors.
+        """
+        shape, columns = self.data.features.values.shape, list[Matrix]()
+        beyond = self.data.covariance - self.data.features.covariance
+        for record, covariance in enumerate(beyond):
+            values, vectors = np.linalg.eigh(covariance)
+            kept = values > _SMALLEST * values.max()
+            changes = np.zeros((int(kept.sum()), *shape))
+            changes[:, record] = (vectors[:, kept] * np.sqrt(values[kept])).T
+            columns.append(self.data.whiten(changes).T)
+        whole = self._whole(np.hstack(columns))
+        none = np.zeros(whole.shape[1])
+        return Sized("repeatability of the static error", whole, *REPEATABLE, none, none > 0)
 
     @cached_property
     def _noise(self) -> Matrix:
