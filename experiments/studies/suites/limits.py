@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Iterator
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -105,7 +106,7 @@ def many_objectives() -> Iterator[list[Any]]:
         makers: dict[str, Callable[[], Algorithm]] = {
             "CompactSwarm": CompactSwarm,
             "ElitistSwarm": ElitistSwarm,
-            "NSGA-III": lambda directions=directions: NSGA3(directions),
+            "NSGA-III": partial(NSGA3, directions),
         }
         for name, make in makers.items():
             with warnings.catch_warnings():
@@ -126,8 +127,8 @@ def sizes() -> Iterator[list[Any]]:
     rivals = {"NSGA-II": NSGA2, "SMS-EMOA": SMSEMOA, "AGE-MOEA-II": AGEMOEA2}
     makers: dict[str, Callable[[int], Algorithm]] = {"CompactSwarm": lambda _: CompactSwarm()}
     for rival, make in rivals.items():
-        makers[rival] = lambda _, make=make: make(pop_size=100)
-        makers[rival + SIZED] = lambda budget, make=make: make(pop_size=size_for(budget))
+        makers[rival] = partial(_of_size, make, lambda _: 100)
+        makers[rival + SIZED] = partial(_of_size, make, size_for)
     for budget in ZCAT_BUDGETS:
         medians = [
             [
@@ -141,6 +142,11 @@ def sizes() -> Iterator[list[Any]]:
         for name, (volume, distance) in zip(makers, ranks, strict=True):
             yield [SIZES, "hypervolume", budget, name, float(volume)]
             yield [SIZES, "igd_plus", budget, name, float(distance)]
+
+
+def _of_size(make: Callable[..., Algorithm], size: Callable[[int], int], budget: int) -> Algorithm:
+    """Return a rival with as many individuals as a budget asks for."""
+    return make(pop_size=size(budget))
 
 
 def _worth(
