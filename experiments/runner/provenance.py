@@ -18,7 +18,7 @@ PACKAGES = ("numpy", "scipy", "finufft", "numba", "pymoo", "moocore", "chaospy",
 """Installed packages whose version can change a result."""
 EXTRAS = (
     *("jmetalpy", "pygmo", "coco-experiment", "comocma", "cma"),
-    *("pysindy", "sysidentpy", "openturns", "scikit-learn", "emcee"),
+    *("pysindy", "sysidentpy", "mujoco", "platypus-opt", "openturns", "scikit-learn", "emcee"),
 )
 """Packages that can as well, where they are installed."""
 _COMPUTES = ("algorithms", "drive", "problems", "surrogate")

@@ -143,6 +143,15 @@ class DirectProblem(Problem):
     ------
     InvalidInput
         If a statistic needs a probability that so few draws do not resolve.
+
+    Examples
+    --------
+    >>> from pymoo.problems import get_problem
+    >>> problem = Robust(
+    ...     get_problem("zdt1"), scatter=0.02, method="direct", clip=True, progress=False
+    ... )
+    >>> isinstance(problem, DirectProblem), problem.draws
+    (True, 128)
     """
 
     def __init__(

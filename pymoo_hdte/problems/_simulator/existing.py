@@ -118,7 +118,7 @@ def Robust(
     Examples
     --------
     >>> from pymoo.problems import get_problem
-    >>> problem = Robust(get_problem("zdt1"), scatter=0.02, progress=False)
+    >>> problem = Robust(get_problem("zdt1"), scatter=0.02, clip=True, progress=False)
     >>> problem.n_var, problem.draws
     (30, 128)
     """

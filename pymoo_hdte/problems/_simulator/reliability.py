@@ -58,14 +58,24 @@ class Reliability:
         The inputs there, by name and in their units.
     importance : dict of str to float
         Squared direction cosines of that point, dimensionless: shares of each input, which sum to
-        1. Of dependent
-        inputs they belong to the normal variables that make them, in the order of their names.
+        1. Of dependent inputs they belong to the normal variables that make them, in the order of
+        their names.
     n_runs : int
         Runs of the simulator.
     confirmed : bool
         Whether the requested accuracy was reached within the budget.
     failed : ndarray, shape (k, d)
         Inputs in their units at which the simulator failed; they are left out.
+
+    Examples
+    --------
+    >>> noise = {"load": chaospy.Normal(1.0, 0.1), "strength": chaospy.Normal(2.0, 0.2)}
+    >>> rare = failure_probability(
+    ...     lambda load, strength: {"margin": strength - load}, noise, Response("margin") < 0.0,
+    ...     progress=False,
+    ... )
+    >>> isinstance(rare, Reliability), round(rare.form_beta, 2)
+    (True, 4.47)
     """
 
     probability: float

@@ -17,7 +17,14 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Event:
-    """Something that happens or not, given the responses; ``|`` and ``&`` join events."""
+    """Something that happens or not, given the responses; ``|`` and ``&`` join events.
+
+    Examples
+    --------
+    >>> event = (Response("g1") > 2.0) | (Response("g2") < 0.5)
+    >>> event.responses
+    ('g1', 'g2')
+    """
 
     def __or__(self, other: Event) -> Event:
         return JointEvent("any", (self, _event(other)))

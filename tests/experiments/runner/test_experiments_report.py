@@ -398,6 +398,8 @@ def test_the_versions_are_those_of_all_that_computes_a_result():
     distributions = packages_distributions()
     found = {name for module in imported & distributions.keys() for name in distributions[module]}
     bystanders = {"pymoo-hdte", "tqdm", "Jinja2", "tomli_w", "threadpoolctl"}
+    # Parts of mujoco.
+    bystanders |= {"mujoco-core", "mujoco-studio"}
     # They carry calls to workers.
     bystanders |= {"distributed", "cloudpickle"}
     named = {name.lower() for name in (*provenance.PACKAGES, *provenance.EXTRAS)}
