@@ -439,6 +439,9 @@ def fit_adaptively(
     build.run(min(first, budget))
     # What lies beyond the runs does not count here: more of them would not make it smaller.
     passed, goal = 0, max(min(accuracy, CONFIRMED), accuracy / MARGIN)
+    if is_random:
+        # Errors by many independent draws are as large as they are stated.
+        goal = accuracy
     while True:
         fit = build.judge()
         inside = error_of(fit)
