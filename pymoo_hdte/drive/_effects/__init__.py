@@ -8,6 +8,7 @@ from pymoo_hdte.drive._effects.base import (
     Session,
     drive_effects,
     effect_from_fields,
+    only_reads,
 )
 from pymoo_hdte.drive._effects.bench_resonance import BenchResonance
 from pymoo_hdte.drive._effects.encoder import ENCODER_LINE, Eccentricity
@@ -55,4 +56,5 @@ __all__ = [
     "drive_effects",
     "effect_from_fields",
     "effects_at_ports",
+    "only_reads",
 ]

@@ -115,9 +115,7 @@ class DriveEffect:
 
     name: ClassVar[str]
     """Name of the effect, in model files and verdicts."""
-    only_reads: ClassVar[bool] = False
-    """Whether it is all in `reading_lines` and in the input torque of `torque_reading`, so that no
-    motion has to be found anew."""
+    _only_reads: ClassVar[bool] = False
 
     def apply(self, coefficients: Coefficients) -> Coefficients:
         """Return the coefficients with this effect added."""
@@ -219,6 +217,15 @@ class DriveEffect:
     def to_dict(self) -> dict[str, object]:
         """Return the effect as the TOML-like table that `effect_from_fields` reads."""
         return {"name": self.name} | effect_named(self.name).to_fields(self)
+
+
+def only_reads(effect: DriveEffect) -> bool:
+    """Return whether an effect changes readings only, so that no motion has to be found anew.
+
+    It is all in `reading_lines` and in the input torque of `torque_reading` then: the output torque
+    that is read is a condition of the motion.
+    """
+    return effect._only_reads
 
 
 @dataclass(frozen=True)

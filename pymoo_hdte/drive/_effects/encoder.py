@@ -46,7 +46,7 @@ class Eccentricity(DriveEffect):
     ('sensor', 1.0)
     """
 
-    only_reads: ClassVar[bool] = True
+    _only_reads: ClassVar[bool] = True
     name: ClassVar[str] = "eccentricity"
     port: ClassVar[str] = "sensor"
     amplitude: float

@@ -41,7 +41,7 @@ class ThermalDrift(DriveEffect):
     inf
     """
 
-    only_reads: ClassVar[bool] = True
+    _only_reads: ClassVar[bool] = True
     name: ClassVar[str] = "thermal_drift"
     port: ClassVar[str] = "sensor"
     rate: float
@@ -162,7 +162,7 @@ class NewZero(DriveEffect):
     'sensor'
     """
 
-    only_reads: ClassVar[bool] = True
+    _only_reads: ClassVar[bool] = True
     name: ClassVar[str] = "new_zero"
     port: ClassVar[str] = "sensor"
     size: float

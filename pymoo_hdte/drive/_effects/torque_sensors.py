@@ -66,7 +66,7 @@ class InputTorqueDrift(TorqueDrift):
     [[0.0, 0.002], [0.0, 0.0]]
     """
 
-    only_reads: ClassVar[bool] = True
+    _only_reads: ClassVar[bool] = True
     name: ClassVar[str] = "input_torque_drift"
     sensor: ClassVar[str] = "input"
 
@@ -121,7 +121,7 @@ class NewTorqueZero(DriveEffect):
 class NewInputTorqueZero(NewTorqueZero):
     """A `NewTorqueZero` of the input torque's sensor."""
 
-    only_reads: ClassVar[bool] = True
+    _only_reads: ClassVar[bool] = True
     name: ClassVar[str] = "new_input_torque_zero"
     sensor: ClassVar[str] = "input"
 

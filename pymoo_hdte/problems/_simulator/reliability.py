@@ -69,6 +69,7 @@ class Reliability:
 
     Examples
     --------
+    >>> import chaospy
     >>> noise = {"load": chaospy.Normal(1.0, 0.1), "strength": chaospy.Normal(2.0, 0.2)}
     >>> rare = failure_probability(
     ...     lambda load, strength: {"margin": strength - load}, noise, Response("margin") < 0.0,

@@ -145,6 +145,7 @@ def answer(*names, status="named", more=False, rivals=(), renewed=None):
         equivalent=rivals,
         leaves_more_than_noise=more,
         renewed=renewed,
+        of_bench=None,
     )
 
 
