@@ -194,8 +194,11 @@ def _no_surrogate(problem: Problem) -> str:
 
 
 def _has_to_clip(problem: Problem, deviations: Mapping[str, Any], seed: int) -> bool:
-    """Return whether the problem is finite within its bounds only, and warn then."""
-    if is_mixed(problem):
+    """Return whether the problem is finite within its bounds only, and warn then.
+
+    A problem that evaluates one design after the other may be costly, and is not asked.
+    """
+    if is_mixed(problem) or problem.elementwise:
         return False
     draws, lower_upper = 4 * PARTS, np.array(problem.bounds())
     random_state = np.random.default_rng(seed)
