@@ -94,9 +94,9 @@ def test_every_candidate_is_the_same_on_a_drive_of_another_size(factor):
         shares = []
         for before, after in zip(one.parameters, other.parameters, strict=True):
             ends = np.array([[each.lower, each.upper, each.scale] for each in (before, after)])
-            # Of a torque or an inertia, or of an angle, a time or a ratio.
+            # Of a torque or an inertia, of an angle, a time or a ratio, or of a compliance.
             shares.append(ends[1, 2] / ends[0, 2])
-            assert shares[-1] in (factor, 1.0)
+            assert shares[-1] in (factor, 1.0, 1.0 / factor)
             assert np.array_equal(ends[1], shares[-1] * ends[0])
         for start, further in zip(one.starts, other.starts, strict=True):
             assert np.array_equal(further, np.array(start) * shares)
