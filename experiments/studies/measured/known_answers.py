@@ -1,9 +1,9 @@
 """What is known of measured rigs from elsewhere, and how an answer is held against it.
 
-An answer is *right* if it is plain and names every effect that is known and none that is not;
-*partly right* if it names the main effect, but not all or more, or says itself that it is not all;
-*confidently wrong* if it is plain and does not name the main effect; *not found* if it says that
-nothing it knows is the cause; *wrong* otherwise.
+An answer is *right* if it is plain and names every effect that is known and none that is not, and
+*confidently wrong* if it is plain and does not; *partly right* if it names the main effect and says
+itself that it is not all; *not found* if it says that nothing it knows is the cause; *wrong*
+otherwise.
 """
 
 from __future__ import annotations
@@ -96,8 +96,10 @@ def judged(rig: KnownRig, status: str, names: Collection[str]) -> str:
     main = bool(rig.effects[0] & set(names))
     every = all(effect & set(names) for effect in rig.effects)
     known = frozenset().union(*rig.effects, rig.also)
+    if main and status in PLAIN:
+        return RIGHT if every and known >= set(names) else CONFIDENT
     if main:
-        return RIGHT if every and known >= set(names) and status in PLAIN else PARTLY
+        return PARTLY
     if status == "unlisted":
         return NOT_FOUND
     return CONFIDENT if status in (*PLAIN, "class") else WRONG

@@ -44,8 +44,8 @@ JOINT = KnownRig(
     [
         ("named", ["gravity", "coulomb_friction"], RIGHT),
         ("named", ["stribeck_friction", "gravity", "force_offset"], RIGHT),
-        ("named", ["gravity"], PARTLY),
-        ("named", ["gravity", "coulomb_friction", "backlash"], PARTLY),
+        ("named", ["gravity"], CONFIDENT),
+        ("named", ["gravity", "coulomb_friction", "backlash"], CONFIDENT),
         ("partial", ["gravity", "coulomb_friction"], PARTLY),
         ("class", ["gravity", "coulomb_friction"], PARTLY),
         ("named", ["coulomb_friction"], CONFIDENT),
