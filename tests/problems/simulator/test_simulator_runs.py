@@ -66,10 +66,10 @@ def test_a_run_that_fails_once_is_made_again(steady):
 
 
 def test_runs_that_always_fail_are_told():
-    with pytest.warns(RuntimeWarning, match=r"4 of 38 runs failed: x = 0\.4"):
-        problem = quiet(Flaky(lambda call, x: x < 0.5), *PLAIN, accuracy=0.05)
+    with pytest.warns(RuntimeWarning, match=r"\d+ of \d+ runs failed: x = 0\.4"):
+        problem = quiet(Flaky(lambda call, x: x < 0.48), *PLAIN, accuracy=0.05)
     assert len(problem.failed) > 0
-    assert np.all(problem.failed[:, 0] < 0.5)
+    assert np.all(problem.failed[:, 0] < 0.48)
     mean = problem.evaluate(np.array([[0.8]]))[0, 0]
     x = np.linspace(0.75, 0.85, 2001)
     assert mean == pytest.approx(np.mean((np.exp(x) - 1.0) / x), rel=0.02)
