@@ -3,8 +3,8 @@
 import matplotlib
 import numpy as np
 import pytest
-from PIL import Image
-from places import DOCS, ROOT
+from drawn_pictures import drawn_and_stored
+from places import DOCS
 
 from experiments.runner.campaign import Campaign
 from experiments.runner.registry import Context
@@ -103,11 +103,6 @@ def test_tables_hold_all_that_is_stored():
     matplotlib.__version_info__ < (3, 11), reason="matplotlib lays it out otherwise before 3.11"
 )
 def test_the_picture_of_how_to_choose_is_drawn_by_its_script(tmp_path):
-    script = ROOT / "docs" / "which_algorithm_picture.py"
-    scope = {"__file__": str(script), "__name__": "picture"}
-    exec(compile(script.read_text(), str(script), "exec"), scope)
-    scope["draw"](tmp_path / "drawn.png")
-    drawn, kept = (
-        np.asarray(Image.open(path), float) for path in (tmp_path / "drawn.png", scope["PICTURE"])
-    )
+    pictures = drawn_and_stored(DOCS / "which_algorithm_picture.py", tmp_path)
+    drawn, kept = (np.asarray(picture, float) for picture in pictures)
     assert np.mean(np.abs(drawn - kept)) < 0.5

@@ -11,7 +11,7 @@ from pathlib import Path
 import matplotlib
 import numpy as np
 import pytest
-from PIL import Image
+from drawn_pictures import drawn_and_stored
 from places import PAGES, README, ROOT, WORDS
 
 from pymoo_hdte.cli import command_line as cli
@@ -125,13 +125,8 @@ def test_the_readme_is_short():
 
 @pytest.mark.nightly
 def test_the_picture_of_the_beams_is_drawn_by_its_script(tmp_path):
-    script = ROOT / "docs" / "beam_picture.py"
-    scope = {"__file__": str(script), "__name__": "picture"}
-    exec(compile(script.read_text(), str(script), "exec"), scope)
-    scope["draw"](tmp_path / "drawn.png")
-    drawn, stored = (
-        np.asarray(Image.open(path), float) for path in (tmp_path / "drawn.png", scope["PICTURE"])
-    )
+    pictures = drawn_and_stored(ROOT / "docs" / "beam_picture.py", tmp_path)
+    drawn, stored = (np.asarray(picture, float) for picture in pictures)
     assert np.mean(np.abs(drawn - stored)) < 0.5
 
 
@@ -139,11 +134,7 @@ def test_the_picture_of_the_beams_is_drawn_by_its_script(tmp_path):
 def pictures(tmp_path_factory):
     """The picture of the drive, drawn now and as it is stored."""
     script = ROOT / "docs" / "robust_design_picture.py"
-    scope = {"__file__": str(script), "__name__": "picture"}
-    exec(compile(script.read_text(), str(script), "exec"), scope)
-    drawn = tmp_path_factory.mktemp("picture") / "drawn.png"
-    scope["draw"](drawn)
-    return [Image.open(path) for path in (drawn, scope["PICTURE"])]
+    return drawn_and_stored(script, tmp_path_factory.mktemp("picture"))
 
 
 def _parted(text):

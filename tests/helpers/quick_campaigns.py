@@ -7,6 +7,7 @@ import numpy as np
 from kept_results import files_in, kept
 from virtual_rig_cases import BELIEVED, RIG, effect
 
+from experiments.studies.virtual_rig.own_effects import with_effects
 from experiments.studies.virtual_rig.rig import draw_rig, run_campaign
 from experiments.studies.virtual_rig.runs import Condition
 from pymoo_hdte.cli import optimum_report
@@ -43,6 +44,13 @@ def quick_campaign(seed: int, *effects) -> Campaign:
     rng = np.random.default_rng(seed)
     rig = draw_rig(BELIEVED, effects, rng)
     return run_campaign(rig, BELIEVED, RIG, rng, CONDITIONS)
+
+
+def campaign_with(*effects) -> Campaign:
+    """Return a campaign on a clean rig to whose drive effects of the library are added."""
+    rng = np.random.default_rng(5)
+    rig = draw_rig(BELIEVED, (), rng)
+    return with_effects(run_campaign(rig, BELIEVED, RIG, rng, CONDITIONS), rig, effects)
 
 
 @kept

@@ -2,13 +2,9 @@
 
 import json
 
-import numpy as np
 import pytest
-from quick_campaigns import CONDITIONS
-from virtual_rig_cases import BELIEVED, RIG
+from quick_campaigns import campaign_with
 
-from experiments.studies.virtual_rig.own_effects import with_effects
-from experiments.studies.virtual_rig.rig import draw_rig, run_campaign
 from pymoo_hdte.discrepancy import analyse
 from pymoo_hdte.drive import LawAtPort
 from pymoo_hdte.effects.gravity import Gravity
@@ -23,11 +19,8 @@ PLANTED = {
 @pytest.mark.nightly
 @pytest.mark.parametrize("name", PLANTED)
 def test_a_hidden_torque_of_the_load_is_named_there_with_its_size(name, tmp_path):
-    rng = np.random.default_rng(5)
-    rig = draw_rig(BELIEVED, (), rng)
-    campaign = run_campaign(rig, BELIEVED, RIG, rng, CONDITIONS)
     law, number, size = PLANTED[name]
-    analysis = analyse(with_effects(campaign, rig, [LawAtPort(name, "load", law)]))
+    analysis = analyse(campaign_with(LawAtPort(name, "load", law)))
     analysis.report(tmp_path)
     document = json.loads((tmp_path / "verdict.json").read_text())
     (effect,) = [*document["effects"], *document.get("nuisances", [])]

@@ -2,15 +2,11 @@
 
 import json
 
-import numpy as np
 import pytest
 from kept_results import kept, put_files
 from measured_oscillator import reported
-from quick_campaigns import CONDITIONS
-from virtual_rig_cases import BELIEVED, RIG
+from quick_campaigns import campaign_with
 
-from experiments.studies.virtual_rig.own_effects import with_effects
-from experiments.studies.virtual_rig.rig import draw_rig, run_campaign
 from pymoo_hdte.discrepancy import analyse
 from pymoo_hdte.drive import LawAtPort
 from pymoo_hdte.drive._effects import LoadDamping
@@ -21,10 +17,7 @@ PLANTED = LawAtPort("load_dependent_damping", "mesh", LoadDamping(25.0, referenc
 @kept
 def analysis_and_report():
     """Return what is found on a rig whose mesh is damped more under load."""
-    rng = np.random.default_rng(5)
-    rig = draw_rig(BELIEVED, (), rng)
-    campaign = run_campaign(rig, BELIEVED, RIG, rng, CONDITIONS)
-    return reported(analyse(with_effects(campaign, rig, [PLANTED])))
+    return reported(analyse(campaign_with(PLANTED)))
 
 
 @pytest.mark.nightly

@@ -3,16 +3,13 @@
 import json
 from dataclasses import replace
 
-import numpy as np
 import pytest
 from kept_results import kept, put_files
 from measured_oscillator import reported
 from planted_features import SCALES
-from quick_campaigns import CONDITIONS
-from virtual_rig_cases import BELIEVED, RIG
+from quick_campaigns import campaign_with
+from virtual_rig_cases import BELIEVED
 
-from experiments.studies.virtual_rig.own_effects import with_effects
-from experiments.studies.virtual_rig.rig import draw_rig, run_campaign
 from pymoo_hdte.discrepancy import analyse
 from pymoo_hdte.discrepancy._evidence.order_lines.candidates import drive_candidates
 from pymoo_hdte.discrepancy._evidence.order_lines.sizes import port_sizes
@@ -25,10 +22,7 @@ PLANTED = LoadDependentError(1.0, 2.5 * ARCSEC, 0.4, reference=40.0)
 @kept
 def analysis_and_report():
     """Return what is found on a rig whose believed first order grows with the load."""
-    rng = np.random.default_rng(5)
-    rig = draw_rig(BELIEVED, (), rng)
-    campaign = run_campaign(rig, BELIEVED, RIG, rng, CONDITIONS)
-    return reported(analyse(with_effects(campaign, rig, [PLANTED])))
+    return reported(analyse(campaign_with(PLANTED)))
 
 
 def test_a_hidden_one_is_named_with_its_size_and_validated(tmp_path):

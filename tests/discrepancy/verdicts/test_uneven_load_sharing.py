@@ -2,13 +2,9 @@
 
 from dataclasses import replace
 
-import numpy as np
 import pytest
-from quick_campaigns import CONDITIONS
-from virtual_rig_cases import BELIEVED, RIG
+from quick_campaigns import campaign_with
 
-from experiments.studies.virtual_rig.own_effects import with_effects
-from experiments.studies.virtual_rig.rig import draw_rig, run_campaign
 from pymoo_hdte.discrepancy import analyse
 from pymoo_hdte.drive import LawAtPort
 from pymoo_hdte.effects.load_sharing import UnevenSharing
@@ -19,11 +15,8 @@ NAME = "uneven_load_sharing"
 
 def verdict(half_width, variation):
     """Return what is said of a rig with such a play, without its sweep, which does not have it."""
-    rng = np.random.default_rng(5)
-    rig = draw_rig(BELIEVED, (), rng)
-    campaign = run_campaign(rig, BELIEVED, RIG, rng, CONDITIONS)
     law = UnevenSharing(1.0, 0.3, half_width * ARCSEC, variation * ARCSEC)
-    changed = with_effects(campaign, rig, [LawAtPort(NAME, "mesh", law)])
+    changed = campaign_with(LawAtPort(NAME, "mesh", law))
     return analyse(replace(changed, torsion=())).verdict
 
 
