@@ -9,6 +9,7 @@ for those who compare with it.
 """
 
 import pickle
+import warnings
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -18,7 +19,6 @@ from pymoo.problems import get_problem
 from pymoo.termination import get_termination
 
 from pymoo_hdte.algorithms import AMPMOPSO, ElitistSwarm
-from pymoo_hdte.checks import InvalidInput
 
 # %%
 # A problem
@@ -115,14 +115,13 @@ plt.show()
 # ------------------
 #
 # ``ElitistSwarm`` follows no schedule: stop it or go on whenever you like. ``AMPMOPSO`` makes
-# smaller steps towards the end of a run, so that it must know the number of generations G_max, as
-# must all of its family. ``("n_gen", n)`` and ``("n_eval", n)`` tell it. A limit of time does not,
-# and is refused:
+# smaller steps towards the end of a run, so that it has to know the number of generations G_max, as
+# has all of its family. ``("n_gen", n)`` and ``("n_eval", n)`` tell it. A limit of time does not:
 
-try:
+with warnings.catch_warnings(record=True) as raised:
+    warnings.simplefilter("always")
     minimize(truss, AMPMOPSO(), get_termination("time", 1), seed=1)
-except InvalidInput as error:
-    print(error)
+print(raised[-1].message)
 
 # %%
 # There ``n_max_gen`` gives the number that the schedule shall count on.
