@@ -27,6 +27,7 @@ from pymoo_hdte.discrepancy._evidence.force_balances.intervals import Spread
 from pymoo_hdte.discrepancy._evidence.force_balances.orders import position_orders
 from pymoo_hdte.discrepancy._evidence.force_balances.unexplained import (
     fitted_values,
+    port_forces,
     root_mean_square,
 )
 from pymoo_hdte.discrepancy._records.rig_model import MechanismModel
@@ -672,14 +673,9 @@ def _candidates(finding: MechanismFinding, design: _Design, six: Values) -> list
     """Return every effect that a port may have, with the orders that six terms leave."""
     data = design.data
     left = replace(finding.verdict.base, residuals=design.whitened(six))
-    rms = dict(zip(data.names, root_mean_square(data, left.residuals), strict=True))
-    forces = {
-        port.name: rms[port.name]
-        if port.read
-        else max(rms[name] / abs(share) for name, share in port.motion.items() if share)
-        for port in data.mechanism.ports
-    }
-    return mechanism_candidates(data, forces, position_orders(data, left))
+    return mechanism_candidates(
+        data, port_forces(data, left.residuals), position_orders(data, left)
+    )
 
 
 def _simple(terms: Sequence[_Term]) -> list[_Term]:

@@ -27,7 +27,7 @@ from pymoo_hdte.discrepancy._evidence.force_balances.preconditions import (
 )
 from pymoo_hdte.discrepancy._evidence.force_balances.unexplained import (
     fitted_values,
-    root_mean_square,
+    port_forces,
     with_unexplained_residual,
 )
 from pymoo_hdte.discrepancy._selection.candidate import Candidate
@@ -217,11 +217,4 @@ def _candidates(
     if fitted is not base and not all(seen.values()):
         further = position_orders(data, fitted)
         seen = {port: orders or further[port] for port, orders in seen.items()}
-    residual = dict(zip(data.names, root_mean_square(data, base.residuals), strict=True))
-    forces = {
-        port.name: residual[port.name]
-        if port.read
-        else max(residual[name] / abs(share) for name, share in port.motion.items() if share)
-        for port in data.mechanism.ports
-    }
-    return mechanism_candidates(data, forces, seen)
+    return mechanism_candidates(data, port_forces(data, base.residuals), seen)

@@ -8,7 +8,6 @@ from pymoo_hdte.drive._effects.base import (
     Session,
     drive_effects,
     effect_from_fields,
-    only_reads,
 )
 from pymoo_hdte.drive._effects.bench_resonance import BenchResonance
 from pymoo_hdte.drive._effects.encoder import ENCODER_LINE, Eccentricity
@@ -56,5 +55,4 @@ __all__ = [
     "drive_effects",
     "effect_from_fields",
     "effects_at_ports",
-    "only_reads",
 ]

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pymoo_hdte._io.fields import Fields
-from pymoo_hdte.checks import InvalidInput, one_of
+from pymoo_hdte.checks import InvalidInput, one_of, real_number
 from pymoo_hdte.drive._solve.coefficients import Coefficients
 from pymoo_hdte.effects.effect import Effect, effect_named, known_effects
 from pymoo_hdte.effects.guess import Sizes
@@ -115,7 +115,13 @@ class DriveEffect:
 
     name: ClassVar[str]
     """Name of the effect, in model files and verdicts."""
-    _only_reads: ClassVar[bool] = False
+
+    @property
+    def only_reads(self) -> bool:
+        """Whether it changes readings only, so that no motion has to be found anew."""
+        kind = type(self)
+        reads = kind.reading_lines is not DriveEffect.reading_lines
+        return reads and kind.apply is DriveEffect.apply
 
     def apply(self, coefficients: Coefficients) -> Coefficients:
         """Return the coefficients with this effect added."""
@@ -219,13 +225,22 @@ class DriveEffect:
         return {"name": self.name} | effect_named(self.name).to_fields(self)
 
 
-def only_reads(effect: DriveEffect) -> bool:
-    """Return whether an effect changes readings only, so that no motion has to be found anew.
+def check_line(effect: Any) -> None:
+    """Refuse numbers of a line that are not finite, or an order that is not above 0.
 
-    It is all in `reading_lines` and in the input torque of `torque_reading` then: the output torque
-    that is read is a condition of the motion.
+    Parameters
+    ----------
+    effect : DriveEffect
+        With ``order``, ``amplitude`` and ``phase``.
+
+    Raises
+    ------
+    InvalidInput
+        Naming effect and number.
     """
-    return effect._only_reads
+    real_number(f"{effect.name}.order", effect.order, above=0.0)
+    real_number(f"{effect.name}.amplitude", effect.amplitude)
+    real_number(f"{effect.name}.phase", effect.phase)
 
 
 @dataclass(frozen=True)

@@ -7,8 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from pymoo_hdte.checks import real_number
-from pymoo_hdte.drive._effects.base import DriveEffect, DriveSizes, Lines, Session
+from pymoo_hdte.drive._effects.base import DriveEffect, DriveSizes, Lines, Session, check_line
 from pymoo_hdte.effects.effect import Effect, register
 from pymoo_hdte.effects.guess import Guess, guess_of_lines
 from pymoo_hdte.effects.law import Values
@@ -46,7 +45,6 @@ class Eccentricity(DriveEffect):
     ('sensor', 1.0)
     """
 
-    _only_reads: ClassVar[bool] = True
     name: ClassVar[str] = "eccentricity"
     port: ClassVar[str] = "sensor"
     amplitude: float
@@ -54,9 +52,7 @@ class Eccentricity(DriveEffect):
     order: float = 1.0
 
     def __post_init__(self) -> None:
-        real_number("eccentricity.amplitude", self.amplitude)
-        real_number("eccentricity.phase", self.phase)
-        real_number("eccentricity.order", self.order, above=0.0)
+        check_line(self)
 
     def reading(self, output_angle: Values, elapsed: Values | float) -> Values:
         """Return what is added to the reading of true output angles.

@@ -41,7 +41,6 @@ class ThermalDrift(DriveEffect):
     inf
     """
 
-    _only_reads: ClassVar[bool] = True
     name: ClassVar[str] = "thermal_drift"
     port: ClassVar[str] = "sensor"
     rate: float
@@ -162,7 +161,6 @@ class NewZero(DriveEffect):
     'sensor'
     """
 
-    _only_reads: ClassVar[bool] = True
     name: ClassVar[str] = "new_zero"
     port: ClassVar[str] = "sensor"
     size: float

@@ -9,7 +9,7 @@ from typing import ClassVar
 import numpy as np
 
 from pymoo_hdte.checks import real_number
-from pymoo_hdte.drive._effects.base import DriveEffect, DriveSizes
+from pymoo_hdte.drive._effects.base import DriveEffect, DriveSizes, check_line
 from pymoo_hdte.drive._effects.mesh_stiffness import WAVE_GENERATOR_ORDER
 from pymoo_hdte.drive._solve.coefficients import Coefficients
 from pymoo_hdte.drive._solve.order_spectrum import sine_phasor
@@ -58,9 +58,7 @@ class LoadDependentError(DriveEffect):
     reference: float
 
     def __post_init__(self) -> None:
-        real_number("load_dependent_error.order", self.order, above=0.0)
-        real_number("load_dependent_error.amplitude", self.amplitude)
-        real_number("load_dependent_error.phase", self.phase)
+        check_line(self)
         real_number("load_dependent_error.reference", self.reference, above=0.0)
 
     def apply(self, coefficients: Coefficients) -> Coefficients:

@@ -12,7 +12,7 @@ from typing import ClassVar
 import numpy as np
 
 from pymoo_hdte.checks import real_number
-from pymoo_hdte.drive._effects.base import DriveEffect, DriveSizes
+from pymoo_hdte.drive._effects.base import DriveEffect, DriveSizes, check_line
 from pymoo_hdte.drive._solve.coefficients import Coefficients
 from pymoo_hdte.drive._solve.order_spectrum import sine_phasor
 from pymoo_hdte.effects.effect import Effect, register
@@ -56,9 +56,7 @@ class ChangedStaticError(DriveEffect):
     after: float
 
     def __post_init__(self) -> None:
-        real_number("changed_static_error.order", self.order, above=0.0)
-        real_number("changed_static_error.amplitude", self.amplitude)
-        real_number("changed_static_error.phase", self.phase)
+        check_line(self)
         real_number("changed_static_error.after", self.after)
 
     def apply(self, coefficients: Coefficients) -> Coefficients:

@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from pymoo_hdte.checks import real_number
-from pymoo_hdte.drive._effects.base import DriveEffect, DriveSizes
+from pymoo_hdte.drive._effects.base import DriveEffect, DriveSizes, check_line
 from pymoo_hdte.drive._solve.coefficients import Coefficients
 from pymoo_hdte.drive._solve.order_spectrum import sine_phasor
 from pymoo_hdte.effects.effect import Effect, register
@@ -54,9 +54,7 @@ class KinematicErrorLine(DriveEffect):
     phase: float
 
     def __post_init__(self) -> None:
-        real_number("kinematic_error.order", self.order, above=0.0)
-        real_number("kinematic_error.amplitude", self.amplitude)
-        real_number("kinematic_error.phase", self.phase)
+        check_line(self)
 
     def apply(self, coefficients: Coefficients) -> Coefficients:
         """Return the coefficients with the order added."""

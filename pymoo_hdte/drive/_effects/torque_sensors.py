@@ -19,8 +19,37 @@ _SENSORS = ("input", "output")
 """Torque sensors, in the order of `DriveEffect.torque_reading`."""
 
 
+class TorqueSensorEffect(DriveEffect):
+    """A change of what one of the torque sensors reads, which a subclass gives by its time."""
+
+    port: ClassVar[str] = "sensor"
+    sensor: ClassVar[str]
+
+    @property
+    def only_reads(self) -> bool:
+        """Whether no motion follows: the output torque that is read is a condition of it."""
+        return self.sensor == "input"
+
+    def added(self, elapsed: Values) -> Values:
+        """Return what is added to the reading, N.m, at times (n,) of the session, s."""
+        raise NotImplementedError
+
+    def torque_reading(self, elapsed: Values) -> Values:
+        """Return what is added to the readings of both torques, N.m, shape (2, n).
+
+        Parameters
+        ----------
+        elapsed : ndarray, shape (n,)
+            Time of the session, s.
+        """
+        added = self.added(np.asarray(elapsed))
+        return np.array(
+            [added if sensor == self.sensor else np.zeros_like(added) for sensor in _SENSORS]
+        )
+
+
 @dataclass(frozen=True)
-class TorqueDrift(DriveEffect):
+class TorqueDrift(TorqueSensorEffect):
     """A zero of a torque sensor that runs to a size: size (1 - exp(-t / time)) is added to it.
 
     Attributes
@@ -36,8 +65,6 @@ class TorqueDrift(DriveEffect):
         For a size that is not finite, or a time constant that is not above 0.
     """
 
-    port: ClassVar[str] = "sensor"
-    sensor: ClassVar[str]
     size: float
     time: float
 
@@ -45,15 +72,9 @@ class TorqueDrift(DriveEffect):
         real_number(f"{self.name}.size", self.size)
         real_number(f"{self.name}.time", self.time, above=0.0)
 
-    def torque_reading(self, elapsed: Values) -> Values:
-        """Return what is added to the readings of both torques, N.m, shape (2, n).
-
-        Parameters
-        ----------
-        elapsed : ndarray, shape (n,)
-            Time of the session, s.
-        """
-        return _of_sensor(self.sensor, -self.size * np.expm1(-np.asarray(elapsed) / self.time))
+    def added(self, elapsed: Values) -> Values:
+        """Return what is added to the reading, N.m, at times (n,) of the session, s."""
+        return np.asarray(-self.size * np.expm1(-elapsed / self.time))
 
 
 @dataclass(frozen=True)
@@ -66,7 +87,6 @@ class InputTorqueDrift(TorqueDrift):
     [[0.0, 0.002], [0.0, 0.0]]
     """
 
-    _only_reads: ClassVar[bool] = True
     name: ClassVar[str] = "input_torque_drift"
     sensor: ClassVar[str] = "input"
 
@@ -80,7 +100,7 @@ class OutputTorqueDrift(TorqueDrift):
 
 
 @dataclass(frozen=True)
-class NewTorqueZero(DriveEffect):
+class NewTorqueZero(TorqueSensorEffect):
     """A new zero of a torque sensor: size is added to every reading from a time on.
 
     Attributes
@@ -96,8 +116,6 @@ class NewTorqueZero(DriveEffect):
         For a number that is not finite.
     """
 
-    port: ClassVar[str] = "sensor"
-    sensor: ClassVar[str]
     size: float
     after: float
 
@@ -105,23 +123,15 @@ class NewTorqueZero(DriveEffect):
         real_number(f"{self.name}.size", self.size)
         real_number(f"{self.name}.after", self.after)
 
-    def torque_reading(self, elapsed: Values) -> Values:
-        """Return what is added to the readings of both torques, N.m, shape (2, n).
-
-        Parameters
-        ----------
-        elapsed : ndarray, shape (n,)
-            Time of the session, s.
-        """
-        late = np.asarray(elapsed) >= self.after
-        return _of_sensor(self.sensor, np.where(late, self.size, 0.0))
+    def added(self, elapsed: Values) -> Values:
+        """Return what is added to the reading, N.m, at times (n,) of the session, s."""
+        return np.where(elapsed >= self.after, self.size, 0.0)
 
 
 @dataclass(frozen=True)
 class NewInputTorqueZero(NewTorqueZero):
     """A `NewTorqueZero` of the input torque's sensor."""
 
-    _only_reads: ClassVar[bool] = True
     name: ClassVar[str] = "new_input_torque_zero"
     sensor: ClassVar[str] = "input"
 
@@ -132,10 +142,6 @@ class NewOutputTorqueZero(NewTorqueZero):
 
     name: ClassVar[str] = "new_output_torque_zero"
     sensor: ClassVar[str] = "output"
-
-
-def _of_sensor(sensor: str, values: Values) -> Values:
-    return np.array([values if sensor == place else np.zeros_like(values) for place in _SENSORS])
 
 
 def _drift(kind: type[TorqueDrift]) -> Callable[[DriveSizes], list[Guess]]:

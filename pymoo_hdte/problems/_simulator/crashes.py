@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtr
 
-from pymoo_hdte.problems._simulator.statistics import Statistic
+from pymoo_hdte.problems._simulator.statistics import Probability
 from pymoo_hdte.surrogate._sparse.axes import Axis
 from pymoo_hdte.surrogate._sparse.moments import SparseMoments
 from pymoo_hdte.surrogate._sparse.success import Success
@@ -107,7 +107,7 @@ class SuccessAround:
 
 
 @dataclass(frozen=True)
-class CrashProbability(Statistic):
+class CrashProbability(Probability):
     """The probability that a run of the simulator around a design gives no result.
 
     A run that raises, gives NaN or exceeds the time limit. Of all responses together; without a
@@ -131,16 +131,6 @@ class CrashProbability(Statistic):
     def responses(self) -> tuple[str | None, ...]:
         """It belongs to no response alone."""
         return ()
-
-    @property
-    def has_gradient(self) -> bool:
-        """False."""
-        return False
-
-    @property
-    def relative_to_scatter(self) -> bool:
-        """False: a probability has no unit."""
-        return False
 
     def _of(self, around: Around) -> tuple[Array, Array]:
         return 1.0 - around.success_share, np.zeros((0, 0))

@@ -280,8 +280,7 @@ class SimulatorProblem(Problem):
         InvalidInput
             If there is no such response, or the design has another shape.
         """
-        place = place_of(Statistic(response=response), self.responses)
-        point = self.design_box.settle(finite_array("design", design, (self.n_var,))[None])
+        place, point = self._at(design, response)
         moments = self._fit.moments
         expansion = moments.expansion(point)[0, place]
         variance, first_order, total = moments.divided_variance(expansion)
@@ -310,9 +309,13 @@ class SimulatorProblem(Problem):
         InvalidInput
             If there is no such response, or the design has another shape.
         """
-        place = place_of(Statistic(response=response), self.responses)
-        point = self.design_box.settle(finite_array("design", design, (self.n_var,))[None])
+        place, point = self._at(design, response)
         return self.responses[place], self._around(point)[place].samples[0][0]
+
+    def _at(self, design: ArrayLike, response: str | None) -> tuple[int, Array]:
+        """Return the position of a response, and one design, shape (1, n_var), in the box."""
+        place = place_of(Statistic(response=response), self.responses)
+        return place, self.design_box.settle(finite_array("design", design, (self.n_var,))[None])
 
     def plot_front(self, result: Any, axes: Axes | None = None) -> Axes:
         """Draw the first two objectives of a result with their error bands.

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from pymoo_hdte.checks import InvalidInput, real_number
 from pymoo_hdte.problems._simulator.around import PARTS, STUDENT, Around
 from pymoo_hdte.problems._simulator.crashes import NONE_OF
-from pymoo_hdte.problems._simulator.statistics import Statistic, reach_of
+from pymoo_hdte.problems._simulator.statistics import Probability, Statistic, reach_of
 from pymoo_hdte.problems._simulator.tails import SMALLEST, Tail, Z, near_quantile, quantile_above
 from pymoo_hdte.surrogate._rare.events import Event, Limit
 from pymoo_hdte.surrogate.moments import divide_or_zero
@@ -257,7 +257,7 @@ class CVaR(_TailStatistic):
 
 
 @dataclass(frozen=True)
-class FailureProbability(Statistic):
+class FailureProbability(Probability):
     """The probability that a response is beyond a limit, or of a joint event; without a gradient.
 
     Sampled on the surrogate, by importance where it is below 0.1. As a constraint its bound is
@@ -333,16 +333,6 @@ class FailureProbability(Statistic):
 
     def _bound(self, bound: float) -> float:
         return _probability("bound of a probability", bound, SMALLEST, 1.0 - SMALLEST)
-
-    @property
-    def has_gradient(self) -> bool:
-        """False: the share of a sample jumps."""
-        return False
-
-    @property
-    def relative_to_scatter(self) -> bool:
-        """False: a probability has no unit."""
-        return False
 
     def _shares(self, around: Around, slack: Any = None) -> tuple[Array, Array]:
         """Return probabilities with the responses nearer to their limits or not, and their errors.

@@ -121,6 +121,21 @@ class Statistic:
 
 
 @dataclass(frozen=True)
+class Probability(Statistic):
+    """A share of what scatters: it has no unit, and that of a sample jumps."""
+
+    @property
+    def has_gradient(self) -> bool:
+        """False: a share jumps."""
+        return False
+
+    @property
+    def relative_to_scatter(self) -> bool:
+        """False: a probability has no unit."""
+        return False
+
+
+@dataclass(frozen=True)
 class RobustConstraint:
     """A bound on a statistic, as ``Quantile(0.99) <= 250e6`` makes it.
 

@@ -119,6 +119,20 @@ def root_mean_square(data: MeasuredData, residuals: NDArray[np.float64]) -> NDAr
     return np.sqrt(data.power(residuals) / samples)
 
 
+def port_forces(data: MeasuredData, residuals: NDArray[np.float64]) -> dict[str, float]:
+    """Return the size of the force that may be missing at each port, N or N.m.
+
+    It is the largest with which one of the port's coordinates may leave whitened residuals (n,).
+    """
+    rms = dict(zip(data.names, root_mean_square(data, residuals).tolist(), strict=True))
+    return {
+        port.name: rms[port.name]
+        if port.read
+        else max(rms[name] / abs(share) for name, share in port.motion.items() if share)
+        for port in data.mechanism.ports
+    }
+
+
 def fitted_values(mechanism: Mechanism, fitted: Fit) -> dict[str, float]:
     """Return the fitted quantities of the mechanism, SI, by name."""
     return {

@@ -29,7 +29,6 @@ from pymoo_hdte.discrepancy._selection.excess import Excess, HeldOutTest
 from pymoo_hdte.discrepancy._selection.fitting import Fit, Response
 from pymoo_hdte.discrepancy._selection.rules import RULES, Rules
 from pymoo_hdte.drive import DriveEffect
-from pymoo_hdte.drive._effects import only_reads
 from pymoo_hdte.effects.unknowns import Parameter
 
 Vector = NDArray[np.float64]
@@ -73,7 +72,7 @@ class Data(Observations):
 
         def change(added: Sequence[DriveEffect]) -> Vector:
             effects = (*fitted.effects, *added)
-            if all(map(only_reads, added)):
+            if all(effect.only_reads for effect in added):
                 moved = with_readings(
                     unchanged, added, self.features.conditions,
                     self.features.orders.tolist(), self.campaign.believed.ratio, input_gain,
