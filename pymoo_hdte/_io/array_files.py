@@ -13,7 +13,8 @@ import tokenize
 import zipfile
 import zlib
 from array import array
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -229,58 +230,63 @@ def _read_json_lines(path: Path, names: Sequence[str]) -> Arrays:
     return Arrays(_checked(path, names, known, there))
 
 
-def _read_xlsx(path: Path, names: Sequence[str]) -> Arrays:
+@contextmanager
+def _rows_of_sheet(path: Path, most: int | None = None) -> Iterator[Iterator[tuple[Any, ...]]]:
+    """Give the rows of the first sheet; file and sheet are closed wherever reading ends."""
     openpyxl = _library("openpyxl", path)
-    budget = Budget.now()
     try:
         _check_zip(path, lambda _: True)
-        book = openpyxl.load_workbook(path, read_only=True, data_only=True)
-        try:
+        with closing(openpyxl.load_workbook(path, read_only=True, data_only=True)) as book:
             sheet = book.worksheets[0]
             # What a sheet says of its size may be too small, and rows beyond it would be left out.
             sheet.reset_dimensions()
-            rows = sheet.iter_rows(values_only=True)
-            titles: list[str] = []
-            above = 0
-            for row in rows:
-                above += 1
-                cells = ["" if cell is None else str(cell).strip() for cell in row]
-                titles = max(
-                    titles, cells, key=lambda candidate: sum(candidate.count(n) == 1 for n in names)
-                )
-                if all(cells.count(name) == 1 for name in names):
-                    break
-                if above >= MOST_LINES_ABOVE:
-                    break
-            if not all(titles.count(name) == 1 for name in names):
-                allowed = f"{', '.join(names)}, each once, in the first sheet"
-                raise InvalidInput(f"{path.name}: columns", titles, allowed)
-            places = [titles.index(name) for name in names]
-            columns = [array("d") for _ in names]
-            row_of_file, first_row = above, True
-            for row in rows:
-                row_of_file += 1
-                budget.check("rows", row_of_file, f"{path.name}: rows")
-                values = [row[at] if at < len(row) else None for at in places]
-                # Units may stand below the titles.
-                if first_row and any(isinstance(cell, str) for cell in values):
-                    first_row, above = False, above + 1
-                    if not any(isinstance(cell, int | float) for cell in values):
-                        continue
-                first_row = False
-                for name, column, value in zip(names, columns, values, strict=True):
-                    if isinstance(value, bool) or not isinstance(value, int | float | None):
-                        place = f"{path.name}, row {row_of_file}: {name}"
-                        raise InvalidInput(place, value, "a number")
-                    column.append(np.nan if value is None else value)
-        finally:
-            book.close()
+            # Rows keep the file open until they end or are closed, whatever becomes of the book.
+            with closing(sheet.iter_rows(values_only=True, max_row=most)) as rows:
+                yield rows
     except InvalidInput:
         raise
     except _DAMAGED as error:
         if isinstance(error, OSError) and not path.is_file():
             raise
         raise InvalidInput(path.name, str(error)[:200], "an intact xlsx file") from None
+
+
+def _read_xlsx(path: Path, names: Sequence[str]) -> Arrays:
+    budget = Budget.now()
+    with _rows_of_sheet(path) as rows:
+        titles: list[str] = []
+        above = 0
+        for row in rows:
+            above += 1
+            cells = ["" if cell is None else str(cell).strip() for cell in row]
+            titles = max(
+                titles, cells, key=lambda candidate: sum(candidate.count(n) == 1 for n in names)
+            )
+            if all(cells.count(name) == 1 for name in names):
+                break
+            if above >= MOST_LINES_ABOVE:
+                break
+        if not all(titles.count(name) == 1 for name in names):
+            allowed = f"{', '.join(names)}, each once, in the first sheet"
+            raise InvalidInput(f"{path.name}: columns", titles, allowed)
+        places = [titles.index(name) for name in names]
+        columns = [array("d") for _ in names]
+        row_of_file, first_row = above, True
+        for row in rows:
+            row_of_file += 1
+            budget.check("rows", row_of_file, f"{path.name}: rows")
+            values = [row[at] if at < len(row) else None for at in places]
+            # Units may stand below the titles.
+            if first_row and any(isinstance(cell, str) for cell in values):
+                first_row, above = False, above + 1
+                if not any(isinstance(cell, int | float) for cell in values):
+                    continue
+            first_row = False
+            for name, column, value in zip(names, columns, values, strict=True):
+                if isinstance(value, bool) or not isinstance(value, int | float | None):
+                    place = f"{path.name}, row {row_of_file}: {name}"
+                    raise InvalidInput(place, value, "a number")
+                column.append(np.nan if value is None else value)
     arrays = {name: np.array(column) for name, column in zip(names, columns, strict=True)}
     # Sheets have rows that were formatted and never filled.
     filled = np.flatnonzero(np.any([~np.isnan(column) for column in arrays.values()], axis=0))
@@ -392,30 +398,18 @@ def _names_of_json_lines(path: Path) -> list[str]:
 
 
 def _names_of_xlsx(path: Path) -> list[str]:
-    openpyxl = _library("openpyxl", path)
-    try:
-        _check_zip(path, lambda _: True)
-        book = openpyxl.load_workbook(path, read_only=True, data_only=True)
-        try:
-            sheet = book.worksheets[0]
-            sheet.reset_dimensions()
-            titles: list[str] = []
-            for row in sheet.iter_rows(values_only=True, max_row=MOST_LINES_ABOVE):
-                numbers = [isinstance(cell, int | float) and cell is not True for cell in row]
-                if titles and any(numbers):
-                    return [
-                        title
-                        for title, number in zip(titles, numbers, strict=False)
-                        if title and number and titles.count(title) == 1
-                    ]
-                words = ["" if cell is None else str(cell).strip() for cell in row]
-                # Units below the titles have no more cells than these.
-                if sum(map(bool, words)) > sum(map(bool, titles)):
-                    titles = words
-        finally:
-            book.close()
-    except _DAMAGED as error:
-        if isinstance(error, OSError) and not path.is_file():
-            raise
-        raise InvalidInput(path.name, str(error)[:200], "an intact xlsx file") from None
+    with _rows_of_sheet(path, MOST_LINES_ABOVE) as rows:
+        titles: list[str] = []
+        for row in rows:
+            numbers = [isinstance(cell, int | float) and cell is not True for cell in row]
+            if titles and any(numbers):
+                return [
+                    title
+                    for title, number in zip(titles, numbers, strict=False)
+                    if title and number and titles.count(title) == 1
+                ]
+            words = ["" if cell is None else str(cell).strip() for cell in row]
+            # Units below the titles have no more cells than these.
+            if sum(map(bool, words)) > sum(map(bool, titles)):
+                titles = words
     return []

@@ -7,6 +7,7 @@ import time
 import tracemalloc
 import zipfile
 import zlib
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -173,6 +174,20 @@ def test_rows_of_arrays_keep_the_budget_however_small_their_numbers_are(
     monkeypatch.setenv("PYMOO_HDTE_MOST_BYTES", str(10**9))
     rows = np.zeros(SMALL["ROWS"] + 2, np.uint8)
     refused(written(tmp_path, form, rows, rows), form, "MOST_ROWS")
+
+
+@pytest.mark.skipif(not Path("/proc/self/fd").is_dir(), reason="no list of open files here")
+def test_a_sheet_is_closed_while_its_refusal_is_still_held(tmp_path, monkeypatch):
+    monkeypatch.setenv("PYMOO_HDTE_MOST_BYTES", str(10**9))
+    rows = np.zeros(SMALL["ROWS"] + 2, np.uint8)
+    path = written(tmp_path, "xlsx", rows, rows)
+    with pytest.raises(InvalidInput, match="rows") as refusal:
+        tables.read_table(
+            path, tables.TableLayout("xlsx", {"q": Channel("q", "m")}, None, 100.0, 0)
+        )
+    opened = {link.resolve() for link in Path("/proc/self/fd").iterdir()}
+    assert refusal.value.__traceback__ is not None
+    assert path.resolve() not in opened
 
 
 @pytest.mark.parametrize("form", ["npz", "hdf5", "matlab"])
