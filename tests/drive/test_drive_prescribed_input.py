@@ -181,7 +181,7 @@ def test_a_torque_of_one_line_is_answered_as_the_balance_answers_it(name, port, 
             if channel == "coupling_torque" and port != "input":
                 size = max(size, abs(law.line(load)[0]))
             # The angle of the output varies by the error, which turns the line as well.
-            turned = law.orders[0] * np.abs(plain.error_phasors).sum()
+            turned = 2.0 * law.orders[0] * np.abs(plain.error_phasors).sum()
             share = 1e-6 if port == "input" else depth + turned + 2e-3
             np.testing.assert_allclose(change, expected, rtol=0.0, atol=share * size + 1e-13)
 
