@@ -378,30 +378,20 @@ def _with_further(
 
     The last channel is the torque of the output, which turns what holds the sensor of its angle.
     """
-    orders = balance.torus.orders
-    laws = {id(further): _torque_lines_of(further) for _, further in parts}
-    most = max(map(len, laws.values()))
-    lines = np.zeros((*channels.shape[:2], most), dtype=complex)
-    of_lines = np.empty(0)
+    # All parts have the same effects, with numbers of their own.
+    most = len(_torque_lines_of(parts[0][1]))
+    of_lines, lines = np.empty(0), np.zeros((*channels.shape[:2], most), dtype=complex)
     for rows, further in parts if most else ():
+        laws = _torque_lines_of(further)
         added = torque_lines(
-            coefficients.rows(rows), laws[id(further)], balance.rows(rows), speed[rows], load[rows]
+            coefficients.rows(rows), laws, balance.rows(rows), speed[rows], load[rows]
         )
         of_lines, still = added.orders, np.zeros_like(added.torsion)
         of_output = added.brake_torque if at_brake else added.coupling_torque
-        lines[rows] = np.stack(
-            [
-                added.torsion,
-                added.motor_torque,
-                of_output,
-                still,
-                added.ripple,
-                still,
-                added.coupling_torque,
-            ],
-            axis=1,
-        )
-    orders, channels = np.append(orders, of_lines), np.concatenate([channels, lines], axis=2)
+        of_motor = added.motor_torque, of_output, still, added.ripple, still
+        lines[rows] = np.stack([added.torsion, *of_motor, added.coupling_torque], axis=1)
+    orders = np.append(balance.torus.orders, of_lines)
+    channels = np.concatenate([channels, lines], axis=2)
     for rows, further in parts:
         for effect in further:
             turned = effect.turned_back(orders * speed[rows, None])
