@@ -15,6 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pymoo_hdte.discrepancy._evidence.order_lines.bench import IDEAL, Bench
+from pymoo_hdte.discrepancy._evidence.order_lines.folded_lines import (
+    beyond_orders,
+    folded_down,
+    free_input,
+)
 from pymoo_hdte.discrepancy._evidence.order_lines.steady_states import (
     PREDICTION,
     Effort,
@@ -27,6 +32,7 @@ from pymoo_hdte.discrepancy._records.line_fit import CHANNELS
 from pymoo_hdte.drive import (
     Coefficients,
     DriveEffect,
+    SpeedLoop,
     SteadyMotion,
 )
 from pymoo_hdte.drive._effects import Session
@@ -73,6 +79,9 @@ class Conditions:
     unsteady : complex ndarray, shape (r, 2, m), optional
         Lines of the input's speed and acceleration beyond those of a steady motion, rad/s and
         rad/s2: see `unsteady_lines`; by default none.
+    folded : complex ndarray, shape (r, k, 2, 1 + m), optional
+        Contribution of what a motor does at `COGGING_ORDERS` beyond those that the rows of a record
+        show, see `OrderLines`; by default none.
     """
 
     input_speed: NDArray[np.float64]
@@ -86,6 +95,7 @@ class Conditions:
     lead: NDArray[np.complex128] | None = None
     lead_share: NDArray[np.float64] | None = None
     unsteady: NDArray[np.complex128] | None = None
+    folded: NDArray[np.complex128] | None = None
 
     def rows(self, rows: NDArray[np.int_]) -> Conditions:
         """Return the conditions of some of the records."""
@@ -170,6 +180,7 @@ def _predict_group(
 ) -> Prediction:
     """Return the prediction of vectors that share all effects ``present``."""
     count, records = len(values["offset"]), len(conditions)
+    present, beyond = beyond_orders(present, orders)
     gain = 1.0 + values["output_torque_gain"][:, None]
     of_torques = _torque_readings(present, conditions)
     load = conditions.output_torque - of_torques[1] - values["output_torque_zero"][:, None]
@@ -219,6 +230,14 @@ def _predict_group(
     phasors = lines.reshape(count, records, len(CHANNELS), len(orders))
     mean = means.T.reshape(count, records, len(CHANNELS))
     mean[..., 1:3] += of_torques.T
+    if beyond and conditions.folded is not None:
+        loop = SpeedLoop(rig.proportional, rig.integral)
+        free = free_input(coefficients.at_loads(load.ravel()), balance, speed, loop, beyond)
+        if at_brake:
+            free[:, 2] = 0.0
+        of_means, of_lines = folded_down(free, beyond, conditions.folded)
+        mean += of_means.reshape(mean.shape)
+        phasors += of_lines.reshape(phasors.shape)
     _add_sensor_errors(believed.ratio, conditions, orders, values, present, mean, phasors)
     return Prediction(mean, phasors, balance, response)
 
