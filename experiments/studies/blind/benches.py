@@ -45,6 +45,8 @@ TOLD_AS: Mapping[str, frozenset[str]] = {
     "warming": frozenset({"warming"}),
     "drift": frozenset({"input_torque_drift", "output_torque_drift"}),
     "zeros": frozenset({"new_input_torque_zero", "new_output_torque_zero"}),
+    "cogging": frozenset({"cogging"}),
+    "shaft": frozenset({"load_shaft"}),
 }
 """Names of nuisances in a verdict, any of which tells a group. Others have no name there."""
 PAIRS, CLEAN, EACH = 40, 16, 5

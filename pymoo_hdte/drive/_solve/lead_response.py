@@ -81,7 +81,7 @@ def lead_response(
     """
     rate = 1j * np.multiply.outer(speed, np.asarray(orders, dtype=float))
     stiffness, damping, output, inputs = (column[:, None] for column in slopes.T)
-    loose = coefficients.inertia_in_clutches(rate.imag)
+    loose = coefficients.loose_inertia(rate.imag)
     loose = loose + sum(size * rate**k for k, size in coefficients.load_rates)
     inertia = np.reshape(coefficients.output_inertia, (-1, 1)) + loose
     beyond = np.reshape(coefficients.load_inertia, (-1, 1)) + loose
