@@ -13,7 +13,7 @@ import numpy as np
 
 from pymoo_hdte.discrepancy._selection.candidate import Candidate
 from pymoo_hdte.discrepancy._selection.fitting import Fit, fit
-from pymoo_hdte.discrepancy._selection.hypothesis import Hypothesis, is_bounded, label_of
+from pymoo_hdte.discrepancy._selection.hypothesis import Hypothesis, label_of
 from pymoo_hdte.discrepancy._selection.screening import (
     Screened,
     basis_of,
@@ -85,14 +85,12 @@ def leading_nuisances(
 def nuisances_beside(search: Search, hypothesis: Hypothesis) -> Fit | None:
     """Return a fit with nuisances that explain what a set of effects does not; None without any.
 
-    They are searched for beside the set where it leaves more than noise. One of which an unknown
-    ended at a bound is no answer, however little it leaves: nuisances beside a special case of it
-    may explain as much.
+    They are searched for beside the set where it leaves more than noise, and beside sets that it
+    contains, however little it leaves: what it has beyond these may stand for the bench.
     """
     if not search.enough(hypothesis) and (of_bench := leading_nuisances(search, hypothesis)):
         return of_bench
-    specials = search.hypotheses if is_bounded(hypothesis.fit) else []
-    for special in specials:
+    for special in search.hypotheses:
         if _contains(hypothesis, special) and (
             of_bench := leading_nuisances(search, special, hypothesis)
         ):

@@ -53,7 +53,7 @@ def candidates_of(data, base):
     return drive_candidates(sizes, (), data.bench.nuisances)
 
 
-def verdict_on(effects, seed=5):
+def verdict_on(effects, seed=6):
     data, _ = measured(effects, np.random.default_rng(seed), DATA)
     data, _, verdict = rattling.judged(data, fit(data), candidates_of)
     shown = data.bench.shown(verdict.accepted, verdict.rules)
