@@ -20,10 +20,8 @@ from pymoo_hdte.effects.unknowns import is_among
 Lines = NDArray[np.complex128]
 
 
-def beyond_orders(
-    effects: Sequence[DriveEffect], orders: Sequence[float]
-) -> tuple[tuple[DriveEffect, ...], tuple[PeriodicTorque, ...]]:
-    """Return effects without the lines of a motor above all analysed orders, and these lines.
+def beyond_orders(effects: Sequence[DriveEffect], orders: Sequence[float]) -> list[PeriodicTorque]:
+    """Return the lines of a motor above all analysed orders that averaging may fold down.
 
     Parameters
     ----------
@@ -32,69 +30,56 @@ def beyond_orders(
         Analysed orders, cycles per input turn.
     """
     highest = max(orders, default=np.inf)
-    kept, beyond = list[DriveEffect](), list[PeriodicTorque]()
-    for effect in effects:
-        law = effect.law if isinstance(effect, LawAtPort) and effect.port == "input" else None
-        if isinstance(law, PeriodicTorque) and law.drives and law.order > highest:
-            beyond.append(law)
-        else:
-            kept.append(effect)
-    return tuple(kept), tuple(beyond)
+    laws = [
+        effect.law for effect in effects if isinstance(effect, LawAtPort) and effect.port == "input"
+    ]
+    return [
+        law
+        for law in laws
+        if isinstance(law, PeriodicTorque) and law.drives and law.order > highest
+        if is_among(COGGING_ORDERS, law.order)
+    ]
 
 
-def free_input(
+def folded_down(
     coefficients: Coefficients,
     balance: SteadyMotion,
     speed: NDArray[np.float64],
     loop: SpeedLoop,
     torques: Sequence[PeriodicTorque],
-) -> Lines:
-    """Return what small torques of the motor do, each at its own order.
+    folded: Lines,
+    at_brake: bool = False,
+) -> tuple[NDArray[np.float64], Lines]:
+    """Return the means (n, 4) and phasors (n, 4, m) that torques of a motor add to readings.
 
-    The input moves so far that its inertia, the drive and the loop together take the torque. Other
+    The input moves so far that its inertia, the drive and the loop together take each torque. Other
     laws act with their mean slopes.
 
     Parameters
     ----------
     coefficients : Coefficients
-        Coefficients of n cases.
+        Coefficients of n cases, r records innermost.
     balance : SteadyMotion
         Their steady states without these torques.
     speed : ndarray, shape (n,)
         Mean speed of the input, rad/s.
     loop : SpeedLoop
-    torques : sequence of PeriodicTorque, length k
-
-    Returns
-    -------
-    ndarray of complex, shape (n, 4, k)
-        Phasors of transmission error, rad, both torques, N.m, and input angle, rad.
+    torques : sequence of PeriodicTorque
+    folded : ndarray of complex, shape (r, n_orders, 2, 1 + m)
+        As of `Conditions`.
+    at_brake : bool
+        Whether the sensor of the output's torque stands behind the load's inertia.
     """
     orders = [law.order for law in torques]
     response = lead_response(coefficients, balance.slopes, speed, orders)
+    if at_brake:
+        response = response.without_load()
     held = response.motor_torque + loop.proportional * response.rate + loop.integral
     lead = np.array([law.amplitude * np.exp(1j * law.phase) for law in torques]) / held
-    return np.asarray(np.concatenate([response.channels * lead[:, None], lead[:, None]], axis=1))
-
-
-def folded_down(
-    lines: Lines, torques: Sequence[PeriodicTorque], folded: Lines
-) -> tuple[NDArray[np.float64], Lines]:
-    """Return the means (n, 4) and phasors (n, 4, m) that lines (n, 4, k) add to readings.
-
-    Parameters
-    ----------
-    lines : ndarray of complex, shape (n, 4, k)
-        Of n cases, r records innermost.
-    torques : sequence of PeriodicTorque, length k
-    folded : ndarray of complex, shape (r, n_orders, 2, 1 + m)
-        As of `Conditions`.
-    """
-    known = [law.order for law in torques if is_among(COGGING_ORDERS, law.order)]
-    columns = [place for place, law in enumerate(torques) if law.order in known]
-    places = [int(np.argmin(np.abs(np.subtract(COGGING_ORDERS, order)))) for order in known]
+    lines = np.concatenate([response.channels * lead[:, None], lead[:, None]], axis=1)
+    places = [int(np.argmin(np.abs(np.subtract(COGGING_ORDERS, order)))) for order in orders]
     shares = np.tile(folded[:, places], (len(lines) // len(folded), 1, 1, 1))
-    parts = np.stack([lines[..., columns].real, lines[..., columns].imag], axis=-1)
+    parts = np.stack([lines.real, lines.imag], axis=-1)
     added = np.einsum("nckp,nkpm->ncm", parts, shares)
     return added[..., 0].real, added[..., 1:]
 
