@@ -252,7 +252,7 @@ def _predict_group(
         response = lead_response(coefficients.at_loads(load), balance.slopes, speed, orders)
         if rig.output_torque_at == "brake":
             response = response.without_load()
-        _follow_lead(lines, response, lead, balance)
+        _follow_lead(lines, response, lead, balance, coefficients.input_inertia)
         if conditions.unsteady is not None:
             unsteady = np.tile(conditions.unsteady, (count, 1, 1))
             lines[:, :3] += np.einsum("nck,nkm->ncm", response.slow, unsteady)
@@ -285,13 +285,70 @@ def _predict_group(
 
 
 def _follow_lead(
-    lines: NDArray[np.complex128], response: LeadResponse, lead: Lead, balance: SteadyMotion
+    lines: NDArray[np.complex128],
+    response: LeadResponse,
+    lead: Lead,
+    balance: SteadyMotion,
+    inertia: NDArray[np.float64],
 ) -> None:
-    """Add to lines (n, 6, m) what follows the lead at orders that the torus does not hold."""
-    beyond = [balance.torus.find(order) is None for order in lead.orders.tolist()]
-    phasors = np.where(beyond, lead.phasors, 0.0)
+    """Add to lines (n, 6, m) what follows the lead at orders that the torus does not hold.
+
+    Over the angle of the input its speed is Omega / (1 - l') for a lead l of slope l' = dl/dangle,
+    and its acceleration half the slope of the square of that. So two lines of the lead, as of a
+    strong ripple at a low speed, beat to the second order: speed is Omega (1 + l' + l'^2), and its
+    square Omega^2 (1 + 2 l' + 3 l'^2). What ``inertia`` (n,) takes of that at the input, N.m.
+    """
+    held = tuple(balance.torus.find(order) is not None for order in lead.orders.tolist())
+    rates = response.rate * lead.phasors
+    phasors = np.where(held, 0.0, lead.phasors)
     lines[:, :3] += response.channels * phasors[:, None]
-    lines[:, 5] -= response.rate * phasors
+    lines[:, 5] -= np.where(held, 0.0, rates)
+    beats = _beats(tuple(lead.orders.tolist()), held)
+    if beats.places.any():
+        speed = (response.rate[:, :1] / (1j * lead.orders[0])).real
+        second = rates[:, beats.second]
+        np.conjugate(second, out=second, where=beats.conjugate)
+        beating = (rates[:, beats.first] * second) @ beats.places / speed
+        losses = balance.slopes[:, 3:] + 1.5 * inertia[:, None] * response.rate
+        lines[:, 1] += losses * beating
+        lines[:, 5] -= beating
+
+
+class _Beats(NamedTuple):
+    """Pairs of lines whose product is at an analysed order, with a second that may be conjugate.
+
+    ``places`` (k, m) are the shares of a pair in a square at each order.
+    """
+
+    first: NDArray[np.int_]
+    second: NDArray[np.int_]
+    conjugate: NDArray[np.bool_]
+    places: NDArray[np.float64]
+
+
+@lru_cache(maxsize=64)
+def _beats(orders: tuple[float, ...], held: tuple[bool, ...]) -> _Beats:
+    """Return the pairs of lines that beat at one of the orders; without those of a torus alone."""
+    pairs = list[tuple[int, int, bool, int, float]]()
+    for k, order in enumerate(orders):
+        for j, lower in enumerate(orders[: k + 1]):
+            sums = [(False, order + lower, 0.5 if k == j else 1.0)]
+            for conjugate, beat, share in [*sums, (True, order - lower, 1.0)]:
+                places = np.flatnonzero(np.abs(np.subtract(orders, beat)) < _SAME)
+                pairs += [
+                    (k, j, conjugate, place, share)
+                    for place in places.tolist()
+                    if not (held[k] and held[j] and held[place])
+                ]
+    places = np.zeros((len(pairs), len(orders)))
+    for row, (_, _, _, place, share) in enumerate(pairs):
+        places[row, place] = share
+    first, second = np.array([pair[:2] for pair in pairs], dtype=int).reshape(-1, 2).T
+    conjugate = np.array([pair[2] for pair in pairs], dtype=bool)
+    beats = _Beats(first, second, conjugate, places)
+    for array in beats:
+        array.flags.writeable = False
+    return beats
 
 
 def _loop_lead(
