@@ -332,12 +332,12 @@ def _beats(orders: tuple[float, ...], held: tuple[bool, ...]) -> _Beats:
     pairs = list[tuple[int, int, bool, int, float]]()
     for k, order in enumerate(orders):
         for j, lower in enumerate(orders[: k + 1]):
-            sums = [(False, order + lower, 0.5 if k == j else 1.0)]
-            for conjugate, beat, share in [*sums, (True, order - lower, 1.0)]:
-                places = np.flatnonzero(np.abs(np.subtract(orders, beat)) < _SAME)
+            beats = (False, order + lower, 0.5 if k == j else 1.0), (True, order - lower, 1.0)
+            for of_difference, beat, share in beats:
+                at = np.flatnonzero(np.abs(np.subtract(orders, beat)) < _SAME)
                 pairs += [
-                    (k, j, conjugate, place, share)
-                    for place in places.tolist()
+                    (k, j, of_difference, place, share)
+                    for place in at.tolist()
                     if not (held[k] and held[j] and held[place])
                 ]
     places = np.zeros((len(pairs), len(orders)))
@@ -345,10 +345,9 @@ def _beats(orders: tuple[float, ...], held: tuple[bool, ...]) -> _Beats:
         places[row, place] = share
     first, second = np.array([pair[:2] for pair in pairs], dtype=int).reshape(-1, 2).T
     conjugate = np.array([pair[2] for pair in pairs], dtype=bool)
-    beats = _Beats(first, second, conjugate, places)
-    for array in beats:
+    for array in (first, second, conjugate, places):
         array.flags.writeable = False
-    return beats
+    return _Beats(first, second, conjugate, places)
 
 
 def _loop_lead(
