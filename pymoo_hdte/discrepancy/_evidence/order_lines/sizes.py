@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from pymoo_hdte.discrepancy._evidence.order_lines.evidence import Data
 from pymoo_hdte.discrepancy._evidence.order_lines.features import MEANS, Features
+from pymoo_hdte.discrepancy._evidence.order_lines.folded_lines import folded_orders
 from pymoo_hdte.discrepancy._records.believed import BelievedDrive
 from pymoo_hdte.discrepancy._records.cleaning.session_zero import places_of_change
 from pymoo_hdte.discrepancy._selection.fitting import Fit
@@ -58,6 +59,8 @@ class Scales:
         Mean of the records, K, if all have a temperature and these spread enough; else 0.
     loads_differ : bool
         Whether the records are taken under different loads.
+    folded : tuple of float
+        Orders above those that records analyse at which a motor may show in them all the same.
     """
 
     speed: float
@@ -73,6 +76,7 @@ class Scales:
     series: tuple[float, ...] = ()
     swept: bool = False
     loads_differ: bool = False
+    folded: tuple[float, ...] = ()
 
 
 def scales_of(data: Data, base: Fit) -> Scales:
@@ -109,6 +113,7 @@ def scales_of(data: Data, base: Fit) -> Scales:
         series=_series(features),
         swept=bool(data.torsion),
         loads_differ=bool(np.ptp(when.output_torque) > least),
+        folded=folded_orders(when.folded, noise[:, features.places(1)].min(axis=2) / input_torque),
     )
 
 
@@ -223,6 +228,7 @@ def port_sizes(
         changes=scales.changes,
         series=scales.series,
         loads_differ=scales.loads_differ,
+        folded=scales.folded,
         readings=(scales.input_torque, scales.output_torque),
         largest_readings=(LARGEST * scales.input_torque, LARGEST * scales.output_torque),
     )
