@@ -25,6 +25,21 @@ SHOWN, NOT_SHOWN, MISSED = "Shown", "Not shown", "Missed"
 itself does but its interval does not, as there are too few cases, or the score does not."""
 SCORE_STATES = (SHOWN, NOT_SHOWN, MISSED)
 
+MOODS = {
+    "Contradicts": "no",
+    "Consistent": "yes",
+    "Differs": "no",
+    "Agrees": "yes",
+    "Missed by the fit": "no",
+    "Fitted": "fitted",
+    "Fails": "no",
+    "Holds": "yes",
+    MISSED: "no",
+    NOT_SHOWN: "open",
+    SHOWN: "yes",
+}
+"""The style in which a page shows a finding, by its `Finding.verdict`."""
+
 
 @dataclass(frozen=True)
 class Finding:
@@ -169,6 +184,8 @@ class Result:
         Heading of its page.
     command
         What makes it anew.
+    question
+        What it answers, where that is not the question of the experiment.
     answer
         What came out, with which its page begins; the first sentence stands on its card. Without
         one, the findings that answer are joined.
@@ -186,6 +203,7 @@ class Result:
 
     title: str
     command: str
+    question: str = ""
     answer: str = ""
     paragraphs: tuple[str, ...] = ()
     models: Mapping[str, str] = field(default_factory=dict)
