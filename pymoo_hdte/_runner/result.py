@@ -184,8 +184,6 @@ class Result:
         Heading of its page.
     command
         What makes it anew.
-    question
-        What it answers, where that is not the question of the experiment.
     answer
         What came out, with which its page begins; the first sentence stands on its card. Without
         one, the findings that answer are joined.
@@ -199,11 +197,12 @@ class Result:
         Parts of the sections of `FIRST_PAGE`, each beginning in lower case.
     shown_first
         Name of the picture that the first page shows, if any.
+    question
+        What it answers, where that is not the question of the experiment.
     """
 
     title: str
     command: str
-    question: str = ""
     answer: str = ""
     paragraphs: tuple[str, ...] = ()
     models: Mapping[str, str] = field(default_factory=dict)
@@ -212,6 +211,7 @@ class Result:
     notes: tuple[str, ...] = ()
     first_page: Mapping[str, str] = field(default_factory=dict)
     shown_first: str = ""
+    question: str = ""
 
     def __post_init__(self) -> None:
         unknown = set(self.first_page) - set(FIRST_PAGE)
