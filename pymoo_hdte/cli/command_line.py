@@ -18,9 +18,10 @@ from pymoo_hdte.cli.identify import IDENTIFY
 from pymoo_hdte.cli.init import INIT
 from pymoo_hdte.cli.optimise import OPTIMISE
 from pymoo_hdte.cli.plan import PLAN
+from pymoo_hdte.cli.robust import ROBUST
 from pymoo_hdte.cli.simulate import SIMULATE
 
-COMMANDS = (OPTIMISE, SIMULATE, IDENTIFY, PLAN, INIT, DISCREPANCY, EXPORT)
+COMMANDS = (ROBUST, OPTIMISE, SIMULATE, IDENTIFY, PLAN, INIT, DISCREPANCY, EXPORT)
 """Commands in the order of the help."""
 
 
