@@ -150,7 +150,9 @@ def whole_numbers(field: str, given: Any) -> Scenarios | None:
         if not last - first < MOST_VALUES:
             raise InvalidInput(field, given, allowed)
         values = np.arange(first, last + 1.0)
-        weights = np.ravel(given.pmf(values) if of_scipy else given.pdf(values))
+        # Not the density, which of chaospy.DiscreteUniform does not sum to 1.
+        below = np.ravel(given.cdf(np.arange(first - 1.0, last + 1.0)))
+        weights = np.diff(below)
     except InvalidInput:
         raise
     except Exception as error:  # Libraries raise anything for numbers that do not fit.
