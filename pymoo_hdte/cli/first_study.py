@@ -10,7 +10,7 @@ from pymoo_hdte.checks import InvalidInput
 
 SIMULATOR_FILE = "beam.py"
 
-STUDY = '''\
+STUDY = """\
 # A cantilever of a rectangular section: as light as possible, and steady under a load that varies.
 title = "Cantilever"
 
@@ -60,7 +60,7 @@ algorithm = "ElitistSwarm"
 population = 40
 generations = 50
 seed = 1
-'''
+"""
 
 SIMULATOR = '''\
 """A cantilever of steel, 1 m long, with a load at its tip; lengths in m, load in N."""

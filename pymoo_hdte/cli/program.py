@@ -109,9 +109,7 @@ class Program:
             raise RuntimeError(f"the program ended with code {done.returncode}{ending}")
 
 
-def responses_in(
-    text: str, responses: Sequence[tuple[str, str | None]]
-) -> dict[str, float]:
+def responses_in(text: str, responses: Sequence[tuple[str, str | None]]) -> dict[str, float]:
     """Return the responses that stand in an output.
 
     Parameters

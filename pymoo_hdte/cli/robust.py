@@ -40,12 +40,12 @@ def _run(options: argparse.Namespace, say: Say) -> Outcome:
     from pymoo_hdte.cli.first_study import write_first_study
 
     if options.example:
-        study, simulator = write_first_study(options.study)
+        first, simulator = write_first_study(options.study)
         sentences = [
-            f"Wrote {study} and its simulator {simulator}.",
-            f"Next: pymoo-hdte robust {study} --out report",
+            f"Wrote {first} and its simulator {simulator}.",
+            f"Next: pymoo-hdte robust {first} --out report",
         ]
-        return Outcome({"written": [str(study), str(simulator)]}, "\n".join(sentences))
+        return Outcome({"written": [str(first), str(simulator)]}, "\n".join(sentences))
     from pymoo_hdte.cli.robust_report import FOLDER, write_robust_report
     from pymoo_hdte.cli.robust_study import read_study
 

@@ -37,8 +37,8 @@ def write_robust_report(
     feasible = result.X is not None
     designs = np.atleast_2d(result.X if feasible else _least_violating(result))
     F, band = problem.evaluate(designs, return_values_of=["F", "F_band"])
-    chosen = designs[plots.middle(F)]
-    place = int(np.argmin(np.sum(np.abs(designs - chosen), axis=1)))
+    place = plots.middle(F)
+    chosen = designs[place]
     page = plots.page(problem, result if feasible else None, chosen, title)
     document = heading("robust", _sentences(problem, designs, feasible, chosen), noted) | {
         "title": title,
@@ -49,12 +49,12 @@ def write_robust_report(
         "feasible": feasible,
         "front": len(designs) if feasible else 0,
         "design": dict(zip(problem.var_names, chosen.tolist(), strict=True)),
-        "objectives": {
-            name: {"value": value, "error": half if np.isfinite(half) else None}
+        "objectives": [
+            {"name": name, "value": value, "error": half if np.isfinite(half) else None}
             for name, value, half in zip(
                 problem.obj_names, F[place].tolist(), band[place].tolist(), strict=True
             )
-        },
+        ],
     }
     texts = {FRONT_FILE: _front(problem, designs, F, band), RUNS_FILE: _runs(problem)}
     FOLDER.write(out, page, document, texts)

@@ -120,7 +120,8 @@ def _importable(folder: Path) -> Iterator[None]:
 
 
 def _study(fields: Fields, folder: Path) -> RobustStudy:
-    complaints, parts = Complaints(), {}
+    complaints = Complaints()
+    parts: dict[str, Any] = {}
     title = fields.text("title") if fields.has("title") else "Robust design"
     for name, part in (
         ("inputs", _inputs),
@@ -209,7 +210,7 @@ def _function(field_name: str, given: str) -> Callable[..., Any]:
         known = [name for name, value in vars(module).items() if callable(value) and name[0] != "_"]
         allowed = f"a function of {match[1]} ({', '.join(known[:10]) or 'which has none'})"
         raise InvalidInput(field_name, given, allowed)
-    return function  # type: ignore[no-any-return]
+    return function
 
 
 def _program(fields: Fields, folder: Path, names: tuple[str, ...] | None) -> Program:
@@ -399,9 +400,7 @@ def _distribution(fields: Fields, place: str) -> Any:
         raise InvalidInput(f"{place}.distribution", name, allowed) from None
 
 
-def _of_scipy(
-    name: str, numbers: Mapping[str, float], place: str
-) -> tuple[str, dict[str, float]]:
+def _of_scipy(name: str, numbers: Mapping[str, float], place: str) -> tuple[str, dict[str, float]]:
     """Return name and arguments of `scipy.stats` of one of our words."""
     if name == "normal":
         return "norm", {"loc": numbers["mean"], "scale": numbers["std"]}
@@ -543,5 +542,7 @@ def _algorithm(name: str, population: int | None) -> Algorithm:
 
     from pymoo_hdte.algorithms import CompactSwarm, ElitistSwarm
 
-    kinds = {kind.__name__: kind for kind in (ElitistSwarm, CompactSwarm, NSGA2, SMSEMOA, GA, DE)}
+    kinds: dict[str, Callable[..., Algorithm]] = {
+        kind.__name__: kind for kind in (ElitistSwarm, CompactSwarm, NSGA2, SMSEMOA, GA, DE)
+    }
     return kinds[name](**({} if population is None else {"pop_size": population}))

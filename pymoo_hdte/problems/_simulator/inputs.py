@@ -136,9 +136,9 @@ class Inputs:
     designs : mapping of str to Design
     noise : mapping
         From a name to its distribution, to `Scenarios` or an `Interval`, or from a tuple of names
-        to a joint distribution of `chaospy` or `Scenarios`. Dependent variables are functions of independent standard normal ones (inverse
-        Rosenblatt transformation), in which the surrogate is a polynomial: of degree one for
-        `chaospy.MvNormal`. Its moments are exact, and its error is part of the estimated one.
+        to a joint distribution of `chaospy` or `Scenarios`. Dependent variables are functions of
+        independent standard normal ones (inverse Rosenblatt transformation), in which the surrogate
+        is a polynomial: of degree one for `chaospy.MvNormal`. Its moments are exact, and its error is part of the estimated one.
     tail : float
         Share of the probability beyond the reach of an unbounded scatter on either side.
     designed : bool
@@ -270,7 +270,7 @@ class Inputs:
         points = [np.diag(np.full(len(self.axes), side)) for side in (-1.0, 1.0)]
         for start, table in self._tables:
             points.append(np.zeros((len(table), len(self.axes))))
-            points[-1][:, start] = self.axes[start].cube(np.arange(len(table)))
+            points[-1][:, start] = self.axes[start].cube(np.arange(float(len(table))))
         extremes = self.values(np.vstack(points))
         lows, highs = extremes.min(axis=0).tolist(), extremes.max(axis=0).tolist()
         return dict(zip(self.names, zip(lows, highs, strict=True), strict=True))

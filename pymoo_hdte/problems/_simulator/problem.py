@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -220,12 +220,11 @@ class SimulatorProblem(Problem):
         if self._intervals is None:
             return self._bands(X, self._requested[: self.n_obj])
         # What a maximum is off by is at most the largest error that its candidates have.
-        return np.column_stack(
-            [
-                self._intervals.largest(X, lambda points, one=one: self._bands(points, [one])[:, 0])
-                for one in self._requested[: self.n_obj]
-            ]
-        )
+        columns = [
+            self._intervals.largest(X, partial(self._bands, requested=[request]))
+            for request in self._requested[: self.n_obj]
+        ]
+        return np.column_stack(columns)
 
     def _bands(self, X: Array, requested: Sequence[Requested]) -> Array:
         parts = []
@@ -310,7 +309,9 @@ class SimulatorProblem(Problem):
         moments = self._fit.moments
         expansion = moments.expansion(point)[0, place]
         variance, first_order, total = moments.divided_variance(expansion)
-        return SobolIndices(self._inputs.axis_names, float(expansion[0]), variance, first_order, total)
+        return SobolIndices(
+            self._inputs.axis_names, float(expansion[0]), variance, first_order, total
+        )
 
     def scatter(self, design: ArrayLike, response: str | None = None) -> tuple[str, Array]:
         """Return the name of a response and its values at the common samples around a design.
@@ -468,9 +469,7 @@ class SimulatorProblem(Problem):
             values, gradients = self._values(x, self._requested, sloped)
         else:
             # Each goal at the values of the intervals that are worst for it.
-            parts = [
-                self._values(self._at_worst(x, one), [one], sloped) for one in self._requested
-            ]
+            parts = [self._values(self._at_worst(x, one), [one], sloped) for one in self._requested]
             values = np.concatenate([part[0] for part in parts], axis=1)
             gradients = np.concatenate([part[1] for part in parts], axis=1)
         for key, part in (("F", slice(0, self.n_obj)), ("G", slice(self.n_obj, None))):
@@ -502,9 +501,7 @@ class SimulatorProblem(Problem):
         values, gradients = zip(*parts, strict=True)
         return np.concatenate(values), np.concatenate(gradients)
 
-    def _block(
-        self, x: Array, requested: Sequence[Requested], sloped: bool
-    ) -> tuple[Array, Array]:
+    def _block(self, x: Array, requested: Sequence[Requested], sloped: bool) -> tuple[Array, Array]:
         around = self._around(x)
         values, gradients = [], [np.empty((len(x), 0))] * len(requested)
         for row, (statistic, sign, bound, place) in enumerate(requested):

@@ -18,7 +18,7 @@ MOST_CORNERS = 64
 _INSIDE = 16
 """Points within, at which it looks besides."""
 _LINE, _SWEEPS, _NEARER = 9, 8, 0.25
-"""Points on a line, sweeps along all intervals, and what a line is shortened by from sweep to sweep.
+"""Points on a line, sweeps along all intervals, and what shortens a line from one to the next.
 
 The last points are 1/8 * 0.25^7 = 8e-6 of an interval apart: a smooth maximum between them is
 missed by some 1e-11 of what the goal varies by.
@@ -72,9 +72,7 @@ class WorstOver:
         starts = np.broadcast_to(self._starts, (len(designs), *self._starts.shape))
         return self._of(designs, starts, number).max(axis=1, initial=-np.inf)
 
-    def _worst_of(
-        self, designs: Array, tried: Array, goal: Callable[[Array], Array]
-    ) -> Array:
+    def _worst_of(self, designs: Array, tried: Array, goal: Callable[[Array], Array]) -> Array:
         """Return the worst of the values tried at each design, shape (n, q)."""
         worst = np.argmax(self._of(designs, tried, goal), axis=1)
         return np.array(tried[np.arange(len(designs)), worst])

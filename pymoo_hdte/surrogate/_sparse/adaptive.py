@@ -209,7 +209,7 @@ class _SurrogateBuild:
         truth, own_truth = truth[:, :count], truth[:, count:]
         polynomials = EvenPolynomials(
             int(np.clip(len(points) // 3, *DEGREES)),
-            [axis.discrete and len(axis.discrete.values) for axis in self.axes],
+            [None if axis.discrete is None else len(axis.discrete.values) for axis in self.axes],
         )
         shares, weights_of_draws, drawn = self._successes(good, polynomials)
         features = polynomials(points)

@@ -147,7 +147,7 @@ def test_every_goal_has_its_own_worst_values_of_an_interval():
     least = np.min((x[:, None] - ends) ** 2 - 2.0 * ends, axis=1)
     np.testing.assert_allclose(G[:, 0], -5.0 - least, atol=1e-7)
     assert band.shape == F.shape
-    name, values = problem.scatter([0.1])
+    _, values = problem.scatter([0.1])
     assert values.mean() == pytest.approx(0.25, abs=0.1)
 
 
