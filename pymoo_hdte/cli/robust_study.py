@@ -542,7 +542,6 @@ def _algorithm(name: str, population: int | None) -> Algorithm:
 
     from pymoo_hdte.algorithms import CompactSwarm, ElitistSwarm
 
-    kinds: dict[str, Callable[..., Algorithm]] = {
-        kind.__name__: kind for kind in (ElitistSwarm, CompactSwarm, NSGA2, SMSEMOA, GA, DE)
-    }
+    known = ElitistSwarm, CompactSwarm, NSGA2, SMSEMOA, GA, DE
+    kinds: dict[str, Callable[..., Algorithm]] = {kind.__name__: kind for kind in known}
     return kinds[name](**({} if population is None else {"pop_size": population}))

@@ -138,7 +138,8 @@ class Inputs:
         From a name to its distribution, to `Scenarios` or an `Interval`, or from a tuple of names
         to a joint distribution of `chaospy` or `Scenarios`. Dependent variables are functions of
         independent standard normal ones (inverse Rosenblatt transformation), in which the surrogate
-        is a polynomial: of degree one for `chaospy.MvNormal`. Its moments are exact, and its error is part of the estimated one.
+        is a polynomial: of degree one for `chaospy.MvNormal`. Its moments are exact, and its error
+        is part of the estimated one.
     tail : float
         Share of the probability beyond the reach of an unbounded scatter on either side.
     designed : bool
