@@ -105,7 +105,7 @@ class Interval:
     >>> problem = robust_problem(
     ...     lambda x, heat, load: (x - heat) ** 2 + load,
     ...     {"x": Design(0.0, 1.0)},
-    ...     {"heat": Interval(0.2, 0.6), "load": chaospy.Uniform(0.0, 1.0)},
+    ...     {"heat": Interval(0.2, 0.6), "load": TruncatedNormal(0.5, 0.1)},
     ...     objectives=[Mean()],
     ...     progress=False,
     ... )
