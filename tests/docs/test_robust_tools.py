@@ -26,7 +26,7 @@ def test_every_link_is_defined_once_and_used():
 
 def test_what_others_offer_has_a_link_or_is_a_dash():
     for row in ROWS[:-1]:
-        assert all(cell == "–" or "][" in cell for cell in row[2:-1])
+        assert all(cell == "\N{EN DASH}" or "][" in cell for cell in row[2:-1])
 
 
 def test_what_is_here_has_a_test_that_exists():

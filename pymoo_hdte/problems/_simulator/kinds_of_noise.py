@@ -30,9 +30,9 @@ class Scenarios:
 
     Parameters
     ----------
-    values : sequence of float, or of sequences of float
-        Different values in the noise's unit, or rows of one value for each name.
-    weights : sequence of float, optional
+    values : array_like, shape (n,) or (n, k)
+        Different values in the noise's unit, or rows of one value for each of k names.
+    weights : array_like, shape (n,), optional
         Weight of each, above 0; they are divided by their sum. Alike by default.
 
     Raises
