@@ -55,6 +55,10 @@ def write_robust_report(
                 problem.obj_names, F[place].tolist(), band[place].tolist(), strict=True
             )
         ],
+        "constraints": [
+            {"name": name, "value": value, side: bound}
+            for name, value, side, bound in plots.limits_at(problem, chosen)
+        ],
     }
     texts = {FRONT_FILE: _front(problem, designs, F, band), RUNS_FILE: _runs(problem)}
     FOLDER.write(out, page, document, texts)

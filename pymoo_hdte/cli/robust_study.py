@@ -16,6 +16,7 @@ from typing import Any
 
 from pymoo.core.algorithm import Algorithm
 
+from pymoo_hdte._io.budget import LARGEST_TOML
 from pymoo_hdte._io.fields import Fields
 from pymoo_hdte._io.toml import toml_with_lines
 from pymoo_hdte.checks import Complaints, InvalidInput, SeveralComplaints, real_number, whole_number
@@ -290,6 +291,8 @@ def _inside(field_name: str, given: str, folder: Path) -> Path:
 
 
 def _text_of_template(field_name: str, path: Path) -> str:
+    if path.stat().st_size > LARGEST_TOML:
+        raise InvalidInput(field_name, path.name, f"a file of at most {LARGEST_TOML} bytes")
     content = path.read_bytes()
     try:
         return content.decode("utf-8")

@@ -120,6 +120,10 @@ def test_the_first_study_runs_as_the_page_prints_it(tmp_path, monkeypatch, capsy
     page = (tmp_path / "report" / "report.html").read_text()
     assert "<h1>Cantilever</h1>" in page
     document = json.loads((tmp_path / "report" / "robust.json").read_text())
+    (limit,) = document["constraints"]
+    assert (limit["name"], limit["at_most"]) == ("quantile_stress", 80e6)
+    chosen = np.argmin(np.abs(width - document["design"]["width"]))
+    assert limit["value"] == pytest.approx(np.quantile(stress[chosen], 0.99), rel=0.01)
     _, runs = rows_of(tmp_path / "report" / "runs.csv")
     assert document["n_runs"] == len(runs)
 

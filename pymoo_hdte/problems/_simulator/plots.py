@@ -36,6 +36,9 @@ text-align:right}td:first-child,th:first-child{text-align:left}img{max-width:100
 <table><tr><th>objective</th><th>value</th><th>error</th></tr>
 {% for row in objectives %}<tr>{% for cell in row %}<td>{{ cell }}</td>{% endfor %}</tr>
 {% endfor %}</table>
+{% if constraints %}<table><tr><th>constraint</th><th>value</th><th>bound</th></tr>
+{% for row in constraints %}<tr>{% for cell in row %}<td>{{ cell }}</td>{% endfor %}</tr>
+{% endfor %}</table>{% endif %}
 <h2>Where the scatter comes from</h2>
 <table><tr><th>input</th>{% for name in responses %}<th>{{ name }}</th>{% endfor %}</tr>
 {% for row in shares %}<tr>{% for cell in row %}<td>{{ cell }}</td>{% endfor %}</tr>
@@ -121,10 +124,30 @@ def page(
             (name, f"{x:.6g}") for name, x in zip(problem.var_names, point.tolist(), strict=True)
         ],
         objectives=[(name, f"{value:.6g}", f"{half:.2g}") for name, value, half in objectives],
+        constraints=[
+            (name, f"{value:.6g}", f"{side.replace('_', ' ')} {bound:.6g}")
+            for name, value, side, bound in limits_at(problem, point)
+        ],
         responses=problem.responses,
         shares=shares,
         pictures=pictures,
     )
+
+
+def limits_at(problem: SimulatorProblem, design: Array) -> list[tuple[str, float, str, float]]:
+    """Return the constraints of a problem at a design: name, value, kind of bound and bound."""
+    if not problem.constraints:
+        return []
+    (G,) = problem.evaluate(design[None], return_values_of=["G"])
+    return [
+        (
+            limit.statistic.name,
+            float(limit.bound + limit.side * excess),
+            "at_most" if limit.side > 0.0 else "at_least",
+            float(limit.bound),
+        )
+        for limit, excess in zip(problem.constraints, G, strict=True)
+    ]
 
 
 def middle(F: Array) -> int:
