@@ -52,7 +52,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _parser() -> argparse.ArgumentParser:
     parser = OneLineParser(
         prog="pymoo-hdte",
-        description="Robust design of harmonic drives, and what a model lacks.",
+        description="Robust design of simulators and of harmonic drives, and what a model lacks.",
         epilog="pymoo-hdte COMMAND --help shows options, an example and the files of a command.",
     )
     parser.add_argument("--version", action="version", version=f"pymoo-hdte {__version__}")

@@ -330,7 +330,8 @@ def _names_of(inputs: Mapping[str, Any]) -> tuple[str, ...]:
 
 
 def _inputs(fields: Fields) -> dict[str, Any]:
-    designs, noise = {}, {}
+    designs: dict[str, Design] = {}
+    noise: dict[Any, Any] = {}
     table = fields.table("design")
     if not table.names():
         raise InvalidInput(fields.name_of("design"), {}, "one design variable or more")
@@ -345,6 +346,11 @@ def _inputs(fields: Fields) -> dict[str, Any]:
             with complaints.noted():
                 _check_name(table.name_of(name), name)
                 noise[name] = _noise(table.table(name), table.name_of(name))
+    if fields.has("scenarios"):
+        for table in fields.tables("scenarios"):
+            with complaints.noted():
+                names, scenarios = _scenarios(table)
+                noise[names] = scenarios
     complaints.finish()
     return {"designs": designs, "noise": noise}
 
@@ -380,6 +386,23 @@ def _noise(fields: Fields, place: str) -> Any:
         with _at(place):
             return Scenarios(values, weights)
     return _distribution(fields, place)
+
+
+def _scenarios(fields: Fields) -> tuple[tuple[str, ...], Scenarios]:
+    """Return scenarios that set several inputs at once, and the names of these."""
+    names, rows = fields.texts("names"), fields.take("rows", "a list of rows, a value each name")
+    weights = fields.numbers("weights") if fields.has("weights") else None
+    fields.finish()
+    for name in names:
+        _check_name(fields.name_of("names"), name)
+    whole = isinstance(rows, list) and all(
+        isinstance(row, list) and len(row) == len(names) for row in rows
+    )
+    if len(names) < 2 or not whole or not rows:
+        allowed = f"rows of {len(names)} values, one for each of two names or more"
+        raise InvalidInput(fields.name_of("rows"), rows, allowed)
+    with _at(fields.name_of("rows").removesuffix(".rows")):
+        return names, Scenarios(rows, weights)
 
 
 def _distribution(fields: Fields, place: str) -> Any:

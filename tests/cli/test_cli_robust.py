@@ -275,6 +275,7 @@ def test_a_simulator_that_is_none_is_named_with_what_is_allowed(simulator, words
         (INPUTS.replace("0.05", "-1"), GOALS, "deviation.std is -1.0"),
         (INPUTS.replace('"uniform"', '"uniforn"'), GOALS, "one of normal, uniform, triangle"),
         (INPUTS.replace(".load", ".study"), GOALS, "none of input_file, output_file, study"),
+        (INPUTS + '[[scenarios]]\nnames = ["a", "b"]\nrows = [[1]]\n', GOALS, "rows of 2 values"),
         (INPUTS, GOALS.replace('"mean"', '"meen"', 1), "one of 'mean', 'std'"),
         (INPUTS, GOALS.replace("at_least", "at_best"), "either at_most or at_least"),
         (INPUTS, GOALS + 'algorithm = "NSGA4"\n', "one of 'ElitistSwarm'"),
@@ -320,6 +321,10 @@ distribution = "triangle"
 lower = 0
 mode = 1
 upper = 4
+[[scenarios]]
+names = ["speed", "torque"]
+rows = [[1, 2], [3, 0]]
+weights = [3, 1]
 """
     goals = """
 [[objective]]
@@ -335,7 +340,9 @@ statistic = "crash_probability"
 at_most = 0.1
 """
     study = studied(written(folder, inputs=inputs, goals=goals))
-    a, b, c, d, e = study.inputs["noise"].values()
+    a, b, c, d, e, together = study.inputs["noise"].values()
+    assert study.inputs["noise"]["speed", "torque"] is together
+    assert together.values == ((1.0, 2.0), (3.0, 0.0))
     assert (a.mean(), a.std()) == (pytest.approx(3.0), pytest.approx(0.5))
     assert b.weights == (0.5, 0.25, 0.25)
     assert (c.lower, c.upper) == (-1.0, 1.0)
