@@ -284,8 +284,12 @@ def _file_name(field_name: str, given: str) -> str:
 
 def _inside(field_name: str, given: str, folder: Path) -> Path:
     """Return a file that stands in the folder of the study or below it."""
-    path = (folder / given).resolve() if "\0" not in given else folder
-    if not path.is_file() or not path.is_relative_to(folder.resolve()):
+    try:
+        path = (folder / given).resolve()
+        inside = path.is_file() and path.is_relative_to(folder.resolve())
+    except (OSError, RuntimeError, ValueError):  # A link to itself, a zero byte.
+        inside = False
+    if not inside:
         raise InvalidInput(field_name, given, "a file in the folder of the study")
     return path
 
