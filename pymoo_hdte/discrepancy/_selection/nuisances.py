@@ -49,7 +49,7 @@ def leading_nuisances(
         effect
         for effect in nuisances[: search.data.rules.most_seconds]
         if effect.reduction >= _cost(search, effect.candidate.unknowns)
-        and _may_lead(search, effect, beside)
+        and _may_lead(search, effect, beside, instead_of)
     ]
     trials = [_with(search, fitted, effect) for effect in promising]
     if not trials:
@@ -176,15 +176,19 @@ def _that_go_with(candidates: Sequence[Candidate], screened: Sequence[Screened])
     ]
 
 
-def _may_lead(search: Search, effect: Screened, beside: Hypothesis | None) -> bool:
-    """Tell whether a nuisance could do as well as the best single effect.
+def _may_lead(
+    search: Search, effect: Screened, beside: Hypothesis | None, instead_of: Hypothesis | None
+) -> bool:
+    """Tell whether a nuisance could do as well as the best single effect, or as a larger set.
 
     A prediction is nearly linear in most nuisances, so that half of it to first order is enough.
     """
-    if beside is not None or not search.hypotheses:
-        return True
-    share = search.data.rules.explained_part_share
-    return effect.reduction >= share * search.hypotheses[0].removed
+    removed = 0.0
+    if beside is not None and instead_of is not None:
+        removed = beside.fit.chi_square - instead_of.fit.chi_square
+    elif beside is None and search.hypotheses:
+        removed = search.hypotheses[0].removed
+    return effect.reduction >= search.data.rules.explained_part_share * removed
 
 
 def _ranked(

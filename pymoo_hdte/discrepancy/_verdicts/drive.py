@@ -20,7 +20,11 @@ from pymoo_hdte.discrepancy._evidence.order_lines.features import (
     unexpected_orders,
 )
 from pymoo_hdte.discrepancy._evidence.order_lines.prediction import coefficients_of
-from pymoo_hdte.discrepancy._evidence.order_lines.sizes import port_sizes, scales_of
+from pymoo_hdte.discrepancy._evidence.order_lines.sizes import (
+    motor_orders,
+    port_sizes,
+    scales_of,
+)
 from pymoo_hdte.discrepancy._evidence.order_lines.steady_states import PREDICTION, Lead
 from pymoo_hdte.discrepancy._records.campaign import Campaign
 from pymoo_hdte.discrepancy._records.cleaning.cleaning import cleaned_rows
@@ -136,7 +140,7 @@ def _harmonics(data: Data, base: Fit) -> list[float]:
     }
     further = [
         order
-        for order in sorted(brought | orders_beside(strong))
+        for order in sorted(brought | orders_beside(strong, motor_orders(campaign.rig)))
         if lowest < order <= most and not is_among(orders, order)
     ]
     if not further:

@@ -353,6 +353,13 @@ def test_forms_of_one_effect_are_never_together():
     assert rigid.goes_with(next(one for one in LISTED if one.name == "backlash"))
 
 
+def test_of_a_known_motor_one_line_is_enough():
+    scales = replace(SCALES, motor=(8.0, 12.0, 24.0))
+    for seen, forms in (([8.0], ["8"]), ([12.0, 5.0], ["12"]), ([9.0], [])):
+        sizes = port_sizes(BELIEVED, [1.0, *seen], seen, scales, seen, 13.5)
+        assert [one.form for one in drive_candidates(sizes) if one.name == "cogging"] == forms
+
+
 @pytest.mark.parametrize(
     ("seen", "above", "folded", "forms"),
     [

@@ -35,6 +35,7 @@ from pymoo_hdte.drive import (
 from pymoo_hdte.drive._effects import Session
 from pymoo_hdte.drive._solve.lead_response import LeadResponse, lead_response, torque_lines
 from pymoo_hdte.drive._solve.order_spectrum import sine_phasor
+from pymoo_hdte.effects.effect import effect_named
 from pymoo_hdte.effects.law import Law, Values
 
 LOOP = ("loop_gain", "loop_lag")
@@ -179,13 +180,20 @@ def _moves(conditions: Conditions, effect: DriveEffect) -> bool:
     """Tell whether an effect is a part of the equations of motion as they are solved."""
     if type(effect).apply is DriveEffect.apply:
         return False
-    return conditions.lead is None or not _is_line(effect)
+    return conditions.lead is None or not _is_line_of_bench(effect)
 
 
-def _is_line(effect: DriveEffect) -> bool:
-    """Tell whether an effect is a torque that is one line whatever the motion."""
+def _is_line_of_bench(effect: DriveEffect) -> bool:
+    """Tell whether an effect is a torque of the bench that is one line whatever the motion.
+
+    Such lines are small, so that the motion is linear in them or nearly so. A ripple of the drive
+    that is looked for may be strong: one of .02 N.m moves the speed of an input by a fifth at 30
+    r/min, which makes errors of its order and others.
+    """
     port_and_law = effect.at_port()
-    return port_and_law is not None and port_and_law[1].line(np.zeros(1)) is not None
+    if port_and_law is None or port_and_law[0] not in effect_named(effect.name).nuisance_at:
+        return False
+    return port_and_law[1].line(np.zeros(1)) is not None
 
 
 def _predict_group(
