@@ -18,10 +18,11 @@ from pymoo_hdte.cli.identify import IDENTIFY
 from pymoo_hdte.cli.init import INIT
 from pymoo_hdte.cli.optimise import OPTIMISE
 from pymoo_hdte.cli.plan import PLAN
+from pymoo_hdte.cli.robust import ROBUST
 from pymoo_hdte.cli.simulate import SIMULATE
 from pymoo_hdte.cli.table7 import TABLE_7
 
-COMMANDS = (OPTIMISE, SIMULATE, IDENTIFY, PLAN, INIT, DISCREPANCY, EXPORT, TABLE_7)
+COMMANDS = (ROBUST, OPTIMISE, SIMULATE, IDENTIFY, PLAN, INIT, DISCREPANCY, EXPORT, TABLE_7)
 """Commands in the order of the help."""
 
 
@@ -53,7 +54,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _parser() -> argparse.ArgumentParser:
     parser = OneLineParser(
         prog="pymoo-hdte",
-        description="Robust design of harmonic drives, and what a model lacks.",
+        description="Robust design of simulators and of harmonic drives, and what a model lacks.",
         epilog="pymoo-hdte COMMAND --help shows options, an example and the files of a command.",
     )
     parser.add_argument("--version", action="version", version=f"pymoo-hdte {__version__}")
