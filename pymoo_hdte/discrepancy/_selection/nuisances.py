@@ -99,7 +99,7 @@ def nuisances_beside(search: Search, hypothesis: Hypothesis) -> Fit | None:
 
 
 def _contains(general: Hypothesis, special: Hypothesis) -> bool:
-    """Tell whether a set has all effects of another, or laws that contain them, and no fewer."""
+    """Tell whether a set has all effects of another, or laws of which they are special cases."""
     if label_of(general.candidates) == label_of(special.candidates):
         return False
     return all(
