@@ -94,7 +94,9 @@ class CompactSwarm(ElitistSwarm):
 
     Notes
     -----
-    - as long as nothing is feasible, the less infeasible half of the swarm leads;
+    - as long as nothing is feasible, the less infeasible half of the swarm leads, and half of the
+      variables that would pass a bound stop on the way to it, so that a feasible region near a
+      bound is approached by ever smaller steps;
     - the result is feasible as pymoo defines it, with equalities met to 1e-4;
     - the models know objectives only: with constraints they led away from feasible regions (MW:
       feasible in 26 of 29 runs in place of 29), so that `ModelStep` is not among the moves there
@@ -195,6 +197,19 @@ class CompactSwarm(ElitistSwarm):
         if self._waiting:
             waiting = Population.merge(Population.empty(), Population.empty(), *self._waiting)
             archive.update(waiting, self._points(waiting), self._points)
+
+    def _within(
+        self, X: NDArray[np.float64], aims: NDArray[np.float64], swarm: Points
+    ) -> NDArray[np.float64]:
+        cut = super()._within(X, aims, swarm)
+        if np.any(swarm.violation == 0.0):
+            return cut
+        # What is feasible may lie along a bound and be thinner than any step of the mutation.
+        beyond = np.nonzero(cut != aims)
+        shares = 2.0 * self.random_state.random(len(beyond[0]))
+        stops = X[beyond] + shares * (cut[beyond] - X[beyond])
+        cut[beyond] = np.where(shares < 1.0, stops, cut[beyond])
+        return super()._within(X, cut, swarm)  # a stop may be off by a rounding
 
     def _front(self, swarm: Points) -> Points:
         if np.any(swarm.violation == 0.0):

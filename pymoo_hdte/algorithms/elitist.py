@@ -165,10 +165,16 @@ class ElitistSwarm(Swarm):
         # A particle that stays would be evaluated twice.
         mutated = ~np.isin(self.chosen, exact) | ~steps.any(axis=1)
         steps[mutated] += self.mutation(steps[mutated], highest - lowest, random_state)
-        moved = particles_at(np.clip(X + steps, lowest, highest))
+        moved = particles_at(self._within(X, X + steps, swarm))
         if type(self.repair) is NoRepair:
             return moved
         return self.repair.do(self.problem, moved, random_state=random_state)
+
+    def _within(
+        self, X: NDArray[np.float64], aims: NDArray[np.float64], swarm: Points
+    ) -> NDArray[np.float64]:
+        """Return ``aims`` (n, d) in the box, for which particles of a swarm head from ``X``."""
+        return np.clip(aims, *self.problem.bounds())
 
     def _movers(self, n: int) -> NDArray[np.int_]:
         """Return which of ``n`` particles move."""

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from pymoo_hdte._compilation import compiled
 from pymoo_hdte.algorithms.points import Points
 
 
@@ -132,11 +133,25 @@ def lowest_within(
     least = np.maximum(-values[:, :1], 0.0) + 1e-14 * np.abs(values).max(axis=1, keepdims=True)
     least = np.maximum(least * (1.0 + 1e-9), _LEAST_SHIFT)
     most = least + np.linalg.norm(slopes, axis=1, keepdims=True) / radii
+    shift = _halved(slopes**2, values, radii**2, least, most)
+    return np.einsum("kij,kj->ki", vectors[which], -slopes / (values + shift))
+
+
+@compiled
+def _halved(
+    squares: NDArray[np.float64],
+    values: NDArray[np.float64],
+    largest: NDArray[np.float64],
+    least: NDArray[np.float64],
+    most: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """Return the shifts (k, 1), between two bounds, that leave a step no longer than its radius."""
     for _ in range(_HALVINGS):
         middle = np.sqrt(least * most)
-        long = (slopes**2 / (values + middle) ** 2).sum(axis=1, keepdims=True) > radii**2
+        lengths = (squares / (values + middle) ** 2).sum(axis=1)
+        long = lengths.reshape(middle.shape) > largest
         least, most = np.where(long, middle, least), np.where(long, most, middle)
-    return np.einsum("kij,kj->ki", vectors[which], -slopes / (values + most))
+    return most
 
 
 class ModelStep:
