@@ -185,7 +185,7 @@ class CompactSwarm(ElitistSwarm):
 
     def _remember(self, population: Population, points: Points) -> None:
         front = best_front(points)
-        self._offered.update(population[front], points[front], self._points)
+        self._offered.update(population[front], self.problem.has_constraints())
         if len(front):
             self._waiting.append(population[front])
         if len(self._waiting) == _AT_ONCE:
@@ -196,7 +196,7 @@ class CompactSwarm(ElitistSwarm):
         """Offer to an archive what waits for it."""
         if self._waiting:
             waiting = Population.merge(Population.empty(), Population.empty(), *self._waiting)
-            archive.update(waiting, self._points(waiting), self._points)
+            archive.update(waiting, self.problem.has_constraints())
 
     def _within(
         self, X: NDArray[np.float64], aims: NDArray[np.float64], swarm: Points

@@ -161,9 +161,9 @@ class ElitistSwarm(Swarm):
             rows = self.chosen == number
             around = self._around(move, swarm, movers[rows])
             steps[rows] = move(X[rows], leaders[rows], around, random_state)
-        exact = [number for number, move in enumerate(self.moves) if getattr(move, "EXACT", False)]
+        exact = np.array([getattr(move, "EXACT", False) for move in self.moves])
         # A particle that stays would be evaluated twice.
-        mutated = ~np.isin(self.chosen, exact) | ~steps.any(axis=1)
+        mutated = ~exact[self.chosen] | ~steps.any(axis=1)
         steps[mutated] += self.mutation(steps[mutated], highest - lowest, random_state)
         moved = particles_at(self._within(X, X + steps, swarm))
         if type(self.repair) is NoRepair:
@@ -193,7 +193,7 @@ class ElitistSwarm(Swarm):
     def _around(self, move: Move, swarm: Points, rows: NDArray[np.int_]) -> NDArray[np.float64]:
         """Return the positions a move draws from: all, or the neighbours of every row."""
         k = getattr(move, "NEIGHBOURS", None)
-        return swarm.X if k is None else swarm.X[nearest_in_objectives(swarm.F, k)[rows]]
+        return swarm.X if k is None else swarm.X[nearest_in_objectives(swarm.F, k, rows)]
 
     def _survivors(self, points: Points) -> NDArray[np.int_]:
         """Return which of the old and the new points make up the next swarm."""

@@ -215,7 +215,9 @@ class ModelStep:
         if not n or len(known := self._known()) < 3:
             return np.zeros((n, d))
         centre = leaders[0]
-        away = (known.X - centre) / np.where(self._reach > 0.0, self._reach, 1.0)
+        away = known.X - centre
+        if np.any(self._reach != 1.0):
+            away /= np.where(self._reach > 0.0, self._reach, 1.0)
         distances = np.sqrt((away**2).sum(axis=1))
         nearest = min(len(distances), 3 * d + 20, self.LARGEST_FIT)
         neighbours = np.argpartition(distances, nearest - 1)[:nearest]
