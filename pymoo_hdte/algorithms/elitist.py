@@ -180,7 +180,7 @@ class ElitistSwarm(Swarm):
         """Return which of ``n`` particles move."""
         if self._n_requested() < min(n, self.pop_size):
             return self.random_state.permutation(n)[: self._n_requested()]
-        return np.resize(np.arange(n), self._n_requested())
+        return np.arange(self._n_requested()) % n
 
     def _front(self, swarm: Points) -> Points:
         """Return the points that lead."""

@@ -49,7 +49,7 @@ def fitted(Z: NDArray[np.float64], F: NDArray[np.float64]) -> Quadratic:
     """
     products = Z @ Z.T
     kernel = _LINEAR_WEIGHT * (1.0 + products) + 0.5 * products**2
-    kernel[np.diag_indices(len(Z))] += _RIDGE * np.trace(kernel) / len(Z)
+    kernel.flat[:: len(Z) + 1] += _RIDGE * np.trace(kernel) / len(Z)
     parts = np.linalg.solve(kernel, F)
     return Quadratic(
         _LINEAR_WEIGHT * parts.T @ Z,
@@ -194,7 +194,8 @@ class ModelStep:
     def learn(self, points: Points) -> None:
         """Remember evaluated points."""
         # In pieces, which copies of a swarm share: a history would hold all points many times.
-        self._told.append(points[np.flatnonzero(np.isfinite(points.F).all(axis=1))])
+        finite = np.isfinite(points.F).all(axis=1)
+        self._told.append(points if finite.all() else points[np.flatnonzero(finite)])
         while sum(map(len, self._told[1:])) >= self.MEMORY:
             del self._told[0]
 
