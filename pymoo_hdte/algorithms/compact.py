@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from pymoo.core.individual import Individual
 from pymoo.core.population import Population
 from pymoo.core.result import Result
 from pymoo.core.sampling import Sampling
@@ -15,7 +16,7 @@ from pymoo.core.sampling import Sampling
 from pymoo_hdte.algorithms.archive import FrontArchive
 from pymoo_hdte.algorithms.base import twin
 from pymoo_hdte.algorithms.dominance import best_front
-from pymoo_hdte.algorithms.elitist import ElitistSwarm
+from pymoo_hdte.algorithms.elitist import ElitistSwarm, replaced
 from pymoo_hdte.algorithms.horizon import evaluation_limit
 from pymoo_hdte.algorithms.moves import Exchange, Move, NeighbourDifference
 from pymoo_hdte.algorithms.points import Points
@@ -174,8 +175,14 @@ class CompactSwarm(ElitistSwarm):
         self._spent = len(points)
         self._remember(self.pop, points)
 
+    def _replace(self, means: dict[int, Individual]) -> None:
+        super()._replace(means)
+        for archive in (self._offered, self._front_archive):
+            archive.members = replaced(archive.members, means)
+        self._waiting = [replaced(waiting, means) for waiting in self._waiting]
+
     def _note(self, everyone: Population, points: Points) -> None:
-        self._spent += len(self.chosen)
+        self._spent += self._n_requested()
         if self._grows:
             self.pop_size = size_for(self._spent)
         for move in self._learners:
