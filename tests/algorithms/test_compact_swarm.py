@@ -2,11 +2,13 @@
 
 import copy
 import pickle
+import tracemalloc
 
 import numpy as np
 import pytest
 from moocore import is_nondominated
 from night import others_at_night
+from pymoo.algorithms.moo.nsga2 import NSGA2
 from pymoo.core.problem import Problem
 from pymoo.core.variable import Integer, Real
 from pymoo.indicators.hv import HV
@@ -373,6 +375,18 @@ def test_a_history_holds_each_generation_as_it_was():
     (model,) = (move for move in swarm.history[-2].moves if isinstance(move, ModelStep))
     (later,) = (move for move in swarm.history[-1].moves if isinstance(move, ModelStep))
     assert model._told[0].X is later._told[0].X
+
+
+def test_a_history_takes_at_most_three_times_the_memory_of_nsga2_s():
+    """It has nine times as many generations, which share what does not change."""
+    sizes = []
+    for make in (CompactSwarm, NSGA2):
+        run("zdt1", 100, make=make)  # what is loaded once is no part of a history
+        tracemalloc.start()
+        history = run("zdt1", 1000, make=make, save_history=True).history
+        sizes.append(tracemalloc.get_traced_memory()[0] if history else 0)
+        tracemalloc.stop()
+    assert 0 < sizes[0] <= 3 * sizes[1]
 
 
 def test_a_number_of_generations_is_told_in_evaluations():

@@ -33,8 +33,8 @@ def make_df(number: int, time: float) -> Problem:
     return getattr(df, f"DF{number}")(time=time)
 
 
-def df_front(number: int, time: float) -> Array:
-    """Return the true front, shape (n, m), in steps of the variables that say where on it.
+def df_designs(number: int, time: float) -> Array:
+    """Return optimal designs, shape (n, d), in steps of the variables that say where on the front.
 
     All other variables are where the distance from the front is least, which every objective grows
     with.
@@ -42,18 +42,22 @@ def df_front(number: int, time: float) -> Array:
     problem = make_df(number, time)
     places = [0, 1] if number in THREE_OBJECTIVES else [0]
     if number == 2:
-        places = [int((problem.n_var - 1) * abs(np.sin(0.5 * np.pi * time)))]
+        places = [int((problem.n_var - 1) * abs(_wave(time)))]
     steps = _GRID if len(places) > 1 else 20 * N_POINTS
     axes = [np.linspace(problem.xl[place], problem.xu[place], steps) for place in places]
-    X = np.empty((steps ** len(places), problem.n_var))
+    X = np.zeros((steps ** len(places), problem.n_var))
     X[:, places] = np.stack(np.meshgrid(*axes), axis=-1).reshape(len(X), -1)
-    others = np.setdiff1d(np.arange(problem.n_var), places)
-    X[:, others] = 0.0
-    for other in others:
+    for other in np.setdiff1d(np.arange(problem.n_var), places):
         X[:, other] = OPTIMA.get(number, _shifted)(X, other, time)
-    F = problem.evaluate(X)
+    # Off the front, some of DF4 lie beyond the box.
+    return np.clip(X, problem.xl, problem.xu)
+
+
+def df_front(number: int, time: float) -> Array:
+    """Return the true front, shape (n, m), of `df_designs`, its ends among them."""
+    F = make_df(number, time).evaluate(df_designs(number, time))
     F = F[is_nondominated(F)]
-    size = min(len(F), N_POINTS if len(places) == 1 else 5 * N_POINTS)
+    size = min(len(F), (1 if F.shape[1] == 2 else 5) * N_POINTS)
     spread = np.linspace(0, len(F) - 1, size).astype(int)
     return F[np.unique([*spread, *F.argmin(axis=0), *F.argmax(axis=0)])]
 
