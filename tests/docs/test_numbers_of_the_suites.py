@@ -10,7 +10,14 @@ from experiments.runner.campaign import Campaign
 from experiments.runner.registry import Context
 from experiments.studies.suites import data as suites
 from experiments.studies.suites.bbob_tables import CITED, reached
-from experiments.studies.suites.limits import NOISE, OBJECTIVES, SIZED, SIZES, limits_tables, stored
+from experiments.studies.suites.limits import (
+    AGAIN,
+    NOISE,
+    OBJECTIVES,
+    SHARE,
+    limits_tables,
+    stored,
+)
 from experiments.studies.suites.own_time import own_time_table
 from experiments.studies.suites.protocol import BUDGETS
 from experiments.studies.suites.suite_tables import (
@@ -72,8 +79,8 @@ def test_noise_and_many_objectives():
         return " and ".join(f"{values[question, case, 10_000, algorithm]:.3f}" for case in cases)
 
     noise, objectives = ("0.05", "0.2"), ("4", "6")
-    assert f"{both(NOISE, 'ElitistSwarm', *noise)} (`CompactSwarm` " in WORDS
-    assert f"`CompactSwarm` {both(NOISE, 'CompactSwarm', *noise)}, NSGA-II " in WORDS
+    swarms = [both(NOISE, name + AGAIN, *noise) for name in ("ElitistSwarm", "CompactSwarm")]
+    assert f"{swarms[0]} (`CompactSwarm(reevaluated={SHARE})` {swarms[1]}, NSGA-II " in WORDS
     assert f"NSGA-II {both(NOISE, 'NSGA-II', *noise)})" in WORDS
     assert f"{both(OBJECTIVES, 'NSGA-III', *objectives)} (`CompactSwarm` " in WORDS
     assert f"`CompactSwarm` {both(OBJECTIVES, 'CompactSwarm', *objectives)})" in WORDS
