@@ -1,10 +1,11 @@
-"""Where the swarms of this package cease to be the best choice: noise and many objectives.
+"""Where the swarms of this package cease to be the best choice: noise, many objectives, sizes.
 
     python -m experiments.studies.suites.limits OUT
 
 stores what the page on suites and the choice of an algorithm quote. Finished runs lie in
 ``OUT/runs/ORIGIN``, from where a further call goes on. With ``--questions noise`` only that is
-measured anew, and the rest stays.
+measured anew, and the rest stays. Rivals on ZCAT have 100 individuals everywhere else; here they
+also have as many as ours, and an archive of all that they evaluate.
 """
 
 from __future__ import annotations
@@ -29,6 +30,8 @@ from pymoo.optimize import minimize
 from pymoo.problems import get_problem
 from pymoo.util.ref_dirs import get_reference_directions
 
+from experiments.comparing.indicators import smaller_is_better
+from experiments.comparing.ranks import average_ranks
 from experiments.runner.campaign import Campaign, Run
 from experiments.runner.committed import (
     DATA,
@@ -38,12 +41,18 @@ from experiments.runner.committed import (
 )
 from experiments.runner.result import Cell, Column, Table
 from experiments.runner.store import write_atomically
+from experiments.studies.suites.data import Outcome
+from experiments.studies.suites.jobs import SuiteRun
+from experiments.studies.suites.peers import OF_OUR_SIZE, ON_SUITES, OURS, RIVALS
+from experiments.studies.suites.problems import SUITES
+from experiments.studies.suites.suite_tables import NAMES
 from pymoo_hdte.algorithms import CompactSwarm, ElitistSwarm
 
 NAME = "suites_limits"
 COLUMNS = ("question", "case", "evaluations", "algorithm", "value")
 SEEDS = range(1, 11)
-NOISE, OBJECTIVES = "noise", "objectives"
+NOISE, OBJECTIVES, SIZES = "noise", "objectives", "sizes"
+ZCAT_SEEDS, ZCAT_BUDGETS = range(1, 4), (500, 2_000)
 SHARE = 0.3
 AGAIN = f", {SHARE:.0%} evaluated again"
 _DIRECTIONS = 100
@@ -182,6 +191,25 @@ def measured_rows(campaign: Campaign, name: str) -> Iterator[list[Any]]:
                 yield [name, f"{case:g}", budget, algorithm, f"{mean:.4g}"]
 
 
+def rows_of_sizes(campaign: Campaign) -> Iterator[list[Any]]:
+    """Yield average ranks on ZCAT of the medians over the seeds."""
+    names, outcome = (OURS, *RIVALS, *OF_OUR_SIZE), Outcome()
+    for name in names:
+        for budgets in ON_SUITES[name].budgets_of_runs(ZCAT_BUDGETS):
+            jobs = [
+                SuiteRun(problem.name, name, seed, budgets)
+                for problem in SUITES["ZCAT"]
+                for seed in ZCAT_SEEDS
+            ]
+            outcome.add(jobs, campaign.run(jobs, f"{name}, {budgets}"))
+    for measure in NAMES:
+        for budget in ZCAT_BUDGETS:
+            medians = outcome.medians("ZCAT", budget, measure, names)
+            ranks = average_ranks(medians, smaller_is_better=smaller_is_better(measure))
+            for name, rank in zip(names, ranks, strict=True):
+                yield [SIZES, measure, budget, name, f"{rank:.4g}"]
+
+
 def stored() -> dict[tuple[str, str, int, str], float]:
     """Return the stored values by question, case, evaluations and algorithm."""
     return {
@@ -195,35 +223,43 @@ def stored() -> dict[tuple[str, str, int, str], float]:
 def limits_tables() -> Iterator[Table]:
     """Show the stored values, a table a question."""
     values = stored()
-    for name, question in QUESTIONS.items():
-        places = [(f"{case:g}", budget) for case in question.cases for budget in question.budgets]
+    titles = {name: (question.title, question.case) for name, question in QUESTIONS.items()}
+    titles[SIZES] = ("ZCAT against rivals of other sizes: average ranks of seven", "measure")
+    for name, (title, case) in titles.items():
+        algorithms = list(dict.fromkeys(key[3] for key in values if key[0] == name))
+        places = list(dict.fromkeys(key[1:3] for key in values if key[0] == name))
         rows: list[tuple[Cell, ...]] = [
             (algorithm, *(values[name, *place, algorithm] for place in places))
-            for algorithm in question.made
+            for algorithm in algorithms
         ]
         columns = (
             Column("algorithm"),
-            *(Column(f"{budget:,}", "", 3, f"{question.case} {case}") for case, budget in places),
+            *(
+                Column(f"{budget:,}", "", 3, f"{case} {NAMES.get(which, which)}")
+                for which, budget in places
+            ),
         )
         note = f"After so many evaluations; means of {len(SEEDS)} seeds."
-        yield Table(f"limits_{name}", question.title, columns, tuple(rows), note=note, folded=True)
+        if name == SIZES:
+            note = f"After so many evaluations; medians of {len(ZCAT_SEEDS)} seeds are ranked."
+        yield Table(f"limits_{name}", title, columns, tuple(rows), note=note, folded=True)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Measure and store."""
     parser = argparse.ArgumentParser(prog="python -m experiments.studies.suites.limits")
     parser.add_argument("out", type=Path, metavar="OUT")
-    parser.add_argument("--questions", nargs="+", choices=QUESTIONS, default=list(QUESTIONS))
+    questions = (*QUESTIONS, SIZES)
+    parser.add_argument("--questions", nargs="+", choices=questions, default=questions)
     options = parser.parse_args(arguments)
     campaign = Campaign(options.out)
     before = [[*key, f"{value:.4g}"] for key, value in stored().items()]
     rows: list[list[Any]] = []
-    for name in QUESTIONS:
-        rows += (
-            measured_rows(campaign, name)
-            if name in options.questions
-            else [row for row in before if row[0] == name]
-        )
+    for name in questions:
+        if name not in options.questions:
+            rows += [row for row in before if row[0] == name]
+        else:
+            rows += rows_of_sizes(campaign) if name == SIZES else measured_rows(campaign, name)
     facts = {"command": "python -m experiments.studies.suites.limits OUT"}
     write_atomically(DATA / f"{NAME}.csv", table_with_origin(COLUMNS, rows, **facts).encode())
 
