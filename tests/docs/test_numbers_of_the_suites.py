@@ -15,17 +15,20 @@ from experiments.studies.suites.limits import (
     NOISE,
     OBJECTIVES,
     SHARE,
+    SIZES,
     limits_tables,
     stored,
 )
 from experiments.studies.suites.own_time import own_time_table
-from experiments.studies.suites.protocol import BUDGETS
+from experiments.studies.suites.peers import SIZED
+from experiments.studies.suites.protocol import BOTH_SIZES, BUDGETS
 from experiments.studies.suites.suite_tables import (
     feasible_runs,
     ranks_together,
     signs_together,
 )
 from experiments.studies.suites.suite_tables import ranks as suite_ranks
+from experiments.studies.suites.suite_tables import tests as suite_tests
 
 WORDS = " ".join((DOCS / "which_algorithm.md").read_text(encoding="utf-8").split())
 
@@ -99,6 +102,18 @@ def test_rivals_sized_to_the_budget():
             for n in (500, 2_000)
         )
         assert sentence in WORDS
+
+
+def test_rivals_of_both_sizes_on_a_suite_run_once(outcome):
+    for measure, name in (("hypervolume", "by hypervolume"), ("igd_plus", "by IGD+")):
+        ranks = [suite_ranks(outcome, BOTH_SIZES, n, measure) for n in BUDGETS]
+        assert {len(of_all) for of_all in ranks} == {8}
+        ours = ", ".join(f"{of_all['CompactSwarm']:.2f}" for of_all in ranks)
+        assert f"{name} {ours}" in WORDS
+        assert all(min(of_all, key=of_all.get) == "CompactSwarm" for of_all in ranks)
+        against = [test for n in BUDGETS for test in suite_tests(outcome, BOTH_SIZES, n, measure)]
+        assert all(test.beaten for test in against)
+    assert f"{len(outcome.problems(BOTH_SIZES, 500))} problems, one run each" in WORDS
 
 
 def test_tables_hold_all_that_is_stored():
