@@ -30,22 +30,22 @@ from pymoo.optimize import minimize
 from pymoo.problems import get_problem
 from pymoo.util.ref_dirs import get_reference_directions
 
-from experiments.comparing.indicators import smaller_is_better
-from experiments.comparing.ranks import average_ranks
-from experiments.runner.campaign import Campaign, Run
 from experiments.runner.committed import (
     DATA,
     committed_file,
     read_rows,
     table_with_origin,
 )
-from experiments.runner.result import Cell, Column, Table
-from experiments.runner.store import write_atomically
 from experiments.studies.suites.data import Outcome
 from experiments.studies.suites.jobs import SuiteRun
 from experiments.studies.suites.peers import OF_OUR_SIZE, ON_SUITES, OURS, RIVALS
 from experiments.studies.suites.problems import SUITES
 from experiments.studies.suites.suite_tables import NAMES
+from pymoo_hdte._comparing.indicators import smaller_is_better
+from pymoo_hdte._comparing.ranks import average_ranks
+from pymoo_hdte._runner.campaign import Campaign, Run
+from pymoo_hdte._runner.result import Cell, Column, Table
+from pymoo_hdte._runner.store import write_atomically
 from pymoo_hdte.algorithms import CompactSwarm, ElitistSwarm
 
 NAME = "suites_limits"

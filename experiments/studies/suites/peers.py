@@ -16,7 +16,6 @@ from pymoo.core.problem import Problem
 from pymoo.util.ref_dirs import get_reference_directions
 
 from experiments.comparing.contestants import CONTESTANTS, Contestant, of_jmetal
-from experiments.comparing.indicators import front_among
 from experiments.comparing.peers_pymoo import (
     OWN,
     POPULATION,
@@ -28,6 +27,7 @@ from experiments.comparing.peers_pymoo import (
 )
 from experiments.studies.suites.coco import StartBox
 from experiments.studies.suites.reduced import LESS
+from pymoo_hdte._comparing.indicators import front_among
 from pymoo_hdte.algorithms import CompactSwarm
 from pymoo_hdte.algorithms.compact import size_for
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from pymoo.core.problem import Problem
 from pymoo.problems.dynamic import df
 
-from experiments.comparing.quality import N_POINTS
+from pymoo_hdte._comparing.quality import N_POINTS
 
 Array = NDArray[np.float64]
 
