@@ -51,6 +51,16 @@ def grid(
     return figure, axes
 
 
+def panel() -> tuple[Figure, Axes]:
+    """Return a figure of one panel whose words can be read on a phone."""
+    figure, axes = grid(1, 1, width=7.2, height=4.0)
+    axis = axes[0, 0]
+    axis.tick_params(which="both", labelsize=13)
+    for label in (axis.xaxis.label, axis.yaxis.label):
+        label.set_size(14)
+    return figure, axis
+
+
 def fronts(comparisons: Sequence[Comparison]) -> Figure:
     """Draw the run of median IGD of every algorithm over the reference front, one row each.
 

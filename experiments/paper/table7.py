@@ -67,7 +67,6 @@ def run(context: Context) -> Result:
             Picture("igd", "IGD of every run; bars mark the medians.", igd_of_runs(comparisons)),
         ),
         notes=(LOST, *(too_few_seeds(comparisons) if stated else ())),
-        shown_first="fronts",
     )
 
 
