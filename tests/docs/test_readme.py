@@ -101,6 +101,8 @@ def test_pictures_of_the_readme_exist_and_are_small():
     assert sum((ROOT / name).stat().st_size for name in pictures) < 300_000
 
 
-def test_links_lead_to_files():
+def test_links_lead_to_files_and_headings():
+    titles = re.findall(r"^## (.+)$", README, flags=re.MULTILINE)
+    headings = {re.sub(r"[^\w -]", "", title).lower().replace(" ", "-") for title in titles}
     for target in re.findall(r"\]\((?!http)(.*?)\)", README):
-        assert (ROOT / target).exists()
+        assert target.removeprefix("#") in headings or (ROOT / target).exists()
