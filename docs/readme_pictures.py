@@ -152,8 +152,8 @@ def _panel() -> tuple[Figure, Axes]:
     """Return one panel whose words can be read on a phone."""
     figure = Figure(figsize=(7.2, 3.8), layout="constrained")
     axis = figure.subplots()
-    axis.xaxis.label.set_size(14)
-    axis.yaxis.label.set_size(14)
+    axis.xaxis.label.set_fontsize(14)
+    axis.yaxis.label.set_fontsize(14)
     axis.tick_params(labelsize=13)
     axis.spines[["top", "right"]].set_visible(False)
     return figure, axis

@@ -57,7 +57,7 @@ def panel() -> tuple[Figure, Axes]:
     axis = axes[0, 0]
     axis.tick_params(which="both", labelsize=13)
     for label in (axis.xaxis.label, axis.yaxis.label):
-        label.set_size(14)
+        label.set_fontsize(14)
     return figure, axis
 
 
