@@ -32,7 +32,7 @@ from pymoo_hdte.effects.friction import CoulombFriction
 from pymoo_hdte.effects.hysteresis import MaxwellSlip
 from pymoo_hdte.effects.load_friction import LoadFriction
 from pymoo_hdte.effects.stiffness import HardeningStiffness, SoftWindup
-from pymoo_hdte.units import ORIGINS
+from pymoo_hdte.units import ORIGINS, UNITS
 
 FIGURES: Mapping[str, str] = {
     "rated_speed": "speed",
@@ -96,6 +96,31 @@ _SAMPLES = 1000
 """Virtual prototypes from whose component errors a static error follows."""
 _SCATTER = 0.2
 """Relative scatter of a printed accuracy from drive to drive: that of theta_s in the paper."""
+
+
+_SHOWN = {
+    "speed": "r/min",
+    "torque": "N.m",
+    "inertia": "kg.cm2",
+    "stiffness": "N.m/rad",
+    "angle": "arcmin",
+    "share": "%",
+    "damping": "N.m.s/rad",
+}
+
+
+def figure_text(name: str, value: float) -> str:
+    """Return a figure in SI as makers print it, such as ``"1 arcmin"``.
+
+    Examples
+    --------
+    >>> figure_text("K3", 2.9e4), figure_text("efficiency", 0.77)
+    ('29000 N.m/rad', '77 %')
+    """
+    unit = _SHOWN[FIGURES[name]]
+    number = value / UNITS[FIGURES[name]][unit]
+    digits = f"{number:.3g}"
+    return f"{float(digits):.15g} {unit}" if abs(number) >= 1e-3 else f"{digits} {unit}"
 
 
 @dataclass(frozen=True)
