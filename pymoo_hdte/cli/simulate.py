@@ -36,9 +36,7 @@ def _add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="N_M",
         help="torque at the output, N.m (default: rated); negative where it drives",
     )
-    parser.add_argument(
-        "--map", action="store_true", help="also over speed, load and direction"
-    )
+    parser.add_argument("--map", action="store_true", help="also over speed, load and direction")
 
 
 def _run(options: argparse.Namespace, say: Say) -> Outcome:

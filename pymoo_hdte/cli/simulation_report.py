@@ -183,7 +183,9 @@ def _of_map(mapped: OperatingMap) -> str:
     )
     driving = (mapped.loads < 0.0)[None, :, None]
     pushed = np.mean(mapped.motor_torque[np.broadcast_to(driving, mapped.dte.shape)] > 0.0)
-    return f"{said}; {100.0 * pushed:.0f} % of the conditions with a driving load still need a motor."
+    return (
+        f"{said}; {100.0 * pushed:.0f} % of the conditions with a driving load still need a motor."
+    )
 
 
 def limits(simulation: Simulation, notes: Sequence[str]) -> list[str]:

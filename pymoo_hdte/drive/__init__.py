@@ -25,7 +25,7 @@ from pymoo_hdte.drive._solve.steady_motion import SpeedLoop, SteadyMotion
 from pymoo_hdte.drive.catalogue import CataloguePage, Entry, Figure, complete, drive_of
 from pymoo_hdte.drive.datasheet import DataSheet
 from pymoo_hdte.drive.datasheet_file import hs_20_100, load_datasheet
-from pymoo_hdte.drive.drive_file import load_drive, load_page
+from pymoo_hdte.drive.drive_file import built_in_page, load_drive, load_page
 from pymoo_hdte.drive.dte_map import OperatingMap, operating_map
 from pymoo_hdte.drive.estimates import ESTIMATES, Estimate
 from pymoo_hdte.drive.figures import (
@@ -80,6 +80,7 @@ __all__ = [
     "ThermalDrift",
     "UnstableDrive",
     "back_driving_torque",
+    "built_in_page",
     "class_amplitudes",
     "compared",
     "complete",

@@ -231,7 +231,9 @@ class CataloguePage:
         real_number("size", self.size, above=0.0)
         real_number("ratio", self.ratio, above=1.0)
         if abs(2.0 * self.ratio - round(2.0 * self.ratio)) > 1e-9:
-            allowed = "half a number of teeth: turns of the input per turn of the output, as printed"
+            allowed = (
+                "half a number of teeth: turns of the input per turn of the output, as printed"
+            )
             raise InvalidInput("ratio", self.ratio, allowed)
         conditions = [(f.name, f.speed, f.load, f.temperature) for f in self.entered]
         for condition in conditions:
@@ -410,9 +412,7 @@ def _enter_friction(page: CataloguePage, entries: Mapping[str, Entry], enter: An
             enter("no_load_running_torque", Entry(start.value + drag * rated))
     if not {"no_load_running_torque", "no_load_starting_torque"} <= set(entries):
         return
-    start, running = (
-        entries[f"no_load_{name}_torque"].value for name in ("starting", "running")
-    )
+    start, running = (entries[f"no_load_{name}_torque"].value for name in ("starting", "running"))
     worst = max(entries[f"no_load_{name}_torque"].tolerance for name in ("starting", "running"))
     rated = entries["rated_speed"].value
     if "load_friction" not in entries and (rows := page.of("efficiency")):
@@ -585,7 +585,9 @@ def _slip_force(
 
     def excess(force: float) -> float:
         slipping = LawAtPort("hysteresis", "mesh", MaxwellSlip(force, corner))
-        return loop_width(DriveModel("-", "-", "-", sheet, blank, (*mesh, slipping)), rated) - wanted
+        return (
+            loop_width(DriveModel("-", "-", "-", sheet, blank, (*mesh, slipping)), rated) - wanted
+        )
 
     largest = 0.5 * rated
     if excess(largest) < 0.0:

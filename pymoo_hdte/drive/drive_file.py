@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from importlib.resources import files
 from pathlib import Path
 
 from pymoo_hdte._io.toml import read_toml, toml_with_lines
@@ -22,6 +23,32 @@ def holds_model(path: str | Path) -> bool:
     """
     top = read_toml(Path(path))
     return top.has("catalogue") or top.has("model")
+
+
+BUILT_IN_SIZES = (14, 20, 25)
+"""Sizes of the catalogue pages that the package brings along, all of ratio 100."""
+
+
+def built_in_page(size: int) -> Path:
+    """Return the file of a catalogue page that the package brings along.
+
+    Parameters
+    ----------
+    size : {14, 20, 25}
+
+    Raises
+    ------
+    InvalidInput
+        For another size.
+
+    Examples
+    --------
+    >>> built_in_page(20).name
+    'size_20.toml'
+    """
+    if size not in BUILT_IN_SIZES:
+        raise InvalidInput("size", size, ", ".join(map(str, BUILT_IN_SIZES)))
+    return Path(str(files("pymoo_hdte.drive"))) / "data" / f"size_{size}.toml"
 
 
 def load_page(path: str | Path) -> CataloguePage:
@@ -45,7 +72,7 @@ def load_page(path: str | Path) -> CataloguePage:
 
     Examples
     --------
-    >>> page = load_page("catalogue/size_20.toml")
+    >>> page = load_page(built_in_page(20))
     >>> page.teeth
     (200, 202)
     """
@@ -83,7 +110,7 @@ def load_drive(path: str | Path) -> DriveModel:
 
     Examples
     --------
-    >>> load_drive("catalogue/size_20.toml").sheet.ratio
+    >>> load_drive(built_in_page(20)).sheet.ratio
     100.0
     """
     file = Path(path).name

@@ -251,7 +251,9 @@ def operating_map(
         dte=np.reshape(motion.spectrum().peak_to_peak(model.sheet.ratio) / ARCSEC * found, shape),
         ripple=np.reshape(ripple.peak_to_peak(model.sheet.ratio) * found, shape),
         motor_torque=of_motion,
-        efficiency=power_share(of_motion * model.sheet.ratio, np.broadcast_to(loads[:, None], shape)),
+        efficiency=power_share(
+            of_motion * model.sheet.ratio, np.broadcast_to(loads[:, None], shape)
+        ),
         tangent=np.nanmedian(np.moveaxis(tangent, 1, 0).reshape(len(loads), -1), axis=1),
     )
 

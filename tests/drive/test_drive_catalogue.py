@@ -1,10 +1,11 @@
 """Catalogue pages: printed figures that were not entered, sizes held out, and what is asked for."""
 
 from dataclasses import replace
+from importlib.resources import files
+from pathlib import Path
 
 import numpy as np
 import pytest
-from places import DOCS
 from scipy.stats import gmean
 
 from pymoo_hdte.checks import InvalidInput
@@ -29,7 +30,8 @@ from pymoo_hdte.drive import (
 from pymoo_hdte.drive.toml_text import model_toml, sheet_toml
 from pymoo_hdte.units import ARCSEC, REVOLUTION_PER_MINUTE
 
-PAGES = {size: DOCS / "examples" / "catalogue" / f"size_{size}.toml" for size in (14, 20, 25)}
+DATA = Path(str(files("pymoo_hdte.drive"))) / "data"
+PAGES = {size: DATA / f"size_{size}.toml" for size in (14, 20, 25)}
 ARCMIN = 60.0 * ARCSEC
 
 # Schaeffler TPI 275, series RT1-H-CS, ratio 100, 20 C: rated torque N.m, efficiency at it and at
@@ -87,7 +89,9 @@ def test_rules_of_friction_hold_for_sizes_that_they_do_not_come_from(name, colum
     rule = ESTIMATES[name]
     known = {size: row[column] / size**power for size, row in FRICTION.items()}
     at_2000 = {"rated_speed": 2000.0 * REVOLUTION_PER_MINUTE, "no_load_starting_torque": 0.0}
-    assert rule.formula({"size": 1.0, **at_2000}) == pytest.approx(gmean(list(known.values())), rel=0.01)
+    assert rule.formula({"size": 1.0, **at_2000}) == pytest.approx(
+        gmean(list(known.values())), rel=0.01
+    )
     worst = max(abs(held_out(known, size) / known[size] - 1.0) for size in known)
     assert worst <= 0.25
     assert max(abs(known[size] / held_out(known, size) - 1.0) for size in known) <= rule.tolerance
@@ -271,7 +275,10 @@ def test_units_as_printed_are_the_same_drive(tmp_path, drives):
     text = PAGES[20].read_text(encoding="utf-8")
     arcmin = 16e3 * ARCMIN
     for old, new in (
-        ('K1 = { value = 16e3, unit = "N.m/rad" }', f'K1 = {{ value = {arcmin!r}, unit = "Nm/\'" }}'),
+        (
+            'K1 = { value = 16e3, unit = "N.m/rad" }',
+            f'K1 = {{ value = {arcmin!r}, unit = "Nm/\'" }}',
+        ),
         ('value = 105, unit = "mN.m"', 'value = 10.5, unit = "cNm"'),
         ('value = 0.5, unit = "kg.cm2"', 'value = 0.5e-4, unit = "kg.m2"'),
         ("size = 20 #", 'pitch_diameter = { value = 50.8, unit = "mm" } #'),
