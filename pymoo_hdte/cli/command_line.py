@@ -12,6 +12,7 @@ from pymoo_hdte import __version__
 from pymoo_hdte._interrupts import INTERRUPTED
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.cli.command import MISTAKE, OneLineParser
+from pymoo_hdte.cli.decide import DECIDE
 from pymoo_hdte.cli.discrepancy import DISCREPANCY
 from pymoo_hdte.cli.example import EXAMPLE
 from pymoo_hdte.cli.export import EXPORT
@@ -21,7 +22,7 @@ from pymoo_hdte.cli.optimise import OPTIMISE
 from pymoo_hdte.cli.plan import PLAN
 from pymoo_hdte.cli.simulate import SIMULATE
 
-COMMANDS = (EXAMPLE, OPTIMISE, SIMULATE, IDENTIFY, PLAN, INIT, DISCREPANCY, EXPORT)
+COMMANDS = (EXAMPLE, OPTIMISE, SIMULATE, IDENTIFY, PLAN, INIT, DISCREPANCY, DECIDE, EXPORT)
 """Commands in the order of the help."""
 
 
