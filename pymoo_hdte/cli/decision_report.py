@@ -121,7 +121,7 @@ def _to_measure(decision: Decision) -> str:
         )
     )
     if decision.found:
-        names = ", ".join(effect.name for effect in decision.found)
+        names = ", ".join(dict.fromkeys(effect.name for effect in decision.found))
         first += (
             f" The verdict's {names} is taken at its fitted value; its interval is not in the gain."
         )

@@ -12,9 +12,9 @@ _DETAILS = """example:
   pymoo-hdte identify my_gear/bench --datasheet my_gear/gear.toml --out my_gear/identified
   pymoo-hdte simulate my_gear/gear.toml --map --out my_gear/map
 
-FOLDER, which must be new or empty, gets gear.toml (a catalogue page of size 14, 20 or 25 to put your
-figures into), limits.toml (what a rig can do, for plan), bench (records for identify) and campaign
-(records for discrepancy). The records are computed, with noise, from a drive that differs from its
+FOLDER, which must be new or empty, gets gear.toml (a catalogue page of size 14, 20 or 25 to put
+your figures into), limits.toml (what a rig can do, for plan), bench (for identify) and campaign
+(for discrepancy). The records are computed, with noise, from a drive that differs from its
 page within the usual scatter, and whose mesh stiffness varies, which the page does not say.
 Exit codes: 0 written; 2 the folder is not empty."""
 

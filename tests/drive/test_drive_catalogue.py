@@ -160,7 +160,7 @@ def test_the_efficiency_over_the_load_of_another_maker():
 @pytest.mark.parametrize("size", PAGES)
 def test_printed_figures_that_were_not_entered(size, pages):
     """All are met but the accuracy of two sizes, whose part errors are those of another drive."""
-    results = {one.figure.name: one for one in compared(pages[size], draws=10)}
+    results = {one.figure.name: one for one in compared(pages[size], draws=4)}
     accuracy = results.pop("transmission_accuracy")
     assert all(one.holds for one in results.values())
     assert accuracy.holds == (size == 25)
