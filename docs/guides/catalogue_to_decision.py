@@ -44,8 +44,8 @@ print(text[text.index("[catalogue]") : text.index("# No page")])
 
 # %%
 # A page does not print all that a model needs. What is missing is estimated by a rule with a stated
-# tolerance, or asked for by name: nobody can guess what the drive moves, for instance. The rules are
-# in ``pymoo_hdte.drive.ESTIMATES``, each with its source, and can be replaced.
+# tolerance, or asked for by name: nobody can guess what the drive moves, for instance. The rules
+# are in ``pymoo_hdte.drive.ESTIMATES``, each with its source, and can be replaced.
 
 page = load_page(WORK / "gear.toml")
 for name, entry in complete(page).items():
@@ -53,8 +53,8 @@ for name, entry in complete(page).items():
         print(f"{name}: {figure_text(name, entry.value)} +- {100 * entry.tolerance:.0f} %")
 
 # %%
-# How good are the rules? Figures below ``[[printed]]`` are not entered, but compared with the model.
-# Three sizes come with the package.
+# How good are the rules? Figures below ``[[printed]]`` are not entered, but compared with the
+# model. Three sizes come with the package.
 
 for size in (14, 20, 25):
     print(f"size {size}")
@@ -66,8 +66,8 @@ for size in (14, 20, 25):
 
 # %%
 # Torques, efficiency and lost motion are met. The accuracy is not for the small sizes: it follows
-# from the errors of the parts, no page prints those, and the ones of another drive (the HS-20-100 of
-# the paper) stand in for them. If your page prints an accuracy, enter it.
+# from the errors of the parts, no page prints those, and the ones of another drive (the HS-20-100
+# of the paper) stand in for them. If your page prints an accuracy, enter it.
 #
 # Records fill the page
 # ---------------------
@@ -83,9 +83,9 @@ print(document["sentences"][-1])
 # The map
 # -------
 #
-# Error, torque ripple and efficiency over speed, load and direction, with the resonances. A negative
-# load drives the motion. Below the load that drives the gear back the motor has to push, too, and
-# the efficiency is 0.
+# Error, torque ripple and efficiency over speed, load and direction, with the resonances. A
+# negative load drives the motion. Below the load that drives the gear back the motor has to push,
+# too, and the efficiency is 0.
 
 pymoo_hdte("simulate my_gear/identified/identified_drive.toml --map --out my_gear/map")
 with (WORK / "map" / "map.csv").open() as file:
@@ -105,8 +105,8 @@ plt.show()
 # Which tests?
 # ------------
 #
-# ``limits.toml`` says what the rig can do. The plan lists the fewest tests that tell possible effects
-# apart.
+# ``limits.toml`` says what the rig can do. The plan lists the fewest tests that tell possible
+# effects apart.
 
 pymoo_hdte(
     "plan my_gear/identified/identified_drive.toml --limits my_gear/limits.toml --out my_gear/plan"

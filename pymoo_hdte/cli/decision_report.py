@@ -27,6 +27,8 @@ _WORDS = {
     "cam_class": "tolerance class of the cam",
     "tooth_class": "tolerance class of the teeth",
 }
+WEIGHTY = 0.05
+"""Share of the gain that an estimate must move to be worth a measurement; set by hand."""
 _NO_GAIN = 0.02
 """Reduction of the goal, relative, below which nothing is recommended."""
 
@@ -93,8 +95,9 @@ def sentences(decision: Decision) -> list[str]:
         low, high = decision.gain
         said.append(
             f"The mean DTE goes from {before.mean:.1f} to {after.mean:.1f} arcsec, its standard "
-            f"deviation over drives from {before.std:.1f} to {after.std:.1f}. For the nominal drive "
-            f"the reduction is {low:.1f} to {high:.1f} arcsec (90 %, from the estimates alone)."
+            f"deviation over drives from {before.std:.1f} to {after.std:.1f}. For the nominal "
+            f"drive the reduction is {low:.1f} to {high:.1f} arcsec (90 %, from the estimates "
+            "alone)."
         )
         said.append(
             f"It costs: starting torque {number(1e3 * before.starting, 3)} to "
@@ -110,20 +113,21 @@ def sentences(decision: Decision) -> list[str]:
 
 
 def _to_measure(decision: Decision) -> str:
+    """Say which figures decide whether the change pays."""
     width = max(abs(decision.before.mean - decision.after.mean), 1e-9)
-    weighty = [name for name, moved in decision.doubts.items() if moved > 0.05 * width][:2]
-    first = (
-        f"Measure first: {' and '.join(weighty)}, on which the gain depends most."
-        if weighty
-        else (
-            "No estimate moves the gain by 5 % of it. What is to be measured is the DTE itself, before "
-            "and after the first change."
+    weighty = [name for name, moved in decision.doubts.items() if moved > WEIGHTY * width][:2]
+    if weighty:
+        first = f"Measure first: {' and '.join(weighty)}, on which the gain depends most."
+    else:
+        first = (
+            f"No estimate moves the gain by {100.0 * WEIGHTY:g} % of it. What is to be measured "
+            "is the DTE itself, before and after the first change."
         )
-    )
     if decision.found:
         names = ", ".join(dict.fromkeys(effect.name for effect in decision.found))
         first += (
-            f" The verdict's {names} is taken at its fitted value; its interval is not in the gain."
+            f" What the verdict found ({names}) has its fitted values here; their intervals are "
+            "not in that of the gain."
         )
     return first
 
@@ -136,8 +140,8 @@ def limits(decision: Decision, notes: Sequence[str]) -> list[str]:
         "The shares in the formulas of the levers are assumed, not measured: they are printed with "
         "the result, and another formula may be put in their place.",
         f"Limits: starting torque at most times {bounds.starting_torque:g}, bending stress times "
-        f"{bounds.stress:g}, efficiency at most {100.0 * bounds.efficiency:g} points lower; the goal "
-        f"is mean + {SPREAD:g} standard deviations of the DTE at rated speed and load.",
+        f"{bounds.stress:g}, efficiency at most {100.0 * bounds.efficiency:g} points lower. The "
+        f"goal is mean + {SPREAD:g} standard deviations of the DTE at rated speed and load.",
     ]
 
 

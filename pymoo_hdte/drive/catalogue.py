@@ -8,7 +8,7 @@ the error over one output turn, without load or reversal.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from typing import Any
@@ -397,37 +397,41 @@ def complete(
     return entries
 
 
-def _enter_friction(page: CataloguePage, entries: Mapping[str, Entry], enter: Any) -> None:
+def _enter_friction(
+    page: CataloguePage, entries: Mapping[str, Entry], enter: Callable[[str, Entry], None]
+) -> None:
     """Enter what printed conditions of friction imply, as soon as what they build on is known."""
-    if "no_load_running_torque" not in entries and (rows := page.of("no_load_running_torque")):
-        rated = entries["rated_speed"].value
-        start = entries.get("no_load_starting_torque")
-        speeds, torques = np.array([(f.speed or rated, f.value) for f in rows]).T
-        if start is None and len(rows) > 1:
-            drag, level = np.polyfit(speeds, torques, 1)
-            enter("no_load_starting_torque", Entry(max(float(level), 0.0)))
-            enter("no_load_running_torque", Entry(float(level + drag * rated)))
-        elif start is not None:
-            drag = float(speeds @ (torques - start.value) / (speeds @ speeds))
-            enter("no_load_running_torque", Entry(start.value + drag * rated))
-    if not {"no_load_running_torque", "no_load_starting_torque"} <= set(entries):
-        return
-    start, running = (entries[f"no_load_{name}_torque"].value for name in ("starting", "running"))
-    worst = max(entries[f"no_load_{name}_torque"].tolerance for name in ("starting", "running"))
     rated = entries["rated_speed"].value
-    if "load_friction" not in entries and (rows := page.of("efficiency")):
-        loads = np.array([f.load or entries["rated_torque"].value for f in rows]) / page.ratio
-        speeds = np.array([f.speed or rated for f in rows])
-        efficiencies = np.array([f.value for f in rows])
-        no_load = start + (running - start) * speeds / rated
-        share = float(loads @ (loads / efficiencies - no_load - loads) / (loads @ loads))
+    running = page.of("no_load_running_torque")
+    if running and "no_load_running_torque" not in entries:
+        speeds, torques = np.array([(figure.speed or rated, figure.value) for figure in running]).T
+        if "no_load_starting_torque" in entries:
+            level = entries["no_load_starting_torque"].value
+            drag = float(speeds @ (torques - level) / (speeds @ speeds))
+            enter("no_load_running_torque", Entry(level + drag * rated))
+        elif len(running) > 1:
+            drag, level = np.polyfit(speeds, torques, 1).tolist()
+            enter("no_load_starting_torque", Entry(max(level, 0.0)))
+            enter("no_load_running_torque", Entry(level + drag * rated))
+    no_load = [entries.get(f"no_load_{name}_torque") for name in ("starting", "running")]
+    known = [entry for entry in no_load if entry is not None]
+    if len(known) < len(no_load):
+        return
+    start, at_rated = (entry.value for entry in known)
+    rows = page.of("efficiency")
+    if rows and "load_friction" not in entries:
+        loads = np.array([row.load or entries["rated_torque"].value for row in rows]) / page.ratio
+        speeds = np.array([row.speed or rated for row in rows])
+        efficiencies = np.array([row.value for row in rows])
+        unloaded = start + (at_rated - start) * speeds / rated
+        share = float(loads @ (loads / efficiencies - unloaded - loads) / (loads @ loads))
         if share < 0.0:
             allowed = "at most the efficiency that the no-load torque leaves"
             raise InvalidInput("catalogue.efficiency", float(efficiencies.max()), allowed)
-        enter("load_friction", Entry(share, worst, "printed" if worst == 0.0 else "efficiency"))
-    if "driven_friction" not in entries and (rows := page.of("no_load_back_driving_torque")):
-        share = 1.0 - page.ratio * start / rows[0].value
-        enter("driven_friction", Entry(share, 0.0, "printed"))
+        enter("load_friction", Entry(share))
+    back = page.of("no_load_back_driving_torque")
+    if back and "driven_friction" not in entries:
+        enter("driven_friction", Entry(1.0 - page.ratio * start / back[0].value))
 
 
 def sampled(

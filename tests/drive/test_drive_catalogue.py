@@ -54,8 +54,8 @@ TORSION = {
     50: (108.0, 382.0, 250.0, 400.0, 440.0),
     58: (168.0, 598.0, 400.0, 610.0, 710.0),
 }
-# CSF and CSG catalogue of Harmonic Drive LLC, table 41, ratio 30: T1, K1, angle at T1, T2, K2, angle
-# at T2; N.m, 10^4 N.m/rad, 10^-4 rad.
+# CSF and CSG catalogue of Harmonic Drive LLC, table 41, ratio 30: T1, K1, angle at T1, T2, K2 and
+# angle at T2; N.m, 10^4 N.m/rad, 10^-4 rad.
 ANGLES = {
     11: (0.80, 0.084, 9.5, 2.0, 0.13, 19.0),
     14: (2.0, 0.19, 10.5, 6.9, 0.24, 31.0),
