@@ -13,16 +13,18 @@ import scipy
 from numpy.typing import NDArray
 
 from pymoo_hdte.drive import (
+    ESTIMATES,
     CataloguePage,
     DriveEffect,
     DriveModel,
     Entry,
     complete,
+    drive_of,
     efficiency,
     starting_torque,
 )
 from pymoo_hdte.drive.catalogue import sampled
-from pymoo_hdte.drive.levers import LEVERS, bending_stress, changed_drive
+from pymoo_hdte.drive.levers import LEVERS, SHARES, bending_stress, changed_drive
 from pymoo_hdte.effects.effect import place_of
 
 DRIVES = 32
@@ -149,7 +151,7 @@ def decide(
         If the unchanged drive has no steady state.
     """
     limits = Limits() if limits is None else limits
-    figures = complete(page)
+    figures = complete(page, {**ESTIMATES, **SHARES})
     known: dict[tuple[tuple[str, float], ...], Outcome] = {}
 
     def outcome(settings: Mapping[str, float]) -> Outcome:
@@ -202,7 +204,7 @@ def allowed(outcome: Cost, before: Cost, limits: Limits) -> bool:
 
 def found_effects(revised: DriveModel, page: CataloguePage) -> tuple[DriveEffect, ...]:
     """Return the effects of a revised model that the drive of a page lacks."""
-    known = {place_of(effect) for effect in changed_drive(page, complete(page), {}).effects}
+    known = {place_of(effect) for effect in drive_of(page).effects}
     return tuple(effect for effect in revised.effects if place_of(effect) not in known)
 
 

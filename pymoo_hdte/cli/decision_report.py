@@ -16,7 +16,8 @@ from pymoo_hdte._reports.folder import ReportFolder
 from pymoo_hdte._reports.html import change, number, page
 from pymoo_hdte.cli.command import heading
 from pymoo_hdte.cli.decision import LITTLE, SPREAD, Decision, Limits
-from pymoo_hdte.drive.levers import LEVERS
+from pymoo_hdte.drive.catalogue import figure_text
+from pymoo_hdte.drive.levers import LEVERS, SHARES
 
 LEVERS_FILE = "levers.csv"
 FOLDER = ReportFolder("decision.json", (LEVERS_FILE,))
@@ -137,8 +138,13 @@ def limits(decision: Decision, notes: Sequence[str]) -> list[str]:
     bounds = Limits()
     return [
         *notes,
-        "The shares in the formulas of the levers are assumed, not measured: they are printed with "
-        "the result, and another formula may be put in their place.",
+        "Assumed for the levers, and varied in the interval of the gain: "
+        + ", ".join(
+            f"{name} {figure_text(name, decision.figures[name].value)} "
+            f"(± {100.0 * decision.figures[name].tolerance:.0f} %)"
+            for name in SHARES
+        )
+        + ". Enter your own under [catalogue].",
         f"Limits: starting torque at most times {bounds.starting_torque:g}, bending stress times "
         f"{bounds.stress:g}, efficiency at most {100.0 * bounds.efficiency:g} points lower. The "
         f"goal is mean + {SPREAD:g} standard deviations of the DTE at rated speed and load.",

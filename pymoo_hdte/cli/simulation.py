@@ -152,5 +152,5 @@ def _remembers(model: DriveModel) -> bool:
 
 def _map(model: DriveModel, fastest: float) -> OperatingMap:
     load = abs(model.sheet.load_torque) or 1.0
-    speeds = np.linspace(0.0, fastest, MAP_SPEEDS + 1)[1:]
+    speeds = np.linspace(0.0, fastest * REVOLUTION_PER_MINUTE, MAP_SPEEDS + 1)[1:]
     return operating_map(model, speeds, np.linspace(-load, load, MAP_LOADS))

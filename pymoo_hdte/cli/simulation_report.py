@@ -19,7 +19,7 @@ from pymoo_hdte.cli.simulation import FASTEST, Simulation
 from pymoo_hdte.drive import OperatingMap
 from pymoo_hdte.drive.catalogue import figure_text
 from pymoo_hdte.drive.dte_map import DIRECTIONS, neighbouring_resonances
-from pymoo_hdte.units import ARCSEC
+from pymoo_hdte.units import ARCSEC, REVOLUTION_PER_MINUTE
 
 TURN_FILE = "transmission_error.csv"
 LINES_FILE = "order_lines.csv"
@@ -84,7 +84,7 @@ def map_table(mapped: OperatingMap) -> str:
         )
         for place, direction in enumerate(DIRECTIONS)
         for row, load in enumerate(mapped.loads.tolist())
-        for column, speed in enumerate(mapped.speeds.tolist())
+        for column, speed in enumerate((mapped.speeds / REVOLUTION_PER_MINUTE).tolist())
     ]
     return csv_text(columns, rows)
 
@@ -176,9 +176,10 @@ def _torques(simulation: Simulation) -> str:
 def _of_map(mapped: OperatingMap) -> str:
     """Say where the map has its largest error and which loads the motor cannot let drive."""
     place, row, column = np.unravel_index(np.nanargmax(mapped.dte), mapped.dte.shape)
+    speed = mapped.speeds[column] / REVOLUTION_PER_MINUTE
     said = (
         f"Over the map the DTE is largest, {mapped.dte[place, row, column]:.0f} arcsec, "
-        f"{list(DIRECTIONS)[place]} at {mapped.speeds[column]:.0f} r/min and "
+        f"{list(DIRECTIONS)[place]} at {speed:.0f} r/min and "
         f"{number(mapped.loads[row], 3)} N.m"
     )
     driving = (mapped.loads < 0.0)[None, :, None]
@@ -294,6 +295,7 @@ def _speeds_figure(simulation: Simulation) -> Figure:
 
 def map_figure(mapped: OperatingMap) -> Figure:
     """Draw error, torque ripple and efficiency over speed and load, a row for each direction."""
+    speeds = mapped.speeds / REVOLUTION_PER_MINUTE
     figure = Figure(figsize=(11.0, 6.4), layout="constrained")
     axes = figure.subplots(2, 3, sharex=True, sharey=True)
     parts = (
@@ -306,7 +308,7 @@ def map_figure(mapped: OperatingMap) -> Figure:
         for place, direction in enumerate(DIRECTIONS):
             axis = axes[place, column]
             mesh = axis.pcolormesh(
-                mapped.speeds, mapped.loads, values[place], vmin=low, vmax=high, cmap=colours,
+                speeds, mapped.loads, values[place], vmin=low, vmax=high, cmap=colours,
                 shading="nearest", rasterized=True,
             )  # fmt: skip
             axis.set_title(f"{label}, {direction}", fontsize=10)
@@ -323,13 +325,15 @@ def _draw_resonances(axis: Axes, mapped: OperatingMap, shown: bool) -> None:
     """Draw the speed of each resonance over the load, named at the top."""
     if not shown:
         return
-    for order, speeds in mapped.resonances().items():
-        if speeds.min() > mapped.speeds[-1] or order % 1.0:
+    fastest = mapped.speeds[-1] / REVOLUTION_PER_MINUTE
+    for order, at in mapped.resonances().items():
+        speeds = at / REVOLUTION_PER_MINUTE
+        if speeds.min() > fastest or order % 1.0:
             continue
         axis.plot(speeds, mapped.loads, color="white", linestyle="--", linewidth=1.0)
         axis.annotate(
             f"order {order:g}",
-            (min(speeds[-1], mapped.speeds[-1]), mapped.loads[-1]),
+            (min(speeds[-1], fastest), mapped.loads[-1]),
             xytext=(-3, -3),
             textcoords="offset points",
             color="white",
@@ -338,4 +342,4 @@ def _draw_resonances(axis: Axes, mapped: OperatingMap, shown: bool) -> None:
             ha="right",
             va="top",
         )
-    axis.set_xlim(0.0, mapped.speeds[-1])
+    axis.set_xlim(0.0, fastest)

@@ -61,6 +61,9 @@ FIGURES: Mapping[str, str] = {
     "load_friction": "share",
     "driven_friction": "share",
     "mesh_damping_share": "share",
+    "wall_share": "share",
+    "ring_share": "share",
+    "preload_share": "share",
 }
 """The figures of a page, with the quantity, among `units.UNITS`, of each.
 
@@ -136,7 +139,7 @@ class Figure:
     speed, load : float or None
         Of the input, rad/s, and at the output, N.m; None for the rated ones.
     temperature : float
-        K.
+        In kelvin.
     tolerance : float
         Relative; of figures that are checked, how far a prediction may be off.
     limit : bool
@@ -195,9 +198,9 @@ class CataloguePage:
     name, source : str
         Name of the drive, and where its figures come from.
     size : float
-        Pitch diameter of the teeth in tenths of an inch.
+        Pitch diameter of the teeth in units of a tenth of an inch.
     ratio : float
-        Turns of the input per turn of the output.
+        Turns of the input per turn of the output, dimensionless.
     held : {"circular_spline", "flexspline"}
         Member that does not turn.
     entered : tuple of Figure
@@ -206,7 +209,7 @@ class CataloguePage:
     printed : tuple of Figure
         Figures that the model is compared with.
     temperature : float
-        Of operation, K.
+        Of operation, in kelvin.
     error_sources : tuple of ErrorSource
         Errors of the parts; by default those of the paper's Table 2.
 

@@ -169,7 +169,7 @@ class OperatingMap:
     ----------
     model : DriveModel
     speeds : ndarray, shape (n,)
-        Of the input, r/min, above 0.
+        Of the input, rad/s, above 0.
     loads : ndarray, shape (m,)
         N.m at the output.
     dte : ndarray, shape (2, m, n)
@@ -180,7 +180,8 @@ class OperatingMap:
     motor_torque : ndarray, shape (2, m, n)
         Mean torque of the motor in the direction of motion, N.m; negative where it brakes.
     efficiency : ndarray, shape (2, m, n)
-        Power out over power in, whichever side drives; 0 where both have to push, NaN without load.
+        Power out over power in, whichever side drives, dimensionless; 0 where both have to push,
+        NaN without load.
     tangent : ndarray, shape (m,)
         Mean stiffness of the mesh about the torsion under each load, N.m/rad.
     """
@@ -200,18 +201,23 @@ class OperatingMap:
         return int(np.isnan(self.dte).sum())
 
     def resonances(self) -> dict[float, NDArray[np.float64]]:
-        """Return the speed, r/min, of the resonance of each excited order under each load, (m,).
+        """Return the input speed of the resonance of each excited order under each load, rad/s.
 
         That of the two inertias against the `tangent` stiffness; empty where damping leaves none.
+
+        Returns
+        -------
+        dict of ndarray, shape (m,)
+            By order, rad/s.
         """
         if not torsional_mode(self.model).resonates:
             return {}
         coefficients = self.model.coefficients(self.model.nominal[None])
         input_inertia = coefficients.input_inertia[0] * coefficients.ratio**2
         compliance = 1.0 / input_inertia + 1.0 / np.ravel(coefficients.output_inertia)[0]
-        frequency = np.sqrt(self.tangent * compliance) / (2.0 * np.pi)
+        frequency = np.sqrt(self.tangent * compliance)
         orders = {order for order, _ in critical_speeds(self.model)}
-        return {order: 60.0 * frequency / order for order in sorted(orders)}
+        return {order: frequency / order for order in sorted(orders)}
 
 
 def operating_map(
@@ -223,7 +229,7 @@ def operating_map(
     ----------
     model : DriveModel
     speeds : ndarray, shape (n,)
-        Of the input, r/min, above 0.
+        Of the input, rad/s, above 0.
     loads : ndarray, shape (m,)
         N.m at the output; positive ones oppose the motion.
 
@@ -233,7 +239,7 @@ def operating_map(
     """
     shape = (len(DIRECTIONS), len(loads), len(speeds))
     sign = np.reshape(list(DIRECTIONS.values()), (-1, 1, 1))
-    speed = np.broadcast_to(sign * speeds * REVOLUTION_PER_MINUTE, shape).ravel()
+    speed = np.broadcast_to(sign * speeds, shape).ravel()
     load = np.broadcast_to(sign * loads[:, None], shape).ravel()
     rows = model.coefficients(np.repeat(model.nominal[None], len(speed), axis=0))
     motion = _near_what_was_found(

@@ -43,7 +43,7 @@ class Estimate:
     basis : str
         What the rule says and where it comes from.
     sizes, ratios : (float, float)
-        Range within which the rule was checked; outside it the figure is asked for.
+        Range within which the rule was checked, dimensionless; outside it the figure is asked for.
 
     Examples
     --------

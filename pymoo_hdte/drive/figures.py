@@ -56,6 +56,7 @@ def input_torque(model: DriveModel, speed: ArrayLike, load: ArrayLike) -> Values
     Returns
     -------
     ndarray, shape (n,)
+        N.m.
 
     Examples
     --------
@@ -148,6 +149,10 @@ def power_share(given: Values, taken: Values) -> Values:
 def starting_torque(model: DriveModel) -> float:
     """Return the torque, N.m, at which the unloaded input begins to turn.
 
+    Parameters
+    ----------
+    model : DriveModel
+
     Examples
     --------
     >>> starting_torque(preset("calibrated")) < 1e-4
@@ -160,6 +165,10 @@ def back_driving_torque(model: DriveModel) -> float:
     """Return the torque at the output, N.m, at which it begins to turn the free input.
 
     It is where the torque of a driving load leaves nothing for a motor; inf if the drive locks.
+
+    Parameters
+    ----------
+    model : DriveModel
 
     Examples
     --------
@@ -175,6 +184,10 @@ def back_driving_torque(model: DriveModel) -> float:
 def hysteresis_loss(model: DriveModel) -> float:
     """Return the width of the torsion loop at zero torque after +- the rated torque, rad.
 
+    Parameters
+    ----------
+    model : DriveModel
+
     Examples
     --------
     >>> hysteresis_loss(preset("calibrated"))
@@ -185,6 +198,10 @@ def hysteresis_loss(model: DriveModel) -> float:
 
 def lost_motion(model: DriveModel) -> float:
     """Return the torsion between plus and minus `LOST_MOTION_LOAD` of the rated torque, rad.
+
+    Parameters
+    ----------
+    model : DriveModel
 
     Examples
     --------
@@ -232,7 +249,7 @@ class Comparison:
         Predicted, SI.
     low, high : float
         Where 90 % of predictions lie as estimates vary within their tolerances; for the accuracy,
-        of drives.
+        of drives; SI.
 
     Examples
     --------

@@ -15,15 +15,36 @@ from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.drive.catalogue import CataloguePage, Entry, accuracy_of_parts, drive_of
 from pymoo_hdte.drive.datasheet import ErrorSource
 from pymoo_hdte.drive.datasheet_file import hs_20_100
+from pymoo_hdte.drive.estimates import Estimate
 from pymoo_hdte.drive.model import DriveModel
 
 Figures = Mapping[str, Entry]
 Parts = tuple[ErrorSource, ...]
 
-WALL_SHARE = 0.5
-"""Share of the torsional compliance that the wall of the flexspline has; assumed."""
-RING_SHARE = 0.5
-"""Share of the starting torque that the force between wave generator and ring causes; assumed."""
+SHARES: Mapping[str, Estimate] = {
+    "wall_share": Estimate(
+        lambda known: 0.5, (), 0.5, "half of the torsional compliance is of the wall; assumed"
+    ),
+    "ring_share": Estimate(
+        lambda known: 0.5,
+        (),
+        0.5,
+        "half of the starting torque comes from the force that bends the ring; assumed",
+    ),
+    "preload_share": Estimate(
+        lambda known: 0.7,
+        (),
+        0.4,
+        "0.7 of the soft beginning is of flanks that preload closes; assumed",
+    ),
+}
+"""Figures that the formulas of the levers need and no page has, in the form of `ESTIMATES`.
+
+Examples
+--------
+>>> list(SHARES)
+['wall_share', 'ring_share', 'preload_share']
+"""
 GRADE = 2.0**0.5
 """Step of a deviation from one tolerance grade to the next, ISO 1328-1."""
 
@@ -84,21 +105,24 @@ def wall(figures: Figures, parts: Parts, setting: float) -> tuple[dict[str, Entr
     The torsion of a thin tube falls with its thickness, and the force that bends a ring by a given
     way grows with its cube (Timoshenko, Strength of Materials, 1955).
     """
-    stiffer = 1.0 / (WALL_SHARE / setting + 1.0 - WALL_SHARE)
+    share, ring = figures["wall_share"].value, figures["ring_share"].value
+    stiffer = 1.0 / (share / setting + 1.0 - share)
     changed = _times(figures, dict.fromkeys(("K1", "K2", "K3"), stiffer))
-    return _with_start(changed, 1.0 - RING_SHARE + RING_SHARE * setting**3), parts
+    return _with_start(changed, 1.0 - ring + ring * setting**3), parts
 
 
 def preload(figures: Figures, parts: Parts, setting: float) -> tuple[dict[str, Entry], Parts]:
     """Return the figures with ``setting`` times the preload of the teeth.
 
     Contact forces, and with them friction and hysteresis, grow in proportion; the soft beginning of
-    the torsion, whose flanks the preload closes, shrinks.
+    the torsion shrinks by the part that the preload closes.
     """
     second, first = figures["K2"].value, figures["K1"].value
-    stiffer = (second - (second - first) / setting) / first
+    share, ring = figures["preload_share"].value, figures["ring_share"].value
+    left = 1.0 - share + share / setting
+    stiffer = (second - (second - first) * left) / first
     changed = _times(figures, {"K1": stiffer, "hysteresis_loss": setting})
-    return _with_start(changed, 1.0 - RING_SHARE + RING_SHARE * setting), parts
+    return _with_start(changed, 1.0 - ring + ring * setting), parts
 
 
 def _graded(*classes: str) -> Callable[[Figures, Parts, float], tuple[dict[str, Entry], Parts]]:
@@ -121,8 +145,8 @@ LEVERS = (
         1.0,
         (0.9, 1.0, 1.1),
         wall,
-        f"{WALL_SHARE:g} of the torsional compliance falls with the thickness, {RING_SHARE:g} of "
-        "the starting torque grows with its cube, bending stress in proportion",
+        "wall_share of the torsional compliance falls with the thickness, ring_share of the "
+        "starting torque grows with its cube, bending stress in proportion",
         lambda setting: setting,
     ),
     Lever(
@@ -130,7 +154,8 @@ LEVERS = (
         1.0,
         (0.8, 1.0, 1.25),
         preload,
-        f"hysteresis and {RING_SHARE:g} of the starting torque grow in proportion; K1 nears K2",
+        "hysteresis and ring_share of the starting torque grow in proportion, preload_share of "
+        "the distance of K1 from K2 falls in proportion",
     ),
     Lever(
         "cam_class",
@@ -168,7 +193,7 @@ def changed_drive(
     ----------
     page : CataloguePage
     figures : mapping of Entry
-        Of `complete`.
+        Of ``complete(page, ESTIMATES | SHARES)``.
     settings : mapping of float
         By name of the lever; levers that are not named stay unchanged.
     levers : sequence of Lever
@@ -186,7 +211,8 @@ def changed_drive(
     Examples
     --------
     >>> page = load_page(built_in_page(20))
-    >>> thick = changed_drive(page, complete(page), {"wall_thickness": 1.1})
+    >>> figures = complete(page, {**ESTIMATES, **SHARES})
+    >>> thick = changed_drive(page, figures, {"wall_thickness": 1.1})
     >>> print(f"{thick.sheet.nominal.stiffness:.0f} N.m/rad")
     26190 N.m/rad
     """

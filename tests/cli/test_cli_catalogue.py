@@ -15,6 +15,7 @@ from pymoo_hdte.cli import command_line as cli
 from pymoo_hdte.cli import decision
 from pymoo_hdte.cli.example_records import TRUTH
 from pymoo_hdte.drive import (
+    ESTIMATES,
     built_in_page,
     complete,
     load_drive,
@@ -23,11 +24,11 @@ from pymoo_hdte.drive import (
     starting_torque,
 )
 from pymoo_hdte.drive.catalogue import accuracy_of_parts
-from pymoo_hdte.drive.levers import GRADE, LEVERS, Lever, changed_drive
+from pymoo_hdte.drive.levers import GRADE, LEVERS, SHARES, Lever, changed_drive
 from pymoo_hdte.units import REVOLUTION_PER_MINUTE
 
 PAGE = load_page(built_in_page(20))
-FIGURES = complete(PAGE)
+FIGURES = complete(PAGE, {**ESTIMATES, **SHARES})
 
 
 @pytest.fixture(scope="module")

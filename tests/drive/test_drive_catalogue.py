@@ -232,7 +232,8 @@ def test_the_even_torque_is_that_of_the_whole_motion(drives):
 
 def test_the_map_has_the_model_in_all_four_quadrants(drives):
     model = drives[14]
-    speeds, loads = np.array([800.0, 1600.0]), np.array([-8.0, 8.0])
+    loads = np.array([-8.0, 8.0])
+    speeds = REVOLUTION_PER_MINUTE * np.array([800.0, 1600.0])
     mapped = operating_map(model, speeds, loads)
     at = model.at(800.0 * REVOLUTION_PER_MINUTE, 8.0)
     assert mapped.dte[0, 1, 0] == pytest.approx(at.dte_arcsec(model.nominal[None])[0], rel=1e-3)
