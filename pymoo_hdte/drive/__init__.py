@@ -39,6 +39,7 @@ from pymoo_hdte.drive.figures import (
     starting_torque,
 )
 from pymoo_hdte.drive.kinematic_error import KinematicError
+from pymoo_hdte.drive.levers import LEVERS, SHARES, Lever, changed_drive
 from pymoo_hdte.drive.measurement import low_pass, measured_dte
 from pymoo_hdte.drive.model import PRESETS, DriveModel, load_model, preset
 from pymoo_hdte.drive.parameters import PARAMETER_UNITS, PARAMETERS
@@ -47,9 +48,11 @@ from pymoo_hdte.drive.static_error import StaticErrorSample, class_amplitudes, s
 
 __all__ = [
     "ESTIMATES",
+    "LEVERS",
     "PARAMETERS",
     "PARAMETER_UNITS",
     "PRESETS",
+    "SHARES",
     "CataloguePage",
     "ChangedStaticError",
     "Coefficients",
@@ -67,6 +70,7 @@ __all__ = [
     "KinematicErrorLine",
     "KinematicReaction",
     "LawAtPort",
+    "Lever",
     "LoadDependentError",
     "LoadInertia",
     "MeshStiffnessVariation",
@@ -81,6 +85,7 @@ __all__ = [
     "UnstableDrive",
     "back_driving_torque",
     "built_in_page",
+    "changed_drive",
     "class_amplitudes",
     "compared",
     "complete",

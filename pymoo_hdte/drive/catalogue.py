@@ -218,6 +218,12 @@ class CataloguePage:
     InvalidInput
         For a value out of range, a figure that is entered twice for one condition, or a ratio that
         no pair of tooth numbers with a difference of two gives.
+
+    Examples
+    --------
+    >>> page = load_page(built_in_page(20))
+    >>> page.teeth, [figure.value for figure in page.of("T1")]
+    ((200, 202), [7.0])
     """
 
     name: str
@@ -363,6 +369,12 @@ def complete(
     ------
     InvalidInput
         Naming a figure that is missing and that no rule replaces at this size and ratio.
+
+    Examples
+    --------
+    >>> entries = complete(load_page(built_in_page(20)))
+    >>> entries["K3"].estimated, entries["no_load_starting_torque"].estimated
+    (False, True)
     """
     known = {"size": page.size, "ratio": page.ratio}
     entries: dict[str, Entry] = {}
@@ -491,6 +503,12 @@ def drive_of(
     InvalidInput
         As `complete`; for stiffnesses that do not rise, or a running torque that is not above the
         starting torque.
+
+    Examples
+    --------
+    >>> model = drive_of(load_page(built_in_page(20)))
+    >>> model.sheet.name, model.sheet.ratio
+    ('RT1 size 20, ratio 100', 100.0)
     """
     entries = complete(page) if entries is None else entries
     value = {name: entry.value for name, entry in entries.items()}

@@ -184,6 +184,12 @@ class OperatingMap:
         NaN without load.
     tangent : ndarray, shape (m,)
         Mean stiffness of the mesh about the torsion under each load, N.m/rad.
+
+    Examples
+    --------
+    >>> mapped = operating_map(preset("calibrated"), np.array([100.0, 200.0]), np.array([-40.0]))
+    >>> mapped.dte.shape, mapped.not_found
+    ((2, 1, 2), 0)
     """
 
     model: DriveModel
@@ -236,6 +242,12 @@ def operating_map(
     Returns
     -------
     OperatingMap
+
+    Examples
+    --------
+    >>> mapped = operating_map(preset("calibrated"), np.array([200.0]), np.array([40.0]))
+    >>> print(f"{mapped.efficiency[0, 0, 0]:.2f}")
+    0.92
     """
     shape = (len(DIRECTIONS), len(loads), len(speeds))
     sign = np.reshape(list(DIRECTIONS.values()), (-1, 1, 1))

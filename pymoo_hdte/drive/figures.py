@@ -292,6 +292,12 @@ def compared(
     ------
     InvalidInput
         As `drive_of`.
+
+    Examples
+    --------
+    >>> results = compared(load_page(built_in_page(25)), draws=2)
+    >>> [result.holds for result in results]
+    [True, True, True, True, True]
     """
     entries = complete(page) if entries is None else entries
     rng = np.random.default_rng(1)

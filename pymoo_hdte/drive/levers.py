@@ -7,7 +7,7 @@ the errors of the parts, with the setting, to new ones.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -57,11 +57,11 @@ class Lever:
     ----------
     name : str
     unchanged : float
-        Setting that leaves the drive as it is.
-    settings : tuple of float
-        Settings to choose from, in rising order, the unchanged one among them.
+        Setting that leaves the drive as it is: a factor, or steps of a class, dimensionless.
+    settings : tuple of float, length n
+        Settings to choose from, in rising order, the unchanged one among them, dimensionless.
     formula : callable
-        Maps figures, errors of the parts and a setting to figures and errors.
+        Maps figures, errors of the parts and a setting to figures and errors, in SI.
     stress : callable
         Maps a setting to the bending stress in the flexspline, relative to the unchanged one.
     basis : str
@@ -78,7 +78,11 @@ class Lever:
     settings: tuple[float, ...]
     formula: Callable[[Figures, Parts, float], tuple[dict[str, Entry], Parts]]
     basis: str
-    stress: Callable[[float], float] = lambda setting: 1.0
+    stress: Callable[[float], float] = field(default_factory=lambda: _no_stress)
+
+
+def _no_stress(setting: float) -> float:
+    return 1.0
 
 
 def _times(figures: Figures, factors: Mapping[str, float]) -> dict[str, Entry]:
@@ -195,7 +199,7 @@ def changed_drive(
     figures : mapping of Entry
         Of ``complete(page, ESTIMATES | SHARES)``.
     settings : mapping of float
-        By name of the lever; levers that are not named stay unchanged.
+        By name of the lever, dimensionless; levers that are not named stay unchanged.
     levers : sequence of Lever
 
     Returns
