@@ -11,9 +11,12 @@ import numpy as np
 import pytest
 from places import DOCS
 
+from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.cli import command_line as cli
 from pymoo_hdte.cli import decision
+from pymoo_hdte.cli.drive_arguments import read_drive
 from pymoo_hdte.cli.example_records import TRUTH
+from pymoo_hdte.discrepancy import read_drive_model
 from pymoo_hdte.drive import (
     ESTIMATES,
     built_in_page,
@@ -170,3 +173,16 @@ def test_the_commands_of_the_page_run_as_printed(tmp_path, monkeypatch):
     found = json.loads((tmp_path / "my_gear" / "decision" / "decision.json").read_text())["found"]
     depths = [e["depth"] for e in found if e["name"] == "mesh_stiffness_variation" if "depth" in e]
     assert np.max(depths) == pytest.approx(0.06, abs=0.02)
+
+
+def test_every_command_reads_the_same_drive_from_the_page(gear):
+    expected = load_drive(gear / "gear.toml")
+    assert read_drive_model(gear / "gear.toml") == expected
+    options = cli._parser().parse_args(["optimise", str(gear / "gear.toml"), "--out", "x"])
+    model, remarks = read_drive(options)
+    assert model == expected
+    estimated = [name for name, entry in complete(PAGE).items() if entry.estimated]
+    assert all(name in remarks[0] for name in estimated)
+    with pytest.raises(InvalidInput, match="has its own model"):
+        read_drive(cli._parser().parse_args(["optimise", str(gear / "gear.toml"), "--out", "x",
+                                             "--model", "resonant"]))  # fmt: skip
