@@ -83,6 +83,20 @@ def catalogue_page(named: str) -> CataloguePage | None:
     return load_page(named)
 
 
+def exceeded(page: CataloguePage, speed: float, load: float) -> tuple[str, ...]:
+    """Say which printed torque and speed of a page a condition, rad/s and N.m, exceeds."""
+    from pymoo_hdte.drive.catalogue import FIGURES, figure_text
+
+    given = {"torque": abs(load), "speed": speed}
+    above = [
+        f"{figure.name.replace('_', ' ')}, {figure_text(figure.name, figure.value)}"
+        for figure in page.entered
+        if figure.name.split("_")[0] in ("average", "repeated", "momentary", "largest")
+        and given[FIGURES[figure.name]] > figure.value
+    ]
+    return (f"This is above what is printed as the {'; '.join(above)}.",) if above else ()
+
+
 def remarks_on_estimates(named: str) -> tuple[str, ...]:
     """Say which figures of a catalogue page are estimated, and how far they may be off."""
     from pymoo_hdte.drive import complete

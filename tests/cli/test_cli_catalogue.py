@@ -14,7 +14,7 @@ from places import DOCS
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.cli import command_line as cli
 from pymoo_hdte.cli import decision
-from pymoo_hdte.cli.drive_arguments import read_drive
+from pymoo_hdte.cli.drive_arguments import exceeded, read_drive
 from pymoo_hdte.cli.example_records import TRUTH
 from pymoo_hdte.discrepancy import read_drive_model
 from pymoo_hdte.drive import (
@@ -186,3 +186,9 @@ def test_every_command_reads_the_same_drive_from_the_page(gear):
     with pytest.raises(InvalidInput, match="has its own model"):
         read_drive(cli._parser().parse_args(["optimise", str(gear / "gear.toml"), "--out", "x",
                                              "--model", "resonant"]))  # fmt: skip
+
+
+@pytest.mark.parametrize(("load", "words"), [(60.0, 0), (-70.0, 1), (150.0, 2), (200.0, 3)])
+def test_a_load_above_printed_torques_is_said(load, words):
+    said = exceeded(PAGE, 200.0, load)
+    assert " ".join(said).count("N.m") == words
