@@ -186,7 +186,7 @@ class Score:
 
 def score(hypothesis: Linearised) -> Score:
     """Return the marginal likelihood of a hypothesis."""
-    return _Integral(hypothesis).score()
+    return Integral(hypothesis).score()
 
 
 def score_with_outside(hypothesis: Linearised, places: Sequence[Sized]) -> tuple[Score, list[str]]:
@@ -210,7 +210,7 @@ def score_with_outside(hypothesis: Linearised, places: Sequence[Sized]) -> tuple
         Names of the places.
     """
     price = float(np.log(max(len(places), 1)))
-    integral = _Integral(hypothesis)
+    integral = Integral(hypothesis)
     best, taken, remaining = integral.score(), list[Sized](), list(places)
     while remaining and len(taken) < MOST_PLACES:
         gains = integral.gains(remaining)
@@ -221,7 +221,7 @@ def score_with_outside(hypothesis: Linearised, places: Sequence[Sized]) -> tuple
                 return replace(best, ln=best.ln + mean), []
             break
         place = remaining.pop(int(np.argmax(gains)))
-        integral = _Integral(hypothesis.beside(*taken, place))
+        integral = Integral(hypothesis.beside(*taken, place))
         trial = integral.score()
         trial = replace(trial, ln=trial.ln - (len(taken) + 1) * price)
         if taken and trial.ln <= best.ln:
@@ -236,7 +236,7 @@ than noise, which the check of the likeliest explanation sees."""
 
 
 @dataclass(eq=False)
-class _Integral:
+class Integral:
     """The integral over all unknowns of a hypothesis, with the state of its approximation."""
 
     hypothesis: Linearised
