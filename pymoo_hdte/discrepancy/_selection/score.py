@@ -262,7 +262,7 @@ class Integral:
         shares = np.ones(len(residuals)) if hypothesis.shares is None else hypothesis.shares
         self.weights = np.sqrt(shares)
         whole *= self.weights[:, None]
-        self.grams = np.array([whole[rows].T @ whole[rows] for rows in self.rows])
+        self.grams = np.array([(part := whole[rows]).T @ part for rows in self.rows])
         self.counts = np.array([np.sum(shares[rows]) for rows in self.rows])
         self.factors = np.ones(n_channels)
         self._set_priors()
@@ -354,7 +354,7 @@ class Integral:
         by_row = self.factors[self.hypothesis.channels] / self.weights
         left = (self.shift + self.columns @ mean) / by_row
         scaled = self.columns / by_row[:, None]
-        followed = np.einsum("ij,jk,ik->i", scaled, covariance, scaled)
+        followed = np.sum(scaled @ covariance * scaled, axis=1)
         return Score(
             ln,
             {part.name: float(scale) for part, scale in zip(sized, self.scales, strict=True)},
@@ -367,7 +367,7 @@ class Integral:
 
     def _gram(self) -> tuple[Matrix, Vector, float]:
         """Return curvature, slope and constant of the likelihood with the present factors."""
-        gram = np.einsum("cij,c->ij", self.grams, 1.0 / self.factors**2)
+        gram = np.tensordot(1.0 / self.factors**2, self.grams, axes=1)
         return gram[:-1, :-1], -gram[:-1, -1], float(gram[-1, -1])
 
     def _natural(self) -> tuple[Matrix, Vector]:
@@ -507,8 +507,8 @@ class Integral:
             return 0.0
         mean, covariance = self._posterior()
         whole = np.append(mean, 1.0)
-        left = np.einsum("cij,i,j->c", self.grams, whole, whole)
-        followed = np.einsum("cij,ij->c", self.grams[:, :-1, :-1], covariance) / self.factors**2
+        left = self.grams @ whole @ whole
+        followed = np.tensordot(self.grams[:, :-1, :-1], covariance, axes=2) / self.factors**2
         freedom = np.maximum(self.counts - followed, 0.0)
         log = np.log(self.factors)
         # Newton's method in the logarithm: freedom = left / factor^2 - log / spread^2.

@@ -238,9 +238,9 @@ def test_said_probabilities_are_the_shares_that_are_right():
     base = rng.normal(size=(20, 1))
     most, unknowns = 50.0, free(base, [-1.0], [1.0], [0.1])
     empty = [hypothesis(np.zeros(20), unknowns, sized(d, 0.0, most, cut=True)) for d in directions]
-    from pymoo_hdte.discrepancy._selection.score import _Integral
+    from pymoo_hdte.discrepancy._selection.score import Integral
 
-    least = [_Integral(item).least[0] for item in empty]
+    least = [Integral(item).least[0] for item in empty]
     said, right = [], []
     for _ in range(120):
         truth = int(rng.integers(3))
