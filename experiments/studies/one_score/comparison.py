@@ -57,8 +57,7 @@ class Comparison:
 def errors_of(data: Any, fits: Mapping[Hypothesis | None, Fit]) -> LawErrors | BalanceErrors:
     """Return what tells the score about the data of fits, of which that of nothing is the base."""
     if isinstance(data, MeasuredData):
-        best = min(fits.values(), key=lambda fitted: fitted.chi_square)
-        return BalanceErrors(data, fits[None], best)
+        return BalanceErrors(data, fits[None])
     return LawErrors(data, fits[None])
 
 

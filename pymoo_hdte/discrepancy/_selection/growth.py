@@ -33,6 +33,8 @@ from pymoo_hdte.discrepancy._selection.score import (
 from pymoo_hdte.discrepancy._selection.screening import Screened, screen
 from pymoo_hdte.discrepancy._selection.starts import best_fit, other_starts
 
+Vector = NDArray[np.float64]
+
 WINDOW = float(np.log(1000.0))
 """Logarithm of odds within which a set may still matter: all that is further behind changes no
 probability by more than some thousandths (Occam's window of Madigan and Raftery, JASA 89, 1994)."""
@@ -264,7 +266,7 @@ class Growth:
             released, fitted = released_together(self.data, weighed.fit)
             self._fit((*members, *released), fitted.values)
 
-    def _gains(self, integral: Integral, screened: Sequence[Screened], n: int) -> NDArray:
+    def _gains(self, integral: Integral, screened: Sequence[Screened], n: int) -> Vector:
         """Return by how much each effect could raise the probability of a set to first order."""
         parts, owners = list[Sized](), list[int]()
         for number, effect in enumerate(screened):
@@ -350,15 +352,18 @@ _LEAST_SHARE = 1e-3
 def _first_order(effect: Screened, n: int) -> list[Sized]:
     """Return an effect to first order: all its lines as one quantity, or each of its starts."""
     candidate = effect.candidate
-    if not len(effect.signatures):
+    if not effect.signatures.size:
         return []
-    strengths = np.abs([start[0] for start in candidate.starts])
-    most = candidate.parameters[0].upper / np.maximum(strengths, 1e-300)
+    uppers = np.array([parameter.upper for parameter in candidate.parameters])
+    first = [int(np.flatnonzero(start)[0]) for start in candidate.starts]
+    most = [
+        float(uppers[place] / abs(start[place]))
+        for place, start in zip(first, candidate.starts, strict=True)
+    ]
     if candidate.linear:
-        blocks, largest = [effect.signatures[:, :n].T], [float(most[strengths > 0.0].min())]
+        blocks, most = [effect.signatures[:, :n].T], [min(most)]
     else:
         blocks = [signature[:n, None] for signature in effect.signatures]
-        largest = most.tolist()
     return [
         Sized(
             candidate.label,
@@ -368,6 +373,6 @@ def _first_order(effect: Screened, n: int) -> list[Sized]:
             np.zeros(block.shape[1]),
             np.zeros(block.shape[1], dtype=bool),
         )
-        for block, size in zip(blocks, largest, strict=True)
-        if np.isfinite(size) and size > 0.0
+        for block, size in zip(blocks, most, strict=True)
+        if size > 0.0
     ]

@@ -86,7 +86,7 @@ def linearise(
                 Sized(f"form of {candidate.label}", changes, LEAST_ERROR, most, none, none > 0.0)
             )
     of_free = np.column_stack(free) if free else np.empty((n, 0))
-    stated = (np.array(values) for values in zip(*priors, strict=True))
+    stated = np.array(priors).reshape(-1, 5).T
     return Linearised(
         fitted.residuals[:n], channels, Free(of_free, *stated), tuple(sized), noise, shares
     )

@@ -39,5 +39,5 @@ def test_tangents_are_those_of_the_torque(place, number):
 
 def test_a_motion_turns_stops_and_starts():
     speed = np.concatenate([np.ones(10), -np.ones(10), np.zeros(10), np.ones(10)])
-    assert _turns_of(speed, 0.5, 4.0) == [9.5, 19, 30]
+    assert _turns_of(speed, 0.5, 4.0) == [(9.5, -1.0), (19, 1.0), (30, 1.0)]
     assert _turns_of(np.ones(10), 0.5, 4.0) == []

@@ -1,8 +1,8 @@
 """Relative errors of laws in force balances, and what no law of the library holds.
 
 Both are Gaussian processes over the motion at a port: over its position, over its speed, over its
-load and over the time. What a real machine leaves is coloured, so that residuals count as fewer
-independent values than there are.
+load and over the time. What a real machine leaves is coloured: each band of frequencies has a
+noise of its own.
 """
 
 from __future__ import annotations
@@ -32,8 +32,8 @@ TURNS = (1e-3, 1.0)
 """Range of the force around a turn that is not known, as a share of what holds a port at rest."""
 _STILL = 0.02
 """Share of the largest speed below which a port counts as still."""
-_SMOOTHED = 9
-"""Bins over which a spectrum is smoothed, to see how coloured it is."""
+_FEWEST = 20
+"""Fewest coefficients of a band: they know its level to 16 %."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,19 +45,30 @@ class BalanceErrors:
     data : MeasuredData
     base : Fit
         Without effects.
-    best : Fit
-        Of the least residuals: how coloured these are tells how many of them are independent.
     """
 
     data: MeasuredData
     base: Fit
-    best: Fit
     _of_turns: dict[str, Matrix] = field(default_factory=dict)
 
-    @property
+    @cached_property
     def channels(self) -> NDArray[np.int_]:
-        """Balance of each residual."""
-        return self.data._part
+        """Balance and band of frequencies of each residual, of which each has a noise of its own.
+
+        What a real machine leaves is coloured: its level changes from octave to octave. Bands are
+        octaves below the highest frequency of a balance, the lowest ones together.
+        """
+        channels, count = np.zeros(len(self.data.frequency), dtype=int), 0
+        for part in np.unique(self.data._part):
+            rows = np.flatnonzero(self.data._part == part)
+            frequency = self.data.frequency[rows]
+            octave = np.log2(frequency.max() / np.maximum(frequency, 1e-12)).astype(int)
+            sizes = np.bincount(np.minimum(octave, len(rows)))
+            lowest = int(np.flatnonzero(sizes >= _FEWEST)[-1]) if sizes.max() >= _FEWEST else 0
+            octave = np.minimum(octave, lowest)
+            channels[rows] = count + octave
+            count += lowest + 1
+        return channels
 
     @property
     def groups(self) -> list[NDArray[np.int_]]:
@@ -67,20 +78,6 @@ class BalanceErrors:
             for labels in (self.data._record, self.data._part)
             for label in np.unique(labels)
         ]
-
-    @cached_property
-    def shares(self) -> Matrix:
-        """Independent values that each residual counts for, shape (n,)."""
-        shares = np.ones(len(self.channels))
-        window = np.ones(_SMOOTHED) / _SMOOTHED
-        for record in np.unique(self.data._record):
-            for part in np.unique(self.data._part):
-                rows = np.flatnonzero((self.data._record == record) & (self.data._part == part))
-                if len(rows) < _SMOOTHED:
-                    continue
-                power = np.convolve(self.best.residuals[rows] ** 2, window, "same")
-                shares[rows] = np.sum(power) ** 2 / (len(rows) * np.sum(power**2))
-        return shares
 
     def linearised(self, fitted: Fit) -> Linearised:
         """Return a fit as a hypothesis."""
@@ -97,24 +94,31 @@ class BalanceErrors:
             ]
             return np.column_stack(columns)
 
-        hypothesis = linearise(fitted, self.channels, errors, NOISE, self.shares)
-        return hypothesis.beside(*self._turning(fitted))
+        return linearise(fitted, self.channels, errors, NOISE).beside(*self._turning(fitted))
 
     def _turning(self, fitted: Fit) -> Iterator[Sized]:
         """Yield what dry friction may do where a port turns, starts or stops.
 
-        When it does is known to a part of the time over which the motion is smoothed only.
+        When it does is known to a part of the time over which the motion is smoothed only. What
+        smoothing does to a kink of the motion is the same at every turn, but for its size: so a
+        part is common to all turns, and another one is each turn's own.
         """
         for effect in fitted.effects:
             if not (effect.law.breakaway and (columns := self._turns(effect.port)).size):
                 continue
-            none = np.zeros(columns.shape[1])
-            name = f"turns of {effect.name}:{effect.port}"
-            force = effect.law.breakaway * columns
-            yield Sized(name, force, *TURNS, none, none > 0.0)
+            common = columns.reshape(len(columns), -1, 2).sum(axis=1)
+            for name, part in (("all turns", common), ("turns", columns)):
+                none = np.zeros(part.shape[1])
+                force = effect.law.breakaway * part
+                label = f"{name} of {effect.name}:{effect.port}"
+                yield Sized(label, force, *TURNS, none, none > 0.0)
 
     def _turns(self, port: str) -> Matrix:
-        """Return whitened balances of a unit force around each turn of a port, (n, 2 n_turns)."""
+        """Return whitened balances of a unit force around each turn of a port, (n, 2 n_turns).
+
+        First that of a turn that is early or late, then that of one that takes its time; both with
+        the sign of the speed after the turn.
+        """
         if port not in self._of_turns:
             self._of_turns[port] = np.column_stack(
                 [np.empty((len(self.channels), 0)), *self._pulses(port)]
@@ -126,11 +130,12 @@ class BalanceErrors:
         for number, balance in enumerate(self.data.spectra):
             speed, step = balance.ports[port].speed, float(balance.time[1] - balance.time[0])
             smoothed = 1.0 / (balance.cutoff * step)
-            for turn in _turns_of(speed, _STILL * float(np.abs(speed).max()), 2.0 * smoothed):
+            still = _STILL * float(np.abs(speed).max())
+            for turn, after in _turns_of(speed, still, 2.0 * smoothed):
                 place = (np.arange(len(speed)) - turn) / (smoothed / 4.0)
                 for pulse in (np.exp(-0.5 * place**2), place * np.exp(-0.5 * place**2)):
                     column = np.zeros(len(self.channels))
-                    force = balance.of_port(port, pulse) / self.data.deviation[number]
+                    force = balance.of_port(port, after * pulse) / self.data.deviation[number]
                     column[ends[number] : ends[number + 1]] = force[balance.kept]
                     yield column
 
@@ -168,14 +173,9 @@ class BalanceErrors:
                 columns = np.column_stack(
                     [self._column(port.name, over, number) for number in range(1, TERMS + 1)]
                 )
-                columns = columns * np.sqrt(self.shares)[:, None]
                 size = max(float(np.sum(columns**2)), 1e-24)
-                independent = float(np.sum(self.shares))
-                most = np.sqrt(
-                    max(float(self.shares @ self.base.residuals**2), 4.0 * independent) / size
-                )
+                most = np.sqrt(max(self.base.chi_square, 4.0 * len(columns)) / size)
                 none = np.zeros(TERMS)
-                columns = columns / np.sqrt(self.shares)[:, None]
                 yield Sized(
                     f"outside: {over} at {port.name}",
                     columns,
@@ -186,17 +186,19 @@ class BalanceErrors:
                 )
 
 
-def _turns_of(speed: Matrix, still: float, long: float) -> list[float]:
+def _turns_of(speed: Matrix, still: float, long: float) -> list[tuple[float, float]]:
     """Return the rows, perhaps between two, at which a motion turns, stops or starts.
 
-    A rest of more than ``long`` rows has two of them, its end and its beginning.
+    Each with the sign of the speed after it, or before a rest. A rest of more than ``long`` rows
+    has two of them, its end and its beginning.
     """
-    turns, moving = list[float](), np.flatnonzero(np.abs(speed) >= still)
+    turns, moving = list[tuple[float, float]](), np.flatnonzero(np.abs(speed) >= still)
     for before, after in pairwise(moving.tolist()):
+        signs = float(np.sign(speed[before])), float(np.sign(speed[after]))
         if after - before > long:
-            turns += [before, after]
+            turns += [(before, -signs[0]), (after, signs[1])]
         elif speed[before] * speed[after] < 0.0:
-            turns.append((before + after) / 2.0)
+            turns.append(((before + after) / 2.0, signs[1]))
     return turns
 
 
