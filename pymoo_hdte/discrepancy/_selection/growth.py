@@ -22,8 +22,9 @@ from pymoo_hdte.discrepancy._selection.decision import Decision, Explanation, de
 from pymoo_hdte.discrepancy._selection.fitted_sets import may_be_together
 from pymoo_hdte.discrepancy._selection.fitting import Evidence, Fit, fit
 from pymoo_hdte.discrepancy._selection.hypothesis import Hypothesis, hypothesis_of, label_of
-from pymoo_hdte.discrepancy._selection.released import released_together
+from pymoo_hdte.discrepancy._selection.released import gain_of_released, released_together
 from pymoo_hdte.discrepancy._selection.score import (
+    VISIBLE,
     Integral,
     Linearised,
     Score,
@@ -42,6 +43,9 @@ MOST_MEMBERS = 3
 """Most effects of a set; values out of tolerance count as one."""
 WIDTH = 8
 """Most extensions of a set that are fitted, the likeliest to first order."""
+TRUSTED = 2.0
+"""Factor by which an effect may remove more than it does to first order. Of the fits of single
+effects on 25 campaigns none gained more."""
 OF_ONE_NAME = 2
 """Most of them that have one name."""
 MOST_OUTSIDE = 6
@@ -251,6 +255,10 @@ class Growth:
                 break
             if taken[effect.candidate.name] == OF_ONE_NAME:
                 continue
+            prior = self._prior((effect.candidate,))
+            most = TRUSTED * max(gains[place] - prior, 0.0) + prior
+            if weighed.weight + most < self.ranked[0].weight - WINDOW:
+                break
             taken[effect.candidate.name] += 1
             self._fit((*members, effect.candidate), np.append(weighed.fit.values, effect.start))
 
@@ -262,7 +270,9 @@ class Growth:
         for candidate in bounded:
             if candidate.releases not in already:
                 self._fit((*members, candidate), weighed.fit.values)
-        if not already and len(self.data.out_of_tolerance(weighed.fit.at_bounds, True)) > 1:
+        together = self.data.out_of_tolerance(weighed.fit.at_bounds, True)
+        hopeful = len(together) > 1 and not already
+        if hopeful and gain_of_released(weighed.fit, together) > VISIBLE:
             released, fitted = released_together(self.data, weighed.fit)
             self._fit((*members, *released), fitted.values)
 
@@ -345,10 +355,6 @@ def _size(members: Sequence[Candidate]) -> int:
     return len(effects) + any(member.releases is not None for member in members)
 
 
-_LEAST_SHARE = 1e-3
-"""Least size of a further effect, as a share of its largest, to first order."""
-
-
 def _first_order(effect: Screened, n: int) -> list[Sized]:
     """Return an effect to first order: all its lines as one quantity, or each of its starts."""
     candidate = effect.candidate
@@ -368,10 +374,11 @@ def _first_order(effect: Screened, n: int) -> list[Sized]:
         Sized(
             candidate.label,
             block,
-            _LEAST_SHARE * size,
+            0.0,
             size,
             np.zeros(block.shape[1]),
             np.zeros(block.shape[1], dtype=bool),
+            True,
         )
         for block, size in zip(blocks, most, strict=True)
         if size > 0.0

@@ -480,7 +480,10 @@ class Integral:
         self.corrections[number] = whole - largest
 
     def gains(self, places: Sequence[Sized]) -> Vector:
-        """Return by how much each further quantity alone would raise the logarithm, (n_places,)."""
+        """Return by how much each further quantity alone would raise the logarithm, (n_places,).
+
+        To first order; minus infinity for one that would be invisible at its largest scale.
+        """
         mean, covariance = self._posterior()
         by_row = self.factors[self.hypothesis.channels] / self.weights
         scaled = self.columns / by_row[:, None]
@@ -495,9 +498,18 @@ class Integral:
             curvature = columns.T @ columns - across.T @ covariance @ across
             along = -columns.T @ left
             values, vectors = np.linalg.eigh(curvature)
-            grid = np.linspace(np.log(part.least), np.log(part.most), _GRID)
+            values = np.maximum(values, 0.0)
+            least = part.least
+            if part.cut:
+                largest = float(values.max(initial=0.0))
+                least = max(least, np.sqrt(VISIBLE / largest) if largest > 0.0 else np.inf)
+            if least >= part.most:
+                gains[number] = -np.inf
+                continue
+            grid = np.linspace(np.log(least), np.log(part.most), _GRID)
+            cut, one_sided = least if part.cut else 0.0, bool(part.positive.all())
             projected = (vectors.T @ along) ** 2
-            gains[number] = _mean_over_scales(grid, np.maximum(values, 0.0), projected)[0]
+            gains[number] = _mean_over_scales(grid, values, projected, cut, one_sided)[0]
         return gains
 
     def _set_factors(self) -> float:
