@@ -482,35 +482,48 @@ class Integral:
     def gains(self, places: Sequence[Sized]) -> Vector:
         """Return by how much each further quantity alone would raise the logarithm, (n_places,).
 
-        To first order; minus infinity for one that would be invisible at its largest scale.
+        To first order, with the noise that it leaves; minus infinity for one that would be
+        invisible at its largest scale.
         """
         mean, covariance = self._posterior()
         by_row = self.factors[self.hypothesis.channels] / self.weights
         scaled = self.columns / by_row[:, None]
         left = (self.shift + self.columns @ mean) / by_row
-        gains = np.empty(len(places))
+        gains = np.full(len(places), -np.inf)
         every = np.column_stack([part.columns for part in places]) / by_row[:, None]
-        with_unknowns = scaled.T @ every
+        beyond = every - scaled @ (covariance @ (scaled.T @ every))
         ends = np.cumsum([0, *(part.columns.shape[1] for part in places)])
         for number, part in enumerate(places):
             place = slice(ends[number], ends[number + 1])
-            columns, across = every[:, place], with_unknowns[:, place]
-            curvature = columns.T @ columns - across.T @ covariance @ across
-            along = -columns.T @ left
-            values, vectors = np.linalg.eigh(curvature)
+            along = -every[:, place].T @ left
+            values, vectors = np.linalg.eigh(every[:, place].T @ beyond[:, place])
             values = np.maximum(values, 0.0)
             least = part.least
             if part.cut:
                 largest = float(values.max(initial=0.0))
                 least = max(least, np.sqrt(VISIBLE / largest) if largest > 0.0 else np.inf)
             if least >= part.most:
-                gains[number] = -np.inf
                 continue
             grid = np.linspace(np.log(least), np.log(part.most), _GRID)
             cut, one_sided = least if part.cut else 0.0, bool(part.positive.all())
-            projected = (vectors.T @ along) ** 2
-            gains[number] = _mean_over_scales(grid, values, projected, cut, one_sided)[0]
+            projected = vectors.T @ along
+            gains[number], _, at = _mean_over_scales(grid, values, projected**2, cut, one_sided)
+            sizes = vectors @ (projected / (values + np.exp(-2.0 * at)))
+            gains[number] += self._gain_of_noise(left + beyond[:, place] @ sizes)
         return gains
+
+    def _gain_of_noise(self, left: Vector) -> float:
+        """Return by how much factors that fit residuals (n,), in units of them, are likelier."""
+        spread, channels = self.hypothesis.noise, self.hypothesis.channels
+        if spread <= 0.0:
+            return 0.0
+        before = np.log(self.factors)
+        power = np.bincount(channels, left**2, len(before))
+        after = before + _log_factor(power, self.counts, before, spread)
+        of_prior = (before**2 - after**2) / (2.0 * spread**2)
+        ratio = after - before
+        of_data = -self.counts * ratio + 0.5 * power * (1.0 - np.exp(-2.0 * ratio))
+        return float(np.sum(of_data + of_prior))
 
     def _set_factors(self) -> float:
         """Move the factors of the noise to their mode; return the logarithm of their integral."""
@@ -523,16 +536,26 @@ class Integral:
         followed = np.tensordot(self.grams[:, :-1, :-1], covariance, axes=2) / self.factors**2
         freedom = np.maximum(self.counts - followed, 0.0)
         log = np.log(self.factors)
-        # Newton's method in the logarithm: freedom = left / factor^2 - log / spread^2.
-        for _ in range(20):
-            scaled = left * np.exp(-2.0 * log)
-            step = (scaled - freedom - log / spread**2) / (2.0 * scaled + 1.0 / spread**2)
-            log = log + np.clip(step, -1.0, 1.0)
-            if np.max(np.abs(step)) < 1e-6:
-                break
+        log = log + _log_factor(left / self.factors**2, freedom, log, spread)
         self.factors = np.exp(log)
         curvature = 2.0 * freedom + 1.0 / spread**2
         return float(np.sum(-0.5 * (log / spread) ** 2 - np.log(spread) - 0.5 * np.log(curvature)))
+
+
+def _log_factor(power: Vector, freedom: Vector, log: Vector, spread: float) -> Vector:
+    """Return by how much logarithms of factors have to change to be most probable, (n_channels,).
+
+    For residuals of a ``power`` in units of the present factors, whose logarithms are ``log``. By
+    Newton's method: freedom = power / ratio^2 - log / spread^2.
+    """
+    step, change = np.zeros_like(log), np.zeros_like(log)
+    for _ in range(20):
+        scaled = power * np.exp(-2.0 * change)
+        step = (scaled - freedom - (log + change) / spread**2) / (2.0 * scaled + 1.0 / spread**2)
+        change = change + np.clip(step, -1.0, 1.0)
+        if np.max(np.abs(step), initial=0.0) < 1e-6:
+            break
+    return change
 
 
 def _mean_over_scales(

@@ -14,6 +14,7 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import uniform_filter1d
 
 from pymoo_hdte.discrepancy._evidence.force_balances.evidence import MeasuredData
 from pymoo_hdte.discrepancy._selection.candidate import Candidate
@@ -32,6 +33,8 @@ TURNS = (1e-3, 1.0)
 """Range of the force around a turn that is not known, as a share of what holds a port at rest."""
 _STILL = 0.02
 """Share of the largest speed below which a port counts as still."""
+_SMOOTHED = 9
+"""Coefficients over which a spectrum is smoothed, to see how coloured it is."""
 _FEWEST = 20
 """Fewest coefficients of a band: they know its level to 16 %."""
 
@@ -45,10 +48,14 @@ class BalanceErrors:
     data : MeasuredData
     base : Fit
         Without effects.
+    best : Fit or None
+        Of the least residuals: where these are lines, as of a motion that repeats, fewer of them
+        are independent.
     """
 
     data: MeasuredData
     base: Fit
+    best: Fit | None = None
     _of_turns: dict[str, Matrix] = field(default_factory=dict)
 
     @cached_property
@@ -79,6 +86,25 @@ class BalanceErrors:
             for label in np.unique(labels)
         ]
 
+    @cached_property
+    def shares(self) -> Matrix:
+        """Independent values that each residual counts for, shape (n,).
+
+        By the moments of the residuals' power in each record and band (Satterthwaite, Biometrics
+        Bulletin 2, 1946).
+        """
+        shares = np.ones(len(self.channels))
+        if self.best is None:
+            return shares
+        power = self.best.residuals**2
+        for record in np.unique(self.data._record):
+            for channel in np.unique(self.channels):
+                rows = np.flatnonzero((self.data._record == record) & (self.channels == channel))
+                if len(rows) >= _SMOOTHED:
+                    smooth = uniform_filter1d(power[rows], _SMOOTHED, mode="reflect")
+                    shares[rows] = smooth.mean() ** 2 / np.mean(smooth**2)
+        return shares
+
     def linearised(self, fitted: Fit) -> Linearised:
         """Return a fit as a hypothesis."""
 
@@ -94,7 +120,7 @@ class BalanceErrors:
             ]
             return np.column_stack(columns)
 
-        return linearise(fitted, self.channels, errors, NOISE).beside(*self._turning(fitted))
+        return linearise(fitted, self.channels, errors, NOISE, self.shares).beside(*self._turning(fitted))
 
     def _turning(self, fitted: Fit) -> Iterator[Sized]:
         """Yield what dry friction may do where a port turns, starts or stops.
@@ -173,8 +199,9 @@ class BalanceErrors:
                 columns = np.column_stack(
                     [self._column(port.name, over, number) for number in range(1, TERMS + 1)]
                 )
-                size = max(float(np.sum(columns**2)), 1e-24)
-                most = np.sqrt(max(self.base.chi_square, 4.0 * len(columns)) / size)
+                size = max(float(self.shares @ np.sum(columns**2, axis=1)), 1e-24)
+                misfit = float(self.shares @ self.base.residuals**2)
+                most = np.sqrt(max(misfit, 4.0 * float(self.shares.sum())) / size)
                 none = np.zeros(TERMS)
                 yield Sized(
                     f"outside: {over} at {port.name}",
