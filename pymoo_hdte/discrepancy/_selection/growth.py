@@ -285,7 +285,7 @@ class Growth:
                 owners.append(number)
         gains = np.full(len(screened), -np.inf)
         if parts:
-            np.maximum.at(gains, owners, integral.gains(parts))
+            np.maximum.at(gains, owners, integral.gains(parts, renewed=True))
         priors = [self._prior((effect.candidate,)) for effect in screened]
         return gains + np.array(priors)
 

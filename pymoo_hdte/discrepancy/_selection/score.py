@@ -479,11 +479,11 @@ class Integral:
         self.scales[number] = np.exp(at)
         self.corrections[number] = whole - largest
 
-    def gains(self, places: Sequence[Sized]) -> Vector:
+    def gains(self, places: Sequence[Sized], renewed: bool = False) -> Vector:
         """Return by how much each further quantity alone would raise the logarithm, (n_places,).
 
-        To first order, with the noise that it leaves; minus infinity for one that would be
-        invisible at its largest scale.
+        To first order; minus infinity for one that would be invisible at its largest scale. The
+        noise stays, or is ``renewed`` as it would be beside the most probable sizes.
         """
         mean, covariance = self._posterior()
         by_row = self.factors[self.hypothesis.channels] / self.weights
@@ -508,22 +508,30 @@ class Integral:
             cut, one_sided = least if part.cut else 0.0, bool(part.positive.all())
             projected = vectors.T @ along
             gains[number], _, at = _mean_over_scales(grid, values, projected**2, cut, one_sided)
-            sizes = vectors @ (projected / (values + np.exp(-2.0 * at)))
-            gains[number] += self._gain_of_noise(left + beyond[:, place] @ sizes)
+            if renewed:
+                sizes = vectors @ (projected / (values + np.exp(-2.0 * at)))
+                after = left + beyond[:, place] @ sizes
+                gains[number] += self._gain_of_noise(after, covariance)
         return gains
 
-    def _gain_of_noise(self, left: Vector) -> float:
+    def _gain_of_noise(self, left: Vector, covariance: Matrix) -> float:
         """Return by how much factors that fit residuals (n,), in units of them, are likelier."""
         spread, channels = self.hypothesis.noise, self.hypothesis.channels
         if spread <= 0.0:
             return 0.0
+        freedom = self._freedom(covariance)
         before = np.log(self.factors)
         power = np.bincount(channels, left**2, len(before))
-        after = before + _log_factor(power, self.counts, before, spread)
+        after = before + _log_factor(power, freedom, before, spread)
         of_prior = (before**2 - after**2) / (2.0 * spread**2)
         ratio = after - before
-        of_data = -self.counts * ratio + 0.5 * power * (1.0 - np.exp(-2.0 * ratio))
+        of_data = -freedom * ratio + 0.5 * power * (1.0 - np.exp(-2.0 * ratio))
         return float(np.sum(of_data + of_prior))
+
+    def _freedom(self, covariance: Matrix) -> Vector:
+        """Return the number of values of each channel that no unknown follows, (n_channels,)."""
+        followed = np.tensordot(self.grams[:, :-1, :-1], covariance, axes=2) / self.factors**2
+        return np.asarray(np.maximum(self.counts - followed, 0.0))
 
     def _set_factors(self) -> float:
         """Move the factors of the noise to their mode; return the logarithm of their integral."""
@@ -533,8 +541,7 @@ class Integral:
         mean, covariance = self._posterior()
         whole = np.append(mean, 1.0)
         left = self.grams @ whole @ whole
-        followed = np.tensordot(self.grams[:, :-1, :-1], covariance, axes=2) / self.factors**2
-        freedom = np.maximum(self.counts - followed, 0.0)
+        freedom = self._freedom(covariance)
         log = np.log(self.factors)
         log = log + _log_factor(left / self.factors**2, freedom, log, spread)
         self.factors = np.exp(log)
