@@ -38,6 +38,9 @@ def test_tangents_are_those_of_the_torque(place, number):
 
 
 def test_a_motion_turns_stops_and_starts():
-    speed = np.concatenate([np.ones(10), -np.ones(10), np.zeros(10), np.ones(10)])
-    assert _turns_of(speed, 0.5, 4.0) == [(9.5, -1.0), (19, 1.0), (30, 1.0)]
+    """At once, or anywhere in a rest."""
+    speed = np.concatenate([np.ones(10), -np.ones(10), np.zeros(11), np.ones(10)])
+    (turn, *rest) = _turns_of(speed, 0.5, 4.0)
+    assert turn == (9.5, -1.0)
+    assert rest == [(20.5, 1.0), (23.5, 1.0), (26.5, 1.0), (29.5, 1.0)]
     assert _turns_of(np.ones(10), 0.5, 4.0) == []

@@ -24,6 +24,7 @@ from pymoo_hdte.discrepancy._selection.process import TERMS, sine_of
 from pymoo_hdte.discrepancy._selection.score import Linearised, Sized
 from pymoo_hdte.effects.law import Law
 from pymoo_hdte.mechanism.port_motion import PortMotion, law_force
+from pymoo_hdte.mechanism.rests import STILL, speed_noise
 
 Matrix = NDArray[np.float64]
 
@@ -31,8 +32,6 @@ NOISE = float(np.log(10.0))
 """Standard deviation of the logarithm of the noise, which nobody states of a balance."""
 TURNS = (1e-3, 1.0)
 """Range of the force around a turn that is not known, as a share of what holds a port at rest."""
-_STILL = 0.02
-"""Share of the largest speed below which a port counts as still."""
 _SMOOTHED = 9
 """Coefficients over which a spectrum is smoothed, to see how coloured it is."""
 _FEWEST = 20
@@ -132,12 +131,13 @@ class BalanceErrors:
         for effect in fitted.effects:
             if not (effect.law.breakaway and (columns := self._turns(effect.port)).size):
                 continue
-            common = columns.reshape(len(columns), -1, 2).sum(axis=1)
-            for name, part in (("all turns", common), ("turns", columns)):
+            label = f"{effect.name}:{effect.port}"
+            for name, part in (
+                (f"all turns of {label}", columns.reshape(len(columns), -1, 2).sum(axis=1)),
+                (f"turns of {label}", columns),
+            ):
                 none = np.zeros(part.shape[1])
-                force = effect.law.breakaway * part
-                label = f"{name} of {effect.name}:{effect.port}"
-                yield Sized(label, force, *TURNS, none, none > 0.0)
+                yield Sized(name, effect.law.breakaway * part, *TURNS, none, none > 0.0)
 
     def _turns(self, port: str) -> Matrix:
         """Return whitened balances of a unit force around each turn of a port, (n, 2 n_turns).
@@ -156,8 +156,8 @@ class BalanceErrors:
         for number, balance in enumerate(self.data.spectra):
             speed, step = balance.ports[port].speed, float(balance.time[1] - balance.time[0])
             smoothed = 1.0 / (balance.cutoff * step)
-            still = _STILL * float(np.abs(speed).max())
-            for turn, after in _turns_of(speed, still, 2.0 * smoothed):
+            still = speed_noise(balance.mechanism.port(port), balance.record, balance.cutoff)
+            for turn, after in _turns_of(speed, STILL * still, smoothed / 2.0):
                 place = (np.arange(len(speed)) - turn) / (smoothed / 4.0)
                 for pulse in (np.exp(-0.5 * place**2), place * np.exp(-0.5 * place**2)):
                     column = np.zeros(len(self.channels))
@@ -213,19 +213,18 @@ class BalanceErrors:
                 )
 
 
-def _turns_of(speed: Matrix, still: float, long: float) -> list[tuple[float, float]]:
+def _turns_of(speed: Matrix, still: float, apart: float) -> list[tuple[float, float]]:
     """Return the rows, perhaps between two, at which a motion turns, stops or starts.
 
-    Each with the sign of the speed after it, or before a rest. A rest of more than ``long`` rows
-    has two of them, its end and its beginning.
+    Each with the sign of the speed after it. Where a motion is ``still`` for long, it may do so
+    anywhere: at rows that are about so far ``apart``.
     """
     turns, moving = list[tuple[float, float]](), np.flatnonzero(np.abs(speed) >= still)
     for before, after in pairwise(moving.tolist()):
-        signs = float(np.sign(speed[before])), float(np.sign(speed[after]))
-        if after - before > long:
-            turns += [(before, -signs[0]), (after, signs[1])]
-        elif speed[before] * speed[after] < 0.0:
-            turns.append(((before + after) / 2.0, signs[1]))
+        if after - before > apart or speed[before] * speed[after] < 0.0:
+            count = 1 + int((after - before) / apart)
+            places = before + (after - before) * (np.arange(count) + 0.5) / count
+            turns += [(place, float(np.sign(speed[after]))) for place in places.tolist()]
     return turns
 
 
