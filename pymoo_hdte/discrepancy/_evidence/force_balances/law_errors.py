@@ -158,6 +158,8 @@ class BalanceErrors:
             smoothed = 1.0 / (balance.cutoff * step)
             still = speed_noise(balance.mechanism.port(port), balance.record, balance.cutoff)
             for turn, after in _turns_of(speed, STILL * still, smoothed / 2.0):
+                if not balance.moving.weight[int(turn)]:
+                    continue
                 place = (np.arange(len(speed)) - turn) / (smoothed / 4.0)
                 for pulse in (np.exp(-0.5 * place**2), place * np.exp(-0.5 * place**2)):
                     column = np.zeros(len(self.channels))
