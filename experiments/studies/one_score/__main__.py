@@ -1,7 +1,7 @@
-"""``python -m experiments.studies.one_score CAMPAIGNS TRUTH.json --out TABLE.csv [CASE ...]``.
+"""Grow sets by the score beside a search by the rules: ``python -m experiments.studies.one_score``.
 
-Analyse the campaigns of a folder as ever, score the sets that were fitted, and write a table of
-both answers beside the truth. TRUTH.json maps the name of a campaign to its ``effects``.
+Takes a folder of campaigns, or of logs of mechanisms, with the truth of each in a file of JSON, and
+writes a table in which both stand beside each other.
 """
 
 from __future__ import annotations
@@ -16,7 +16,8 @@ from typing import Any
 from experiments.studies.one_score.comparison import compare
 from experiments.studies.one_score.table import COLUMNS, row_of
 from pymoo_hdte.discrepancy import analyse, read_campaign, read_rig
-from pymoo_hdte.discrepancy._verdicts import drive, mechanism_choice, rattling
+from pymoo_hdte.discrepancy._selection.fitting import fit
+from pymoo_hdte.discrepancy._verdicts import mechanism, rattling
 
 
 def main() -> None:
@@ -26,35 +27,38 @@ def main() -> None:
     parser.add_argument("truth", type=Path)
     parser.add_argument("cases", nargs="*")
     parser.add_argument("--out", type=Path, required=True)
-    parser.add_argument("--held-out", action="store_true", help="count held-out records as well")
     options = parser.parse_args()
     truth = json.loads(options.truth.read_text(encoding="utf-8"))
     with options.out.open("w", encoding="utf-8", newline="") as file:
         table = csv.DictWriter(file, COLUMNS, lineterminator="\n")
         table.writeheader()
         for case in options.cases or sorted(truth):
-            table.writerow(_row(case, options.campaigns / case, truth[case], options.held_out))
+            table.writerow(_row(case, options.campaigns / case, truth[case]))
             file.flush()
 
 
-def _row(case: str, folder: Path, truth: dict[str, Any], held_out: bool) -> dict[str, Any]:
-    searched: list[Any] = []
-    for module in (drive, rattling, mechanism_choice):
-        # The candidates of a search are in no finding.
-        module.judge = _noting(module.judge, searched)  # type: ignore[attr-defined]
+def _row(case: str, folder: Path, truth: dict[str, Any]) -> dict[str, Any]:
+    asked = list[tuple[Any, ...]]()
+    rattling.judge = _noting(rattling.judge, asked)  # type: ignore[attr-defined]
+    mechanism.judged = _noting(mechanism.judged, asked)  # type: ignore[attr-defined]
     campaign = (folder / "campaign.toml").is_file()
     measured = read_campaign(folder) if campaign else read_rig(folder)
     started = time.process_time()
     finding: Any = analyse(measured).finding
     seconds = time.process_time() - started
-    found = compare(finding.data, finding.verdict, searched, held_out)
+    # What was asked first: before nuisances of the bench joined the base.
+    first, second, candidates, *best = asked[0]
+    if campaign:
+        found = compare(first, second, candidates)
+    else:
+        found = compare(second, fit(second), candidates, best[0] and best[0].fit)
     return row_of(case, truth, finding.verdict, found, seconds)
 
 
-def _noting(judge: Any, searched: list[Any]) -> Any:
-    def noted(data: Any, base: Any, candidates: Any, *further: Any, **named: Any) -> Any:
-        searched[:] = candidates
-        return judge(data, base, candidates, *further, **named)
+def _noting(judge: Any, asked: list[tuple[Any, ...]]) -> Any:
+    def noted(*arguments: Any, **named: Any) -> Any:
+        asked.append(arguments)
+        return judge(*arguments, **named)
 
     return noted
 

@@ -95,9 +95,9 @@ def row_of(
     """Return a row of the table."""
     today, now = said_today(verdict), said_by(found.decision)
     judge = answer if "effects" in truth else answer_of_log
-    top = found.scored[0]
+    top = found.sets[0]
     other = next(
-        (entry for entry in found.scored[1:] if entry.explanation.names != top.explanation.names),
+        (entry for entry in found.sets[1:] if entry.explanation.names != top.explanation.names),
         None,
     )
     return dict(
@@ -115,9 +115,9 @@ def row_of(
                 f"{found.decision.probability:.3f}",
                 f"{found.decision.outside:.3f}",
                 other.explanation.label if other else "-",
-                f"{_ln(other) - _ln(top):.1f}" if other else "-",
+                f"{other.weight - top.weight:.1f}" if other else "-",
                 without_truth(truth, found),
-                len(found.scored),
+                sum(not entry.outside for entry in found.sets),
                 f"{seconds:.1f}",
                 f"{found.seconds:.1f}",
             ),
@@ -137,10 +137,10 @@ def without_truth(truth: Mapping[str, Any], found: Comparison) -> str:
     wanted += [truth["name_if_listed"]] if "name_if_listed" in truth else []
     rest = [
         entry
-        for entry in found.scored
+        for entry in found.sets
         if not any(name == missing for missing in wanted for name, _ in entry.explanation.names)
     ]
-    if not wanted or not rest or len(rest) == len(found.scored):
+    if not wanted or not rest or len(rest) == len(found.sets):
         return "-"
     decision = decide([entry.explanation for entry in rest], [entry.prior for entry in rest])
     status, members = said_by(decision)
@@ -153,10 +153,6 @@ def _truth(truth: Mapping[str, Any]) -> str:
     if "effects" in truth:
         return "+".join(truth["effects"]) or "-"
     return "+".join(truth.get("all", [])) or "|".join(truth.get("any", [])) or "not known"
-
-
-def _ln(entry: Any) -> float:
-    return float(entry.explanation.ln + entry.prior)
 
 
 def _words(members: Sequence[frozenset[Name]]) -> str:

@@ -119,7 +119,9 @@ class BalanceErrors:
             ]
             return np.column_stack(columns)
 
-        return linearise(fitted, self.channels, errors, NOISE, self.shares).beside(*self._turning(fitted))
+        return linearise(fitted, self.channels, errors, NOISE, self.shares).beside(
+            *self._turning(fitted)
+        )
 
     def _turning(self, fitted: Fit) -> Iterator[Sized]:
         """Yield what dry friction may do where a port turns, starts or stops.
