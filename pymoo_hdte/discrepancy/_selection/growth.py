@@ -18,7 +18,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pymoo_hdte.discrepancy._selection.candidate import Candidate
-from pymoo_hdte.discrepancy._selection.decision import Decision, Explanation, decide, log_prior
+from pymoo_hdte.discrepancy._selection.decision import (
+    SURE,
+    Decision,
+    Explanation,
+    decide,
+    log_prior,
+)
 from pymoo_hdte.discrepancy._selection.fitted_sets import may_be_together
 from pymoo_hdte.discrepancy._selection.fitting import Evidence, Fit, fit
 from pymoo_hdte.discrepancy._selection.hypothesis import Hypothesis, hypothesis_of, label_of
@@ -41,6 +47,9 @@ WINDOW = float(np.log(1000.0))
 probability by more than some thousandths (Occam's window of Madigan and Raftery, JASA 89, 1994)."""
 MOST_MEMBERS = 3
 """Most effects of a set; values out of tolerance count as one."""
+MOST_FIRSTS = 4
+"""Most sets that are extended although another one is likelier, if that one lacks something: two
+effects may be missing of which each alone explains less than a third one."""
 WIDTH = 8
 """Most extensions of a set that are fitted, the likeliest to first order."""
 TRUSTED = 3.0
@@ -158,6 +167,16 @@ class Growth:
     def grow(self) -> None:
         """Extend, exchange and prune sets until none could become as likely as the best."""
         self._weigh(self.base)
+        self._settle()
+        for _ in range(MOST_FIRSTS):
+            further = [weighed for weighed in self.ranked if self._may_be_extended(weighed)]
+            if not further or not self._lacks_something(self.ranked[0]):
+                break
+            self._extend(further[0])
+            self._settle()
+
+    def _settle(self) -> None:
+        """Extend the likeliest sets, and exchange members of the best one, until it stays best."""
         varied = frozenset[str]()
         while True:
             while (weighed := self._open()) is not None:
@@ -169,6 +188,11 @@ class Growth:
             for member in best.candidates:
                 if (without := self._without(best, member)) is not None:
                     self._extend(without, member)
+
+    def _lacks_something(self, weighed: Weighed) -> bool:
+        """Tell whether it is not sure that a set leaves nothing to something outside."""
+        odds = self._with_outside(weighed).weight - weighed.weight
+        return odds > np.log((1.0 - SURE) / SURE)
 
     def decide(self) -> tuple[Decision, list[Weighed]]:
         """Return what is said, and all sets with and without something outside of the library."""
@@ -195,11 +219,15 @@ class Growth:
                 if label not in self._complete:
                     self._complete_fit(weighed)
                     break
-                if label not in self._extended and _size(weighed.candidates) < MOST_MEMBERS:
+                if self._may_be_extended(weighed):
                     return weighed
             else:
                 return None
         return None
+
+    def _may_be_extended(self, weighed: Weighed) -> bool:
+        label = label_of(weighed.candidates)
+        return label not in self._extended and _size(weighed.candidates) < MOST_MEMBERS
 
     def _complete_fit(self, weighed: Weighed) -> None:
         """Fit a set to the end, from other starts as well."""
@@ -227,7 +255,7 @@ class Growth:
             if all(candidate.goes_with(member) for member in members)
             and (
                 not candidate.instead_of
-                or (instead_of is not None and candidate.stands_for(instead_of, any_curve=False))
+                or (instead_of is not None and candidate.replaces(instead_of))
             )
         ]
         integral = Integral(weighed.linearised)
