@@ -39,8 +39,8 @@ def main() -> None:
 
 def _row(case: str, folder: Path, truth: dict[str, Any]) -> dict[str, Any]:
     asked = list[tuple[Any, ...]]()
-    rattling.judge = _noting(rattling.judge, asked)  # type: ignore[attr-defined]
-    mechanism.judged = _noting(mechanism.judged, asked)  # type: ignore[attr-defined]
+    rattling.judge = _noting(rattling.judge, asked)
+    mechanism.judged = _noting(mechanism.judged, asked)
     campaign = (folder / "campaign.toml").is_file()
     measured = read_campaign(folder) if campaign else read_rig(folder)
     started = time.process_time()

@@ -521,7 +521,8 @@ class Integral:
             return 0.0
         freedom = self._freedom(covariance)
         before = np.log(self.factors)
-        power = np.bincount(channels, left**2, len(before))
+        power = np.zeros_like(before)
+        np.add.at(power, channels, left**2)
         after = before + _log_factor(power, freedom, before, spread)
         of_prior = (before**2 - after**2) / (2.0 * spread**2)
         ratio = after - before
