@@ -8,11 +8,12 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pymoo_hdte.checks import real_number
 from pymoo_hdte.effects.effect import Effect, register
 from pymoo_hdte.effects.guess import Guess, Sizes, guess_of_lines
-from pymoo_hdte.effects.law import Periodic, PortState, Response
+from pymoo_hdte.effects.law import Periodic, PortState, Response, Values
 from pymoo_hdte.effects.portable import Formula
 from pymoo_hdte.effects.unknowns import Family, is_among, is_whole
 
@@ -32,10 +33,9 @@ class PeriodicTorque(Periodic):
         """Return torque and tangents; negative, as the driving torque does not oppose."""
         return Response(-self.amplitude * self.cosine(state))
 
-    @property
-    def driving(self) -> complex:
-        """Its phasor, N.m: the torque is that of motor or brake."""
-        return complex(self.amplitude * np.exp(1j * self.phase))
+    def line(self, load: Values) -> NDArray[np.complex128]:
+        """Return its phasors, N.m; negative, as the driving torque does not oppose."""
+        return np.full(np.shape(load), -self.amplitude * np.exp(1j * self.phase))
 
     @property
     def formula(self) -> Formula:
@@ -51,11 +51,6 @@ class CouplingTorque(PeriodicTorque):
     """
 
     drives: ClassVar[bool] = False
-
-    @property
-    def driving(self) -> complex:
-        """Zero: it is no torque of the motor."""
-        return 0.0
 
 
 @dataclass(frozen=True)
@@ -92,6 +87,10 @@ class BrakeRipple(Periodic):
         """
         load = state.known_load("brake_ripple", "load")
         return Response(self.share * load * self.cosine(state))
+
+    def line(self, load: Values) -> NDArray[np.complex128]:
+        """Return its phasors, N.m."""
+        return np.asarray(self.share * np.exp(1j * self.phase) * load)
 
     @property
     def formula(self) -> Formula:

@@ -8,13 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pymoo_hdte.discrepancy._evidence.order_lines.bench import IDEAL, Bench
+from pymoo_hdte.discrepancy._evidence.order_lines.parameters import READING
 from pymoo_hdte.discrepancy._evidence.order_lines.steady_states import (
     PREDICTION,
     Effort,
@@ -30,9 +31,9 @@ from pymoo_hdte.drive import (
     SteadyMotion,
 )
 from pymoo_hdte.drive._effects import Session
-from pymoo_hdte.drive._solve.lead_response import LeadResponse, lead_response
+from pymoo_hdte.drive._solve.lead_response import LeadResponse, lead_response, torque_lines
 from pymoo_hdte.drive._solve.order_spectrum import sine_phasor
-from pymoo_hdte.effects.law import Values
+from pymoo_hdte.effects.law import Law, Values
 
 LOOP = ("loop_gain", "loop_lag")
 """Unknowns of the speed loop: the share by which it is stronger than stated, and its lag in s."""
@@ -145,17 +146,40 @@ def predict(
     bench : Bench
         Nuisances, whose unknowns are among the values.
     """
-    parts = []
-    groups = bench.groups(believed.effects, values)
-    for rows, known in groups:
-        group = {name: column[rows] for name, column in values.items()}
-        present = (*known, *effects)
-        parts.append(
-            _predict_group(believed, rig, conditions, orders, group, present, start, effort)
+    moves = partial(_moves, conditions)
+    moving = tuple(effect for effect in effects if moves(effect))
+    further = tuple(effect for effect in effects if not moves(effect))
+    groups = bench.groups(believed.effects, values, moves)
+    parts = [
+        _predict_group(
+            believed,
+            rig,
+            conditions,
+            orders,
+            {name: column[rows] for name, column in values.items()},
+            (*present, *moving),
+            [(places, (*own, *further)) for places, own in parts],
+            start,
+            effort,
         )
+        for rows, present, parts in groups
+    ]
     if len(parts) == 1:
         return parts[0]
-    return _in_order(parts, [rows for rows, _ in groups], len(conditions))
+    return _in_order(parts, [group.rows for group in groups], len(conditions))
+
+
+def _moves(conditions: Conditions, effect: DriveEffect) -> bool:
+    """Tell whether an effect is a part of the equations of motion as they are solved."""
+    if type(effect).apply is DriveEffect.apply:
+        return False
+    return conditions.lead is None or not _is_line(effect)
+
+
+def _is_line(effect: DriveEffect) -> bool:
+    """Tell whether an effect is a torque that is one line whatever the motion."""
+    port_and_law = effect.at_port()
+    return port_and_law is not None and port_and_law[1].line(np.zeros(1)) is not None
 
 
 def _predict_group(
@@ -164,44 +188,62 @@ def _predict_group(
     conditions: Conditions,
     orders: Sequence[float],
     values: dict[str, NDArray[np.float64]],
-    present: Sequence[DriveEffect],
+    moving: Sequence[DriveEffect],
+    parts: Sequence[tuple[NDArray[np.int_], tuple[DriveEffect, ...]]],
     start: SteadyMotion | None,
     effort: Effort,
 ) -> Prediction:
-    """Return the prediction of vectors that share all effects ``present``."""
+    """Return the prediction of vectors that share all effects ``moving``.
+
+    Those of each of the ``parts`` share the effects that only add to readings, too.
+    """
     count, records = len(values["offset"]), len(conditions)
     gain = 1.0 + values["output_torque_gain"][:, None]
-    of_torques = _torque_readings(present, conditions)
-    load = conditions.output_torque - of_torques[1] - values["output_torque_zero"][:, None]
-    load = load / gain
-    coefficients = coefficients_of(believed, values, present, records)
+    of_torques = np.empty((count, 2, records))
+    for places, further in parts:
+        of_torques[places] = _torque_readings((*moving, *further), conditions)
+    load = conditions.output_torque - of_torques[:, 1] - values["output_torque_zero"][:, None]
+    load = (load / gain).ravel()
+    coefficients = coefficients_of(believed, values, moving, records)
     coefficients = replace(coefficients, elapsed=np.tile(conditions.elapsed, count))
     if conditions.temperature is not None:
         coefficients = replace(coefficients, temperature=np.tile(conditions.temperature, count))
-    nearby = None if start is None else start.rows(np.tile(np.arange(records), count))
     speed = np.tile(conditions.input_speed, count)
     lead = None
     if conditions.lead is not None:
         lead = Lead(np.array(orders, dtype=float), np.tile(conditions.lead, (count, 1)))
-    balance = steady_motions(coefficients, speed, load.ravel(), rig, nearby, effort, lead)
+    solved, again = _different_motions(values, load.reshape(count, records))
+    cases = _cases(solved, records)
+    balance = steady_motions(
+        coefficients.rows(cases),
+        speed[cases],
+        load[cases],
+        rig,
+        None if start is None else start.rows(np.tile(np.arange(records), len(solved))),
+        effort,
+        None if lead is None else lead.rows(cases),
+    ).rows(_cases(again, records))
     at_brake = rig.output_torque_at == "brake"
-    output_torque = balance.brake_torque if at_brake else balance.coupling_torque
-    error = balance.transmission_error
-    for effect in present:
-        turned = effect.turned_back(balance.torus.orders * speed[:, None])
-        error = error if turned is None else error + turned * balance.coupling_torque
-    channels = [
-        error,
-        balance.motor_torque,
-        output_torque,
-        balance.lead,
-        _motor_ripple(balance, coefficients) + np.zeros_like(balance.lead),
-        balance.slower,
-    ]
-    lines = _lines(balance, channels, orders, believed.ratio, conditions)
+    channels = np.stack(
+        [
+            balance.transmission_error,
+            balance.motor_torque,
+            balance.brake_torque if at_brake else balance.coupling_torque,
+            balance.lead,
+            _motor_ripple(balance, coefficients, load),
+            balance.slower,
+            balance.coupling_torque,
+        ],
+        axis=1,
+    )
+    predicted, channels = _with_further(
+        balance, channels, [(_cases(places, records), further) for places, further in parts],
+        coefficients, speed, load, at_brake,
+    )  # fmt: skip
+    lines = _lines(predicted, channels, orders, believed.ratio, conditions)
     response = None
     if lead is not None:
-        response = lead_response(coefficients.at_loads(load.ravel()), balance.slopes, speed, orders)
+        response = lead_response(coefficients.at_loads(load), balance.slopes, speed, orders)
         if rig.output_torque_at == "brake":
             response = response.without_load()
         _follow_lead(lines, response, lead, balance)
@@ -215,11 +257,15 @@ def _predict_group(
             lines[:, :3] += response.channels * (rest * (lines[:, 3] - lead.phasors))[:, None]
     lines[:, 1] += lines[:, 4]
     lines = lines[:, : len(CHANNELS)]
-    means = np.array([channel[:, 0].real for channel in channels[: len(CHANNELS)]])
+    means = channels[:, : len(CHANNELS), 0].real
     phasors = lines.reshape(count, records, len(CHANNELS), len(orders))
-    mean = means.T.reshape(count, records, len(CHANNELS))
-    mean[..., 1:3] += of_torques.T
-    _add_sensor_errors(believed.ratio, conditions, orders, values, present, mean, phasors)
+    mean = means.reshape(count, records, len(CHANNELS)).copy()
+    mean[..., 1:3] += of_torques.swapaxes(1, 2)
+    for places, further in parts:
+        some = {name: values[name][places] for name in READING}
+        readings = mean[places], phasors[places]
+        _add_sensor_errors(believed.ratio, conditions, orders, some, (*moving, *further), *readings)
+        mean[places], phasors[places] = readings
     return Prediction(mean, phasors, balance, response)
 
 
@@ -299,9 +345,68 @@ def coefficients_of(
     return coefficients
 
 
-def _lines(
+def _cases(vectors: NDArray[np.int_], records: int) -> NDArray[np.int_]:
+    """Return the rows of all records of vectors, vectors outermost."""
+    return np.add.outer(records * vectors, np.arange(records)).ravel()
+
+
+def _different_motions(
+    values: dict[str, NDArray[np.float64]], load: NDArray[np.float64]
+) -> tuple[NDArray[np.int_], NDArray[np.int_]]:
+    """Return vectors of which no two move alike, and for each of all which of them it moves as.
+
+    ``load`` (v, r) is that of all records; what else are readings moves nothing.
+    """
+    moving = [values[name] for name in values if name in MECHANICAL or name.startswith("error_")]
+    table = np.column_stack([*moving, load])
+    _, first, again = np.unique(table, axis=0, return_index=True, return_inverse=True)
+    # In the order of the vectors, whose first one is where the others come from.
+    order = np.argsort(first)
+    return first[order], np.argsort(order)[again.ravel()]
+
+
+def _with_further(
     balance: SteadyMotion,
-    channels: Sequence[NDArray[np.complex128]],
+    channels: NDArray[np.complex128],
+    parts: Sequence[tuple[NDArray[np.int_], tuple[DriveEffect, ...]]],
+    coefficients: Coefficients,
+    speed: NDArray[np.float64],
+    load: NDArray[np.float64],
+    at_brake: bool,
+) -> tuple[NDArray[np.float64], NDArray[np.complex128]]:
+    """Return orders, and k channels at them, with what effects add that do not change the motion.
+
+    The last channel is the torque of the output, which turns what holds the sensor of its angle.
+    """
+    # All parts have the same effects, with numbers of their own.
+    most = len(_torque_lines_of(parts[0][1]))
+    of_lines, lines = np.empty(0), np.zeros((*channels.shape[:2], most), dtype=complex)
+    for rows, further in parts if most else ():
+        laws = _torque_lines_of(further)
+        added = torque_lines(
+            coefficients.rows(rows), laws, balance.rows(rows), speed[rows], load[rows]
+        )
+        of_lines, still = added.orders, np.zeros_like(added.torsion)
+        of_output = added.brake_torque if at_brake else added.coupling_torque
+        of_motor = added.motor_torque, of_output, still, added.ripple, still
+        lines[rows] = np.stack([added.torsion, *of_motor, added.coupling_torque], axis=1)
+    orders = np.append(balance.torus.orders, of_lines)
+    channels = np.concatenate([channels, lines], axis=2)
+    for rows, further in parts:
+        for effect in further:
+            turned = effect.turned_back(orders * speed[rows, None])
+            if turned is not None:
+                channels[rows, 0] += turned * channels[rows, -1]
+    return orders, channels
+
+
+def _torque_lines_of(effects: Sequence[DriveEffect]) -> list[tuple[str, Law]]:
+    return [placed for effect in effects if (placed := effect.at_port()) is not None]
+
+
+def _lines(
+    predicted_orders: NDArray[np.float64],
+    channels: NDArray[np.complex128],
     orders: Sequence[float],
     ratio: float,
     conditions: Conditions,
@@ -310,13 +415,12 @@ def _lines(
 
     A case that has diverged is NaN in all its harmonics, and so at all orders.
     """
-    predicted_orders = tuple(balance.torus.orders.tolist())
     angle, travel = (
         np.zeros(len(conditions)) if column is None else column
         for column in (conditions.input_angle, conditions.travel)
     )
-    read = _readings(predicted_orders, tuple(orders), ratio)
-    lines = np.stack([channel[:, read.columns] for channel in channels], axis=1)
+    read = _readings(tuple(predicted_orders.tolist()), tuple(orders), ratio)
+    lines = channels[:, :, read.columns]
     np.conjugate(lines, out=lines, where=read.conjugate)
     if read.beyond.any():
         turned, passed = (np.outer(angles, read.beyond) for angles in (angle, travel))
@@ -359,13 +463,15 @@ def _readings(predicted: tuple[float, ...], orders: tuple[float, ...], ratio: fl
     return readings
 
 
-def _motor_ripple(balance: SteadyMotion, coefficients: Coefficients) -> NDArray[np.complex128]:
-    """Return the harmonics of a motor's ripple as its torque sensor reads it, (1, n_harmonics)."""
-    total = np.zeros((1, len(balance.torus.orders)), dtype=complex)
+def _motor_ripple(
+    balance: SteadyMotion, coefficients: Coefficients, load: NDArray[np.float64]
+) -> NDArray[np.complex128]:
+    """Return the harmonics of a motor's ripple as its torque sensor reads it, (n, n_harmonics)."""
+    total = np.zeros_like(balance.lead)
     for port, law in coefficients.laws:
-        for order in law.orders if port == "input" and law.drives else ():
-            column, conjugate = balance.torus.place(order)
-            total[:, column] += law.driving.conjugate() if conjugate else law.driving
+        if port == "input" and law.drives and (opposing := law.line(load)) is not None:
+            column, conjugate = balance.torus.place(law.orders[0])
+            total[:, column] -= opposing.conj() if conjugate else opposing
     return total
 
 
