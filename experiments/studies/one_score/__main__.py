@@ -13,7 +13,7 @@ import time
 from pathlib import Path
 from typing import Any
 
-from experiments.studies.one_score.comparison import compare
+from experiments.studies.one_score.comparison import compare, with_held_out
 from experiments.studies.one_score.table import COLUMNS, row_of
 from pymoo_hdte.discrepancy import analyse, read_campaign, read_rig
 from pymoo_hdte.discrepancy._selection.fitting import fit
@@ -27,17 +27,18 @@ def main() -> None:
     parser.add_argument("truth", type=Path)
     parser.add_argument("cases", nargs="*")
     parser.add_argument("--out", type=Path, required=True)
+    parser.add_argument("--held-out", action="store_true", help="count held-out records as well")
     options = parser.parse_args()
     truth = json.loads(options.truth.read_text(encoding="utf-8"))
     with options.out.open("w", encoding="utf-8", newline="") as file:
         table = csv.DictWriter(file, COLUMNS, lineterminator="\n")
         table.writeheader()
         for case in options.cases or sorted(truth):
-            table.writerow(_row(case, options.campaigns / case, truth[case]))
+            table.writerow(_row(case, options.campaigns / case, truth[case], options.held_out))
             file.flush()
 
 
-def _row(case: str, folder: Path, truth: dict[str, Any]) -> dict[str, Any]:
+def _row(case: str, folder: Path, truth: dict[str, Any], held_out: bool) -> dict[str, Any]:
     asked = list[tuple[Any, ...]]()
     rattling.judge = _noting(rattling.judge, asked)
     mechanism.judged = _noting(mechanism.judged, asked)
@@ -49,7 +50,9 @@ def _row(case: str, folder: Path, truth: dict[str, Any]) -> dict[str, Any]:
     # What was asked first: before nuisances of the bench joined the base.
     first, second, candidates, *best = asked[0]
     if campaign:
-        found = compare(first, second, candidates)
+        data = with_held_out(first) if held_out else first
+        base = fit(data, start=second.values) if held_out else second
+        found = compare(data, base, candidates)
     else:
         found = compare(second, fit(second), candidates, best[0] and best[0].fit)
     return row_of(case, truth, finding.verdict, found, seconds)

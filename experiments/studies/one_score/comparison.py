@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from pymoo_hdte._one_thread import ONE_THREAD
 from pymoo_hdte.discrepancy._evidence.force_balances.evidence import MeasuredData
 from pymoo_hdte.discrepancy._evidence.force_balances.law_errors import BalanceErrors
+from pymoo_hdte.discrepancy._evidence.order_lines.evidence import Data
+from pymoo_hdte.discrepancy._evidence.order_lines.features import measure
 from pymoo_hdte.discrepancy._evidence.order_lines.law_errors import LawErrors
 from pymoo_hdte.discrepancy._selection.candidate import Candidate
 from pymoo_hdte.discrepancy._selection.decision import Decision
@@ -33,6 +35,19 @@ class Comparison:
     decision: Decision
     sets: tuple[Weighed, ...]
     seconds: float
+
+
+def with_held_out(data: Data) -> Data:
+    """Return the data of a drive with the records kept out of fits.
+
+    The likelihood of all records is that of those that were fitted, times the predictive density of
+    the others with the same coefficients.
+    """
+    if (held_out := data.held_out) is None:
+        return data
+    records = (*data.features.records, *held_out.features.records)
+    orders = data.features.orders.tolist()
+    return replace(data, features=measure(data.campaign, records, orders, data.rules))
 
 
 @ONE_THREAD
