@@ -187,7 +187,7 @@ class Growth:
             varied = label
             for member in best.candidates:
                 if (without := self._without(best, member)) is not None:
-                    self._extend(without, member)
+                    self._exchange(without, member)
 
     def _lacks_something(self, weighed: Weighed) -> bool:
         """Tell whether it is not sure that a set leaves nothing to something outside."""
@@ -230,7 +230,7 @@ class Growth:
         return label not in self._extended and _size(weighed.candidates) < MOST_MEMBERS
 
     def _complete_fit(self, weighed: Weighed) -> None:
-        """Fit a set to the end, from other starts as well."""
+        """Fit a set to the end, from other starts as well, and without each of its members."""
         label = label_of(weighed.candidates)
         self._complete.add(label)
         if not weighed.candidates:
@@ -238,25 +238,30 @@ class Growth:
         hypothesis = self._as_hypothesis(weighed.fit)
         others = [self._as_hypothesis(other.fit) for other in self._known.values()]
         starts = other_starts(hypothesis, self.base.values)
-        again = best_fit(self.data, hypothesis, starts, others)
-        if again.chi_square < weighed.fit.chi_square:
-            del self._known[label]
-            self._weigh(again)
+        self._weigh(best_fit(self.data, hypothesis, starts, others))
+        weighed = self._known[label]
+        for member in weighed.candidates if len(weighed.candidates) > 1 else ():
+            self._without(weighed, member)
 
-    def _extend(self, weighed: Weighed, instead_of: Candidate | None = None) -> None:
-        """Fit a set with each effect that could make it likelier, or as an exchange of a member."""
-        if instead_of is None:
-            self._extended.add(label_of(weighed.candidates))
+    def _exchange(self, without: Weighed, member: Candidate) -> None:
+        """Fit what a set may have in place of a member: other forms of it, and other effects."""
+        for candidate in self.candidates:
+            if candidate.is_form_of(member) or candidate.replaces(member):
+                for start in candidate.starts:
+                    values = np.append(without.fit.values, start)
+                    self._fit((*without.candidates, candidate), values, again=True)
+        if self._may_be_extended(without):
+            self._extend(without)
+
+    def _extend(self, weighed: Weighed) -> None:
+        """Fit a set with each effect that could make it likelier."""
+        self._extended.add(label_of(weighed.candidates))
         self._release(weighed)
         members = weighed.candidates
         candidates = [
             candidate
             for candidate in self.candidates
-            if all(candidate.goes_with(member) for member in members)
-            and (
-                not candidate.instead_of
-                or (instead_of is not None and candidate.replaces(instead_of))
-            )
+            if not candidate.instead_of and all(candidate.goes_with(member) for member in members)
         ]
         integral = Integral(weighed.linearised)
         integral.score()
@@ -331,10 +336,14 @@ class Growth:
             self._fit(members, np.concatenate(values))
         return self._known.get(label)
 
-    def _fit(self, members: Sequence[Candidate], start: NDArray[np.float64]) -> None:
-        """Fit a set that is not known yet, just enough to rank it, and weigh it."""
+    def _fit(self, members: Sequence[Candidate], start: Vector, again: bool = False) -> None:
+        """Fit a set just enough to rank it, and weigh it, unless it is known.
+
+        A known set is fitted ``again`` from another start.
+        """
         label = label_of(members)
-        if label in self._known or label in self._invisible or not may_be_together(tuple(members)):
+        known = label in self._known or label in self._invisible
+        if (known and not again) or not may_be_together(tuple(members)):
             return
         if _size(members) > MOST_MEMBERS:
             return
@@ -342,9 +351,12 @@ class Growth:
 
     def _weigh(self, fitted: Fit) -> None:
         """Keep a fit with its probability, unless one of its effects would be invisible."""
+        label = label_of(fitted.candidates)
+        known = self._known.get(label)
+        if known is not None and known.fit.chi_square <= fitted.chi_square:
+            return
         linearised = self.errors.linearised(fitted)
         score = Integral(linearised).score()
-        label = label_of(fitted.candidates)
         evident = self.data.evident
         lacking = evident and not evident & {member.name for member in fitted.candidates}
         if score.invisible or (lacking and fitted.candidates):
