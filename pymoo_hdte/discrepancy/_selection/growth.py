@@ -126,7 +126,7 @@ class Weighed:
             self.score.ln,
             self.outside,
             self.worst_chance,
-            bool(named) and all(candidate.releases is not None for candidate in named),
+            bool(named) and all(map(_is_value, named)),
         )
 
 
@@ -387,6 +387,11 @@ class Growth:
     def _as_hypothesis(self, fitted: Fit) -> Hypothesis:
         excess = max(self.base.chi_square - len(self.base.residuals), 1.0)
         return hypothesis_of(fitted, excess)
+
+
+def _is_value(member: Candidate) -> bool:
+    """Tell whether a member is a value of the base, released or under the name of an effect."""
+    return member.releases is not None or bool(member.effect and member.effect.covers)
 
 
 def _size(members: Sequence[Candidate]) -> int:
