@@ -28,4 +28,5 @@ def run(context: Context) -> Result:
         paragraphs=(*result.paragraphs, OTHERS),
         tables=(quality, at_the_stated_setting(), *others),
         pictures=(table_7_picture(), *result.pictures),
+        shown_first="",
     )

@@ -56,6 +56,16 @@ def _prepare(axis: Axes) -> None:
     axis.spines[["top", "right"]].set_visible(False)
 
 
+def panel() -> tuple[Figure, Axes]:
+    """Return a figure of one panel whose words can be read on a phone."""
+    figure, axes = grid(1, 1, width=7.2, height=4.0)
+    axis = axes[0, 0]
+    axis.tick_params(which="both", labelsize=13)
+    for label in (axis.xaxis.label, axis.yaxis.label):
+        label.set_fontsize(14)
+    return figure, axis
+
+
 PANELS = 3
 """Panels side by side, which a page of 1280 pixels still shows large enough to be read."""
 

@@ -19,36 +19,51 @@ PER_DECADE = 20
 """Budgets a decade at which a run is measured, as COCO has them."""
 
 
+_BLOCK = 256
+"""Points that are compared with each other at once."""
+
+
 class TracingEvaluator(Evaluator):
-    """Evaluates as pymoo does, and notes each feasible point that none before weakly dominates."""
+    """Evaluates as pymoo does, and keeps the objectives of all feasible points in their order."""
 
     def __init__(self) -> None:
         super().__init__()
-        self._spent = 0
-        self._rows: list[NDArray[np.float64]] = []
-        self._front: NDArray[np.float64] | None = None
+        self._objectives: list[NDArray[np.float64]] = []
 
     @property
     def trace(self) -> NDArray[np.float64]:
-        """The points noted so far, shape (k, 1 + m): number of the evaluation, objectives."""
-        return np.array(self._rows) if self._rows else np.empty((0, 0))
+        """The feasible points that nothing before them weakly dominates, shape (k, 1 + m).
+
+        Number of the evaluation, objectives. It is computed here, so that no run takes longer.
+        """
+        return improvements(np.concatenate(self._objectives))
 
     def _eval(
         self, problem: Problem, pop: Population, evaluate_values_of: list[Any], **kwargs: Any
     ) -> None:
         super()._eval(problem, pop, evaluate_values_of, **kwargs)
-        F, feasible = pop.get("F"), np.ravel(pop.get("feas")).astype(bool)
-        front = np.empty((0, F.shape[1])) if self._front is None else self._front
-        open_ = feasible & np.isfinite(F).all(axis=1) & ~_dominated(F, front)
-        noted: list[NDArray[np.float64]] = []
-        for row in np.flatnonzero(open_):
-            if not noted or not np.all(np.array(noted) <= F[row], axis=1).any():
-                noted.append(F[row])
-                self._rows.append(np.concatenate([[self._spent + row + 1], F[row]]))
-        if noted:
-            union = np.concatenate([front, noted])
-            self._front = union[is_nondominated(union)]
-        self._spent += len(F)
+        F = pop.get("F")
+        if problem.has_constraints():
+            F = np.where(pop.get("feas")[:, None], F, np.nan)
+        self._objectives.append(F)
+
+
+def improvements(F: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the rows of ``F`` (n, m) that no earlier one weakly dominates, after their numbers.
+
+    Rows that are not finite, such as those of infeasible points, count for nothing.
+    """
+    found, front = [np.empty((0, 1 + F.shape[1]))], np.empty((0, F.shape[1]))
+    for start in range(0, len(F), _BLOCK):
+        rows = start + np.flatnonzero(np.isfinite(F[start : start + _BLOCK]).all(axis=1))
+        rows = rows[~_dominated(F[rows], front)]
+        points = F[rows]
+        # What an earlier point dominates, whatever dominates that one dominates as well.
+        new = ~np.tril(np.all(points[None] <= points[:, None], axis=2), -1).any(axis=1)
+        found.append(np.column_stack([rows[new] + 1.0, points[new]]))
+        front = np.concatenate([front, points[new]])
+        front = front[is_nondominated(front)] if len(front) else front
+    return np.concatenate(found)
 
 
 def _dominated(F: NDArray[np.float64], front: NDArray[np.float64]) -> NDArray[np.bool_]:
@@ -80,8 +95,7 @@ def hypervolumes(trace: ArrayLike, truth: TrueFront, at: ArrayLike) -> NDArray[n
         In normalised objectives, up to `indicators.CORNER`.
     """
     rows = np.asarray(trace, dtype=float)
-    counts = np.searchsorted(rows[:, 0], at, side="right") if len(rows) else np.zeros_like(at)
-    points = truth.normalise(rows[:, 1:]) if len(rows) else np.empty((0, truth.F.shape[1]))
+    counts, points = np.searchsorted(rows[:, 0], at, side="right"), truth.normalise(rows[:, 1:])
     corner = np.full(truth.F.shape[1], CORNER)
     # Budgets between which nothing better was found share a value.
     different, place = np.unique(counts, return_inverse=True)

@@ -80,7 +80,7 @@ def _dask_executor(address: str) -> Executor:
         from distributed import Client
     except ImportError:
         raise InvalidInput(
-            "--dask", address, "only with the extra: pip install '.[dask]'"
+            "--dask", address, "only with the extra: pip install 'pymoo-hdte[dask]'"
         ) from None
     try:
         asyncio.run(_greet(address))

@@ -71,6 +71,9 @@ responses = ["cost", "height"]
 def folder(tmp_path, monkeypatch):
     """A folder with both kinds of simulators, in which the commands run."""
     monkeypatch.chdir(tmp_path)
+    # A file that is written again within a second, and as long, would be taken for the one before.
+    monkeypatch.setattr(sys, "dont_write_bytecode", True)
+    monkeypatch.setenv("PYTHONDONTWRITEBYTECODE", "1")
     (tmp_path / "steps_of_a_test.py").write_text(STAIRCASE)
     (tmp_path / "solve.py").write_text(PROGRAM)
     return tmp_path

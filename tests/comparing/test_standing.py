@@ -18,7 +18,7 @@ def comparison(igd, n_obj=2):
     """A comparison in which algorithms have these values of IGD, one a seed, and one front."""
     axes = np.eye(n_obj)
     seeds = range(1, 1 + len(next(iter(igd.values()))))
-    run = Run(("f",), np.zeros((1, 1)), 0.1, trace=np.empty((0, 0)))
+    run = Run(("f",), np.zeros((1, 1)), 0.1, trace=np.empty((0, 3)))
     return Comparison(
         "problem",
         TrueFront(axes, in_pieces=False),

@@ -57,7 +57,7 @@ def test_hypervolumes_of_a_trace_in_closed_form():
     found = hypervolumes(trace, LINE, [1, 2, 3, 6, 7, 100])
     first, both = 0.6 * 0.6, 0.6 * 0.6 + 0.4 * 0.2
     np.testing.assert_allclose(found, [0.0, 0.0, first, first, both, both], rtol=1e-14)
-    np.testing.assert_array_equal(hypervolumes(np.empty((0, 0)), LINE, [1, 9]), [0.0, 0.0])
+    np.testing.assert_array_equal(hypervolumes(np.empty((0, 3)), LINE, [1, 9]), [0.0, 0.0])
 
 
 @pytest.mark.parametrize("evaluations", [1, 7, 1000, 1003])
@@ -73,7 +73,7 @@ def test_budgets_rise_to_the_last_by_at_most_a_twentieth_of_a_decade(evaluations
 def test_a_profile_counts_the_targets_that_runs_have_reached():
     """A run that finds the reference front at once, and one that finds nothing."""
     at_once = np.column_stack([np.full(1001, 10.0), LINE.F])
-    found = profile([(at_once, LINE), (np.empty((0, 0)), LINE)], 100)
+    found = profile([(at_once, LINE), (np.empty((0, 3)), LINE)], 100)
     np.testing.assert_array_equal(found.shares, np.where(found.budgets < 10, 0.0, 0.5))
 
 

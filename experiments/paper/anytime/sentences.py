@@ -160,8 +160,8 @@ def leads_sentence(scores: Scores) -> str:
     totals = totals_of(scores, AS_PRINTED)
     counts = ", ".join(f"of {rival} in {count}" for rival, count in totals.ahead.items())
     return (
-        f"of {totals.cells} cells below 100 particles, {OURS} is ahead {counts}, and the paper's "
-        f"order of the three holds in {totals.in_order}"
+        f"in {totals.cells} settings with fewer particles, {OURS} is ahead {counts}, "
+        f"and the paper's order of the three holds in {totals.in_order}"
     )
 
 

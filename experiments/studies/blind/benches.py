@@ -10,6 +10,8 @@ forty pairs of the ideal bench and the level ``mild``, and five with each of `TO
 from __future__ import annotations
 
 import argparse
+import csv
+import json
 import time
 from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
@@ -27,8 +29,15 @@ from experiments.studies.blind.rig.nuisances import GROUPS, LEVELS, MILD, Nuisan
 from experiments.studies.blind.scoring import COLUMNS, verdict_scores
 from experiments.studies.blind.truth import may_be_named
 from pymoo_hdte._runner.campaign import Campaign, Run
+from pymoo_hdte._runner.provenance import environment
 from pymoo_hdte._runner.workers import make_executor
 from pymoo_hdte.checks import InvalidInput
+from pymoo_hdte.discrepancy._answers.bench_faults import (
+    COARSE,
+    SATURATED,
+    SPEED_WANDERS,
+    bench_faults,
+)
 from pymoo_hdte.discrepancy._verdicts.drive import examine_drive
 
 IDEAL_BENCH = "ideal"
@@ -36,17 +45,23 @@ TOLD = "told"
 ALONE = tuple(group for group in GROUPS if MILD.has(group))
 """Groups that the level has, each a bench of its own."""
 TOLD_AS: Mapping[str, frozenset[str]] = {
+    "lag": frozenset({"loop_lag"}),
+    "wander": frozenset({SPEED_WANDERS}),
     "input_coupling": frozenset({"coupling_ripple"}),
     # On a load that hardly gives way both sides of its torque sensor are one place.
     "output_coupling": frozenset({"torque_ripple", "gravity"}),
+    "cogging": frozenset({"cogging"}),
     "mount": frozenset({"bench_resonance"}),
+    "shaft": frozenset({"load_shaft"}),
     "brake_ripple": frozenset({"torque_ripple"}),
     "gravity": frozenset({"torque_ripple", "gravity"}),
     "warming": frozenset({"warming"}),
     "drift": frozenset({"input_torque_drift", "output_torque_drift"}),
     "zeros": frozenset({"new_input_torque_zero", "new_output_torque_zero"}),
+    "saturation": frozenset({SATURATED}),
+    "resolution": frozenset({COARSE}),
 }
-"""Names of nuisances in a verdict, any of which tells a group. Others have no name there."""
+"""Names of nuisances and faults of a bench in a verdict, any of which tells a group."""
 PAIRS, CLEAN, EACH = 40, 16, 5
 """Paired campaigns, those of them that hide nothing, and campaigns with one nuisance alone."""
 SEEN = range(3001, 3421)
@@ -115,6 +130,7 @@ class BenchJob:
         scores = verdict_scores(self.case, finding.verdict)
         seconds = time.process_time() - begin
         names = {nuisance.name for nuisance, _ in finding.nuisances}
+        names |= {fault.name for fault in bench_faults(finding)}
         bits = sum(1 << k for k, group in enumerate(TOLD_AS) if TOLD_AS[group] & names)
         row = [*(scores.get(column, np.nan) for column in COLUMNS), float(bits)]
         return Run((*COLUMNS, TOLD), np.array([row]), seconds, (seconds,))
@@ -191,6 +207,32 @@ def text_of(comparisons: Sequence[Comparison]) -> str:
     return "\n".join(lines)
 
 
+def write_table(comparisons: Sequence[Comparison], path: Path) -> None:
+    """Write a row a comparison as CSV, below a line with date and versions."""
+    made = {"date": time.strftime("%Y-%m-%d")} | environment()
+    with path.open("w", newline="", encoding="utf-8") as file:
+        file.write(f"# {json.dumps(made)}\n")
+        table = csv.writer(file, lineterminator="\n")
+        table.writerow(
+            ("bench", "case", "truth", "ideal", "named_ideal", "real", "named_real", "told")
+        )
+        for comparison in comparisons:
+            ideal, real = comparison.ideal, comparison.real
+            table.writerow(
+                (
+                    comparison.bench,
+                    f"{ideal.case.kind} {ideal.case.number}",
+                    ideal.case.truth,
+                    *(
+                        part
+                        for each in (ideal, real)
+                        for part in (each.status, " ".join(each.chosen))
+                    ),
+                    " ".join(sorted(comparison.told)),
+                )
+            )
+
+
 def _line(comparison: Comparison) -> str:
     case = comparison.ideal.case
     said = [
@@ -236,9 +278,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     with executor or nullcontext():
         chosen = [cases[number - 1] for number in options.cases]
         campaign = Campaign(options.out, executor)
-        print(text_of(compare(chosen, benches, campaign)))
+        comparisons = compare(chosen, benches, campaign)
+        print(text_of(comparisons), flush=True)
         if options.protocol:
-            print(text_of(compare(chosen[:EACH], list(TOLD_AS), campaign)))
+            alone = compare(chosen[:EACH], list(TOLD_AS), campaign)
+            print(text_of(alone))
+            comparisons += alone
+        write_table(comparisons, options.out / "benches.csv")
     return 0
 
 

@@ -12,6 +12,7 @@ from experiments.studies.suites.bbob_tables import BEST, CITED, reached, reached
 from experiments.studies.suites.data import Outcome
 from experiments.studies.suites.peers import OURS
 from experiments.studies.suites.protocol import (
+    BOTH_SIZES,
     BUDGETS,
     CONSTRAINED,
     FEASIBLE_RIVALS,
@@ -116,7 +117,7 @@ def _first_of_all(outcome: Outcome) -> Iterable[Demand]:
         where = "all held-out suites together"
         yield _first(by_rank, beaten, evaluations, f"{where}: lowest average rank, hypervolume")
         yield _better_than_each(beaten, evaluations, where, "hypervolume")
-    for suite in HELD_OUT:
+    for suite in (*HELD_OUT, BOTH_SIZES):
         where = named(outcome, suite)
         for evaluations in BUDGETS:
             ran = evaluations in outcome.budgets(suite)

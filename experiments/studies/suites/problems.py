@@ -12,6 +12,7 @@ from pymoo.core.problem import Problem
 from pymoo.problems import get_problem
 
 from experiments.runner.committed import committed_file, read_rows
+from experiments.studies.suites.formulas.df import NUMBERS, TIMES, df_front, make_df
 from experiments.studies.suites.formulas.engineering import MEMBERS, make_engineering
 from experiments.studies.suites.formulas.imop import imop_front, make_imop
 from experiments.studies.suites.formulas.lz09 import lz09_front, make_lz09
@@ -44,6 +45,11 @@ def _zcat(n: int, n_obj: int) -> SuiteProblem:
     return SuiteProblem(f"ZCAT{n}_{n_obj}", "ZCAT", make, front)
 
 
+def _df(n: int, time: float) -> SuiteProblem:
+    make, front = partial(make_df, n, time), partial(df_front, n, time)
+    return SuiteProblem(f"DF{n} at {time}", "DF", make, front)
+
+
 def _dascmop(number: int) -> Problem:
     return get_problem(f"dascmop{number}", DIFFICULTY)
 
@@ -64,6 +70,7 @@ SUITES: dict[str, tuple[SuiteProblem, ...]] = {
         SuiteProblem(f"LZ09-F{n}", "LZ09", partial(make_lz09, n), partial(lz09_front, n))
         for n in range(1, 10)
     ),
+    "DF": tuple(_df(n, time) for time in TIMES for n in NUMBERS),
     "ZCAT": tuple(_zcat(n, n_obj) for n_obj in (2, 3) for n in range(1, 21)),
 }
 """Problems by suite."""

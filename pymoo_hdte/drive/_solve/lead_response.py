@@ -194,7 +194,7 @@ def _impedances(
 ) -> tuple[Phasors, Phasors, Phasors]:
     """Return mesh torque per torsion, what the output resists per angle, and inertia beyond it."""
     stiffness, damping, output, _ = (column[:, None] for column in slopes.T)
-    loose = coefficients.inertia_in_clutches(rate.imag)
+    loose = coefficients.loose_inertia(rate.imag)
     loose = loose + sum(size * rate**k for k, size in coefficients.load_rates)
     inertia = np.reshape(coefficients.output_inertia, (-1, 1)) + loose
     beyond = np.reshape(coefficients.load_inertia, (-1, 1)) + loose

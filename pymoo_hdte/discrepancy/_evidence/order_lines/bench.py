@@ -32,9 +32,9 @@ class Group(NamedTuple):
     rows : ndarray of int, shape (k,)
         Their indices.
     moving : tuple of DriveEffect
-        Believed effects, and those of the bench that change the motion.
+        Believed effects and those of the bench that change the motion.
     parts : list of tuple
-        Places among the rows that share all other nuisances, with these.
+        Places among the rows that share all others, with these.
     """
 
     rows: NDArray[np.int_]
@@ -122,10 +122,13 @@ class Bench:
                 further = further.with_nuisance(nuisance, begin)
         groups = []
         for rows, effects in of_equal_numbers(known, values):
+            believed = tuple(effect for effect in effects if moves(effect))
+            rest = tuple(effect for effect in effects if not moves(effect))
             for places, own in moving._of_equal_numbers(values, rows):
                 some = rows[places]
                 parts = further._of_equal_numbers(values, some)
-                groups.append(Group(some, (*effects, *own), parts))
+                parts = [(part, (*rest, *lines)) for part, lines in parts]
+                groups.append(Group(some, (*believed, *own), parts))
         return groups
 
     def _of_equal_numbers(

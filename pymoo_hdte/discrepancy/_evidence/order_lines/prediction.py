@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pymoo_hdte.discrepancy._evidence.order_lines.bench import IDEAL, Bench
+from pymoo_hdte.discrepancy._evidence.order_lines.folded_lines import beyond_orders, folded_down
 from pymoo_hdte.discrepancy._evidence.order_lines.parameters import READING
 from pymoo_hdte.discrepancy._evidence.order_lines.steady_states import (
     PREDICTION,
@@ -28,11 +29,13 @@ from pymoo_hdte.discrepancy._records.line_fit import CHANNELS
 from pymoo_hdte.drive import (
     Coefficients,
     DriveEffect,
+    SpeedLoop,
     SteadyMotion,
 )
 from pymoo_hdte.drive._effects import Session
 from pymoo_hdte.drive._solve.lead_response import LeadResponse, lead_response, torque_lines
 from pymoo_hdte.drive._solve.order_spectrum import sine_phasor
+from pymoo_hdte.effects.effect import effect_named
 from pymoo_hdte.effects.law import Law, Values
 
 LOOP = ("loop_gain", "loop_lag")
@@ -74,6 +77,9 @@ class Conditions:
     unsteady : complex ndarray, shape (r, 2, m), optional
         Lines of the input's speed and acceleration beyond those of a steady motion, rad/s and
         rad/s2: see `unsteady_lines`; by default none.
+    folded : complex ndarray, shape (r, k, 2, 1 + m), optional
+        Contribution of what a motor does at `COGGING_ORDERS` beyond those that the rows of a record
+        show, see `OrderLines`; by default none.
     """
 
     input_speed: NDArray[np.float64]
@@ -87,6 +93,7 @@ class Conditions:
     lead: NDArray[np.complex128] | None = None
     lead_share: NDArray[np.float64] | None = None
     unsteady: NDArray[np.complex128] | None = None
+    folded: NDArray[np.complex128] | None = None
 
     def rows(self, rows: NDArray[np.int_]) -> Conditions:
         """Return the conditions of some of the records."""
@@ -173,13 +180,20 @@ def _moves(conditions: Conditions, effect: DriveEffect) -> bool:
     """Tell whether an effect is a part of the equations of motion as they are solved."""
     if type(effect).apply is DriveEffect.apply:
         return False
-    return conditions.lead is None or not _is_line(effect)
+    return conditions.lead is None or not _is_line_of_bench(effect)
 
 
-def _is_line(effect: DriveEffect) -> bool:
-    """Tell whether an effect is a torque that is one line whatever the motion."""
+def _is_line_of_bench(effect: DriveEffect) -> bool:
+    """Tell whether an effect is a torque of the bench that is one line whatever the motion.
+
+    Such lines are small, so that the motion is linear in them or nearly so. A ripple of the drive
+    that is looked for may be strong: one of .02 N.m moves the speed of an input by a fifth at 30
+    r/min, which makes errors of its order and others.
+    """
     port_and_law = effect.at_port()
-    return port_and_law is not None and port_and_law[1].line(np.zeros(1)) is not None
+    if port_and_law is None or port_and_law[0] not in effect_named(effect.name).nuisance_at:
+        return False
+    return port_and_law[1].line(np.zeros(1)) is not None
 
 
 def _predict_group(
@@ -246,7 +260,7 @@ def _predict_group(
         response = lead_response(coefficients.at_loads(load), balance.slopes, speed, orders)
         if rig.output_torque_at == "brake":
             response = response.without_load()
-        _follow_lead(lines, response, lead, balance)
+        _follow_lead(lines, response, lead, balance, coefficients.input_inertia)
         if conditions.unsteady is not None:
             unsteady = np.tile(conditions.unsteady, (count, 1, 1))
             lines[:, :3] += np.einsum("nck,nkm->ncm", response.slow, unsteady)
@@ -264,19 +278,84 @@ def _predict_group(
     for places, further in parts:
         some = {name: values[name][places] for name in READING}
         readings = mean[places], phasors[places]
+        if conditions.folded is not None and (beyond := beyond_orders(further, orders)):
+            rows = _cases(places, records)
+            held_by = SpeedLoop(rig.proportional, rig.integral)
+            folded = folded_down(
+                coefficients.at_loads(load).rows(rows), balance.rows(rows), speed[rows], held_by,
+                beyond, conditions.folded, at_brake,
+            )  # fmt: skip
+            for reading, added in zip(readings, folded, strict=True):
+                reading += added.reshape(reading.shape)
         _add_sensor_errors(believed.ratio, conditions, orders, some, (*moving, *further), *readings)
         mean[places], phasors[places] = readings
     return Prediction(mean, phasors, balance, response)
 
 
 def _follow_lead(
-    lines: NDArray[np.complex128], response: LeadResponse, lead: Lead, balance: SteadyMotion
+    lines: NDArray[np.complex128],
+    response: LeadResponse,
+    lead: Lead,
+    balance: SteadyMotion,
+    inertia: NDArray[np.float64],
 ) -> None:
-    """Add to lines (n, 6, m) what follows the lead at orders that the torus does not hold."""
-    beyond = [balance.torus.find(order) is None for order in lead.orders.tolist()]
-    phasors = np.where(beyond, lead.phasors, 0.0)
+    """Add to lines (n, 6, m) what follows the lead at orders that the torus does not hold.
+
+    Over the angle of the input its speed is Omega / (1 - l') for a lead l of slope l' = dl/dangle,
+    and its acceleration half the slope of the square of that. So two lines of the lead, as of a
+    strong ripple at a low speed, beat to the second order: speed is Omega (1 + l' + l'^2), and its
+    square Omega^2 (1 + 2 l' + 3 l'^2). What ``inertia`` (n,) takes of that at the input, N.m.
+    """
+    held = tuple(balance.torus.find(order) is not None for order in lead.orders.tolist())
+    rates = response.rate * lead.phasors
+    phasors = np.where(held, 0.0, lead.phasors)
     lines[:, :3] += response.channels * phasors[:, None]
-    lines[:, 5] -= response.rate * phasors
+    lines[:, 5] -= np.where(held, 0.0, rates)
+    beats = _beats(tuple(lead.orders.tolist()), held)
+    if beats.places.any():
+        speed = (response.rate[:, :1] / (1j * lead.orders[0])).real
+        second = rates[:, beats.second]
+        np.conjugate(second, out=second, where=beats.conjugate)
+        beating = (rates[:, beats.first] * second) @ beats.places / speed
+        losses = balance.slopes[:, 3:] + 1.5 * inertia[:, None] * response.rate
+        lines[:, 1] += losses * beating
+        lines[:, 5] -= beating
+
+
+class _Beats(NamedTuple):
+    """Pairs of lines whose product is at an analysed order, with a second that may be conjugate.
+
+    ``places`` (k, m) are the shares of a pair in a square at each order.
+    """
+
+    first: NDArray[np.int_]
+    second: NDArray[np.int_]
+    conjugate: NDArray[np.bool_]
+    places: NDArray[np.float64]
+
+
+@lru_cache(maxsize=64)
+def _beats(orders: tuple[float, ...], held: tuple[bool, ...]) -> _Beats:
+    """Return the pairs of lines that beat at one of the orders; without those of a torus alone."""
+    pairs = list[tuple[int, int, bool, int, float]]()
+    for k, order in enumerate(orders):
+        for j, lower in enumerate(orders[: k + 1]):
+            beats = (False, order + lower, 0.5 if k == j else 1.0), (True, order - lower, 1.0)
+            for of_difference, beat, share in beats:
+                at = np.flatnonzero(np.abs(np.subtract(orders, beat)) < _SAME)
+                pairs += [
+                    (k, j, of_difference, place, share)
+                    for place in at.tolist()
+                    if not (held[k] and held[j] and held[place])
+                ]
+    places = np.zeros((len(pairs), len(orders)))
+    for row, (_, _, _, place, share) in enumerate(pairs):
+        places[row, place] = share
+    first, second = np.array([pair[:2] for pair in pairs], dtype=int).reshape(-1, 2).T
+    conjugate = np.array([pair[2] for pair in pairs], dtype=bool)
+    for array in (first, second, conjugate, places):
+        array.flags.writeable = False
+    return _Beats(first, second, conjugate, places)
 
 
 def _loop_lead(
