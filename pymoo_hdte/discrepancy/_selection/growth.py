@@ -53,8 +53,8 @@ effects may be missing of which each alone explains less than a third one."""
 WIDTH = 8
 """Most extensions of a set that are fitted, the likeliest to first order."""
 TRUSTED = 3.0
-"""Factor by which an effect may remove more than it does to first order. Springs that slip do so on
-logs: a width of the search, like the next two."""
+"""Factor by which an effect may remove more than it does to first order, as springs that slip do on
+logs: a width of the search."""
 OF_ONE_NAME = 2
 """Most of them that have one name."""
 MOST_OUTSIDE = 6
