@@ -64,6 +64,8 @@ def laws():
             if field.init and field.name != "locked"
         }
         values |= OF_LOOPS if kind is BoucWen else {}
+        # A time constant, where a law has one, is above zero.
+        values |= {"time": above_0} if "time" in values else {}
         return st.builds(LawAtPort, st.just(name), st.just(port), st.builds(kind, **values))
 
     return st.one_of(*(of(name, port) for name, effect in LAWS.items() for port in effect.ports))
