@@ -85,11 +85,11 @@ def leading_nuisances(
 def nuisances_beside(search: Search, hypothesis: Hypothesis) -> Fit | None:
     """Return a fit with nuisances that explain what a set of effects does not; None without any.
 
-    They are searched for beside the set where it leaves more than noise, and beside sets that it
-    contains, however little it leaves: what it has beyond these may stand for the bench.
+    They are searched for beside the set where it leaves more than noise. Where it does not, they
+    are beside sets that it contains: what it has beyond these may stand for the bench.
     """
-    if not search.enough(hypothesis) and (of_bench := leading_nuisances(search, hypothesis)):
-        return of_bench
+    if not search.enough(hypothesis):
+        return leading_nuisances(search, hypothesis)
     for special in search.hypotheses:
         if _contains(hypothesis, special) and (
             of_bench := leading_nuisances(search, special, hypothesis)

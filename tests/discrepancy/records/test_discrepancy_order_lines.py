@@ -307,11 +307,11 @@ def test_an_ill_conditioned_fit_keeps_its_digits():
 def test_blocks_of_rows_give_the_lines_and_spectrum_of_all_rows(monkeypatch):
     rng = np.random.default_rng(8)
     whole = noisy(rng, 4)
-    fits = [order_lines(whole, RIG, RATIO, ORDERS)]
+    fits = [order_lines(whole, RIG, RATIO, ORDERS, [15.0, 30.0])]
     spectra = [residual_spectrum(whole, RIG, RATIO, ORDERS)]
     # The last block has fewer rows than the fit has columns.
     monkeypatch.setattr(line_basis, "ROWS_A_BLOCK", (len(whole.time) - 3) // 4)
-    fits.append(order_lines(whole, RIG, RATIO, ORDERS))
+    fits.append(order_lines(whole, RIG, RATIO, ORDERS, [15.0, 30.0]))
     spectra.append(residual_spectrum(whole, RIG, RATIO, ORDERS))
     # Rounding is relative to the rows, of which the input angle is many radians.
     largest = np.abs(fits[0].mean) + np.abs(fits[0].slope) * np.ptp(whole.time)
