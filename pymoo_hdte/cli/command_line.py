@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from pymoo_hdte import __version__
-from pymoo_hdte._interrupts import INTERRUPTED
+from pymoo_hdte._interrupts import INTERRUPTED, how_it_ended
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.cli.command import MISTAKE, OneLineParser
 from pymoo_hdte.cli.discrepancy import DISCREPANCY
@@ -44,7 +44,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             print(f"pymoo-hdte: error: {line}", file=sys.stderr)
         return MISTAKE
     except KeyboardInterrupt:
-        print("pymoo-hdte: interrupted, nothing was written", file=sys.stderr)
+        print(f"pymoo-hdte: {how_it_ended()}", file=sys.stderr)
         return INTERRUPTED
     return 0
 
