@@ -18,29 +18,6 @@ UNREAD = 141
 GIVEN_BACK: list[Callable[[], None]] = []
 """What is called before Ctrl-C ends the process at once: it removes what others would find."""
 
-REMAINS: list[str] = []
-"""What an interrupted program leaves to go on from, in the words of its last line."""
-
-
-@contextmanager
-def leaving(words: str) -> Iterator[None]:
-    """Tell whoever interrupts the block what it leaves, as ``finished runs are kept in ...``."""
-    REMAINS.append(words)
-    try:
-        yield
-    except KeyboardInterrupt:
-        # Still to be told.
-        raise
-    except BaseException:
-        REMAINS.remove(words)
-        raise
-    REMAINS.remove(words)
-
-
-def how_it_ended() -> str:
-    """Return the words for the user who interrupted the program."""
-    return f"interrupted, {REMAINS[-1] if REMAINS else 'nothing was written'}"
-
 
 def ended_quietly(name: str, main: Callable[[], int]) -> int:
     """Run a console program so that Ctrl-C and a closed pipe end it without a traceback.
@@ -109,7 +86,7 @@ def _tell(name: str) -> None:
     # Not print(): its lock may be held by the code that was interrupted. A terminal may have a bar.
     line = "\n" if os.isatty(2) else ""
     with suppress(OSError):
-        os.write(2, f"{line}{name}: {how_it_ended()}\n".encode())
+        os.write(2, f"{line}{name}: interrupted, nothing was written\n".encode())
 
 
 def _to_nowhere() -> None:

@@ -17,7 +17,7 @@ from pymoo.core.algorithm import Algorithm
 from pymoo.core.problem import Problem
 from pymoo.util.ref_dirs import get_reference_directions
 
-from experiments.comparing.named import seeded_default_rng
+from pymoo_hdte._comparing.named import seeded_default_rng
 from pymoo_hdte.algorithms import AMPMOPSO, ElitistSwarm, FirstStepWithinBounds
 
 POPULATION = 100

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from pymoo_hdte import __version__
-from pymoo_hdte._interrupts import INTERRUPTED, how_it_ended
+from pymoo_hdte._interrupts import INTERRUPTED
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.cli.command import MISTAKE, OneLineParser
 from pymoo_hdte.cli.discrepancy import DISCREPANCY
@@ -20,8 +20,9 @@ from pymoo_hdte.cli.optimise import OPTIMISE
 from pymoo_hdte.cli.plan import PLAN
 from pymoo_hdte.cli.robust import ROBUST
 from pymoo_hdte.cli.simulate import SIMULATE
+from pymoo_hdte.cli.table7 import TABLE_7
 
-COMMANDS = (ROBUST, OPTIMISE, SIMULATE, IDENTIFY, PLAN, INIT, DISCREPANCY, EXPORT)
+COMMANDS = (ROBUST, OPTIMISE, SIMULATE, IDENTIFY, PLAN, INIT, DISCREPANCY, EXPORT, TABLE_7)
 """Commands in the order of the help."""
 
 
@@ -43,8 +44,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         for line in _message(error).splitlines():
             print(f"pymoo-hdte: error: {line}", file=sys.stderr)
         return MISTAKE
-    except KeyboardInterrupt:
-        print(f"pymoo-hdte: {how_it_ended()}", file=sys.stderr)
+    except KeyboardInterrupt as stopped:
+        kept = str(stopped) or "nothing was written"
+        print(f"pymoo-hdte: interrupted, {kept}", file=sys.stderr)
         return INTERRUPTED
     return 0
 

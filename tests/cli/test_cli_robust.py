@@ -187,7 +187,8 @@ def test_ctrl_c_tells_where_finished_runs_are_and_the_command_goes_on(folder):
     _, errors = started.communicate(timeout=60)
     assert started.returncode == INTERRUPTED
     assert errors.decode() == (
-        "pymoo-hdte: interrupted, finished runs are kept in study_runs.jsonl\n"
+        "pymoo-hdte: interrupted, finished runs are kept in study_runs.jsonl;"
+        " the same command goes on from there\n"
     )
     kept = [line for line in runs.read_text().splitlines(True) if '"at"' in line]
     assert robust("study.toml", "--out", "report", "--quiet") == 0

@@ -6,7 +6,6 @@ import pytest
 from drawn_pictures import drawn_and_stored
 from places import DOCS
 
-from experiments.runner.campaign import Campaign
 from experiments.runner.registry import Context
 from experiments.studies.suites import data as suites
 from experiments.studies.suites.bbob_tables import CITED, reached
@@ -19,6 +18,7 @@ from experiments.studies.suites.suite_tables import (
     signs_together,
 )
 from experiments.studies.suites.suite_tables import ranks as suite_ranks
+from pymoo_hdte._runner.campaign import Campaign
 
 WORDS = " ".join((DOCS / "which_algorithm.md").read_text(encoding="utf-8").split())
 

@@ -15,9 +15,6 @@ from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
-from experiments.comparing.figures import ALGORITHM_STYLES, grid, plain_log_scale
-from experiments.comparing.indicators import NAMES
-from experiments.comparing.statistics import mean_intervals
 from experiments.paper.anytime.data import (
     NAME,
     OF_TABLE_7,
@@ -52,11 +49,14 @@ from experiments.paper.anytime.tables import (
     standings_table,
     stated_table,
 )
-from experiments.published_values import TABLE_7
 from experiments.runner.committed import committed_file, read_origin, stored_outcome
 from experiments.runner.registry import Context
-from experiments.runner.result import Cell, Column, Finding, Picture, Result, Table
 from experiments.runner.texts import paragraphs
+from pymoo_hdte._comparing.figures import ALGORITHM_STYLES, grid, plain_log_scale
+from pymoo_hdte._comparing.indicators import NAMES
+from pymoo_hdte._comparing.published import TABLE_7
+from pymoo_hdte._comparing.statistics import mean_intervals
+from pymoo_hdte._runner.result import Cell, Column, Finding, Picture, Result, Table
 
 LABELS = {"igd": "IGD [arcsec]", "spacing": "Spacing [arcsec]", "hypervolume": "hypervolume"}
 PRINTED = ("igd", "spacing")

@@ -19,8 +19,6 @@ from typing import Any
 
 import numpy as np
 
-from experiments.runner.campaign import Campaign, Run
-from experiments.runner.workers import make_executor
 from experiments.studies.blind.campaigns import IDEAL, campaign_of, hiding
 from experiments.studies.blind.cases import Case, all_cases
 from experiments.studies.blind.data import outcome
@@ -28,6 +26,8 @@ from experiments.studies.blind.outcome import Outcome
 from experiments.studies.blind.rig.nuisances import GROUPS, LEVELS, MILD, Nuisances
 from experiments.studies.blind.scoring import COLUMNS, verdict_scores
 from experiments.studies.blind.truth import may_be_named
+from pymoo_hdte._runner.campaign import Campaign, Run
+from pymoo_hdte._runner.workers import make_executor
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy._verdicts.drive import examine_drive
 

@@ -24,22 +24,8 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.figure import Figure
 
-from experiments.comparing.figures import BLUE, GREEN, ORANGE, grid
-from experiments.comparing.statistics import rate
 from experiments.runner.committed import stored_outcome
 from experiments.runner.registry import Context
-from experiments.runner.result import (
-    NEW,
-    NOT_SHOWN,
-    SHOWN,
-    Cell,
-    Column,
-    Finding,
-    Picture,
-    Result,
-    Table,
-    scored,
-)
 from experiments.runner.texts import paragraphs
 from experiments.studies.robust.data import (
     ACCURACY,
@@ -57,6 +43,20 @@ from experiments.studies.robust.data import (
 )
 from experiments.studies.robust.functions import BY_NAME, FUNCTIONS
 from experiments.studies.robust.task import DESIGNS
+from pymoo_hdte._comparing.figures import BLUE, GREEN, ORANGE, grid
+from pymoo_hdte._comparing.statistics import rate
+from pymoo_hdte._runner.result import (
+    NEW,
+    NOT_SHOWN,
+    SHOWN,
+    Cell,
+    Column,
+    Finding,
+    Picture,
+    Result,
+    Table,
+    scored,
+)
 
 (PROTOCOL,) = paragraphs("robust")
 CHOSEN = (

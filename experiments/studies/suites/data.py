@@ -10,15 +10,15 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.runner.campaign import Run
 from experiments.runner.committed import committed_file, read_rows, rounded, table_with_origin
 from experiments.runner.registry import Context, require
-from experiments.runner.store import write_atomically
 from experiments.studies.suites.coco import EXTRA
 from experiments.studies.suites.jobs import MEASURES, BbobRun, SuiteRun
 from experiments.studies.suites.peers import OURS, PEERS, takes
 from experiments.studies.suites.problems import PROBLEMS, SUITES, problem_of
 from experiments.studies.suites.protocol import FULL, STORED, BbobPart, SuitePart
+from pymoo_hdte._runner.campaign import Run
+from pymoo_hdte._runner.store import write_atomically
 
 NAME = "suites"
 BBOB = f"{NAME}_bbob"

@@ -8,8 +8,6 @@ from typing import NamedTuple
 import numpy as np
 
 from experiments.comparing.rivals import RivalTest, better_than_each
-from experiments.comparing.statistics import mean, rate, state_of
-from experiments.runner.result import SCORE_STATES, Cell, Column, Table, scored, significant
 from experiments.studies.suites.bbob_tables import BEST, CITED, reached, reached_shares
 from experiments.studies.suites.data import Outcome
 from experiments.studies.suites.peers import OURS
@@ -32,6 +30,8 @@ from experiments.studies.suites.suite_tables import (
     signs_together,
     tests,
 )
+from pymoo_hdte._comparing.statistics import mean, rate, state_of
+from pymoo_hdte._runner.result import SCORE_STATES, Cell, Column, Table, scored, significant
 
 
 class Demand(NamedTuple):

@@ -11,10 +11,8 @@ from importlib.util import find_spec
 
 import numpy as np
 
-from experiments.runner.campaign import Campaign
 from experiments.runner.committed import stored_outcome
 from experiments.runner.registry import Context
-from experiments.runner.result import NEW, Cell, Column, Finding, Picture, Result, Table
 from experiments.runner.texts import paragraphs
 from experiments.studies.suites import protocol
 from experiments.studies.suites.bbob_tables import BEST, CITED, duels_table, reached, shares_table
@@ -39,6 +37,8 @@ from experiments.studies.suites.suite_tables import (
     rivals_table,
     together_table,
 )
+from pymoo_hdte._runner.campaign import Campaign
+from pymoo_hdte._runner.result import NEW, Cell, Column, Finding, Picture, Result, Table
 
 SETTING, SETS, PEERS_NOTE = paragraphs("suites", ours=OURS, difficulty=DIFFICULTY)
 

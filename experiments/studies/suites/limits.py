@@ -29,17 +29,17 @@ from pymoo.problems import get_problem
 from pymoo.util.ref_dirs import get_reference_directions
 from scipy.stats import rankdata
 
-from experiments.comparing.indicators import front_among
 from experiments.runner.committed import (
     DATA,
     committed_file,
     read_rows,
     table_with_origin,
 )
-from experiments.runner.result import Cell, Column, Table
-from experiments.runner.store import write_atomically
 from experiments.studies.suites.jobs import measured
 from experiments.studies.suites.problems import SUITES, problem_of
+from pymoo_hdte._comparing.indicators import front_among
+from pymoo_hdte._runner.result import Cell, Column, Table
+from pymoo_hdte._runner.store import write_atomically
 from pymoo_hdte.algorithms import CompactSwarm, ElitistSwarm
 from pymoo_hdte.algorithms.compact import size_for
 

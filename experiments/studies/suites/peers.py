@@ -13,10 +13,10 @@ from pymoo.core.problem import Problem
 from pymoo.util.ref_dirs import get_reference_directions
 
 from experiments.comparing.contestants import CONTESTANTS, Contestant, of_jmetal
-from experiments.comparing.indicators import front_among
 from experiments.comparing.peers_pymoo import OWN, POPULATION, PYMOO, Offer, run_pymoo
 from experiments.studies.suites.coco import StartBox
 from experiments.studies.suites.reduced import LESS
+from pymoo_hdte._comparing.indicators import front_among
 from pymoo_hdte.algorithms import CompactSwarm
 
 OURS = "CompactSwarm"

@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 from pymoo.core.problem import Problem
 from pymoo.problems import get_problem
 
-from experiments.comparing.indicators import CORNER
 from experiments.runner.committed import committed_file, read_rows
 from experiments.studies.suites.formulas.engineering import MEMBERS, make_engineering
 from experiments.studies.suites.formulas.imop import imop_front, make_imop
 from experiments.studies.suites.formulas.lz09 import lz09_front, make_lz09
 from experiments.studies.suites.formulas.zcat import make_zcat, zcat_front
+from pymoo_hdte._comparing.indicators import CORNER
 
 DIFFICULTY = 5
 """Of DAS-CMOP: the fifth triplet of pymoo's sixteen, which are those of its authors."""

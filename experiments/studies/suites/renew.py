@@ -11,13 +11,13 @@ import argparse
 from collections.abc import Collection, Iterable, Sequence
 from pathlib import Path
 
-from experiments.runner.campaign import Campaign
 from experiments.runner.committed import DATA
-from experiments.runner.result import Cell, Column, Table
 from experiments.studies.suites.data import Outcome, stored, write_outcome
 from experiments.studies.suites.jobs import BbobRun, SuiteRun
 from experiments.studies.suites.peers import ON_BBOB, ON_SUITES
 from experiments.studies.suites.protocol import STORED, BbobPart
+from pymoo_hdte._runner.campaign import Campaign
+from pymoo_hdte._runner.result import Cell, Column, Table
 from pymoo_hdte.checks import one_of
 
 COMMAND = "python -m experiments.studies.suites.renew; runs of unchanged algorithms are kept"

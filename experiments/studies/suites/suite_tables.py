@@ -8,12 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.comparing import indicators as measures
-from experiments.comparing.paired import SIGNIFICANT
-from experiments.comparing.ranks import average_ranks
 from experiments.comparing.rivals import RivalTest, signs_against, tests_of_medians
-from experiments.comparing.statistics import rate
-from experiments.runner.result import Cell, Column, Table
 from experiments.studies.suites.bbob_tables import BEST, CITED, reached
 from experiments.studies.suites.coco import FUNCTIONS
 from experiments.studies.suites.data import Outcome
@@ -28,6 +23,11 @@ from experiments.studies.suites.protocol import (
     HELD_OUT,
     VALIDATION,
 )
+from pymoo_hdte._comparing import indicators as measures
+from pymoo_hdte._comparing.paired import SIGNIFICANT
+from pymoo_hdte._comparing.ranks import average_ranks
+from pymoo_hdte._comparing.statistics import rate
+from pymoo_hdte._runner.result import Cell, Column, Table
 
 NAMES = {name: measures.NAMES[name] for name in ("hypervolume", "igd_plus")}
 SWARMS = (OURS, "ElitistSwarm")

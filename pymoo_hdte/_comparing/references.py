@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 from pymoo.core.problem import Problem
 
-from experiments.comparing.indicators import front_among
-from experiments.comparing.named import OF_PROBLEMS, problem_named
-from experiments.comparing.quality import N_POINTS, TrueFront, even_curve
-from experiments.comparing.runs import robust_problem
-from experiments.runner.setting import Setting
+from pymoo_hdte._comparing.indicators import front_among
+from pymoo_hdte._comparing.named import OF_PROBLEMS, problem_named
+from pymoo_hdte._comparing.quality import N_POINTS, TrueFront, even_curve
+from pymoo_hdte._comparing.runs import robust_problem
+from pymoo_hdte._comparing.setting import Setting
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.problems.drive_response import OBJECTIVES
 

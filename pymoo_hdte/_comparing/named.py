@@ -25,10 +25,11 @@ from pymoo.optimize import minimize
 from pymoo.problems import get_problem
 from pymoo.util.ref_dirs import get_reference_directions
 
-from experiments.comparing.runs import ALGORITHMS, FINAL_SIZE, final_rows, robust_problem
-from experiments.runner.campaign import Run
-from experiments.runner.provenance import fingerprint
-from experiments.runner.setting import Setting
+from pymoo_hdte._comparing.runs import ALGORITHMS, FINAL_SIZE, final_rows, robust_problem
+from pymoo_hdte._comparing.setting import Setting
+from pymoo_hdte._comparing.trace import TracingEvaluator
+from pymoo_hdte._runner.campaign import Run
+from pymoo_hdte._runner.provenance import fingerprint
 from pymoo_hdte.algorithms import CompactSwarm, ElitistSwarm
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.drive import PRESETS
@@ -217,8 +218,9 @@ class OpenRun:
         """
         problem = problem_named(self.problem)
         algorithm = algorithm_named(self.algorithm, self.population, self.problem)
+        evaluator, budget = TracingEvaluator(), ("n_eval", self.evaluations)
         with seeded_default_rng(self.seed):
-            ended = minimize(problem, algorithm, ("n_eval", self.evaluations), seed=self.seed)
+            ended = minimize(problem, algorithm, budget, seed=self.seed, evaluator=evaluator)
         spent = ended.algorithm.evaluator.n_eval
         columns = (SPENT, *(f"x{1 + i}" for i in range(problem.n_var)))
         columns += tuple(f"f{1 + i}" for i in range(problem.n_obj))
@@ -231,12 +233,12 @@ class OpenRun:
         if not len(F):
             nothing = np.full((1, len(columns)), np.nan)
             nothing[0, 0] = spent
-            return Run(columns, nothing, ended.exec_time)
+            return Run(columns, nothing, ended.exec_time, trace=evaluator.trace)
         best = is_nondominated(F, keep_weakly=True)
         X, F = X[best], F[best]
         final = final_rows(F)
         rows = np.hstack([np.full((len(final), 1), spent), X[final], F[final]])
-        return Run(columns, rows, ended.exec_time)
+        return Run(columns, rows, ended.exec_time, trace=evaluator.trace)
 
 
 @contextmanager

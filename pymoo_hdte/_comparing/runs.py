@@ -12,7 +12,8 @@ from pymoo.algorithms.moo.nsga2 import NSGA2
 from pymoo.core.algorithm import Algorithm
 from pymoo.optimize import minimize
 
-from experiments.runner.campaign import Run
+from pymoo_hdte._comparing.trace import TracingEvaluator
+from pymoo_hdte._runner.campaign import Run
 from pymoo_hdte.algorithms import (
     AMOPSO,
     AMPMOPSO,
@@ -84,11 +85,14 @@ class OptimisationRun:
         """
         problem = robust_problem(self.model)
         algorithm = ALGORITHMS[self.algorithm](self.population, self.final_size)
-        ended = minimize(problem, algorithm, ("n_gen", self.generations), seed=self.seed)
+        evaluator = TracingEvaluator()
+        budget = ("n_gen", self.generations)
+        ended = minimize(problem, algorithm, budget, seed=self.seed, evaluator=evaluator)
         spent = ended.algorithm.evaluator.n_eval
         if spent != self.population * self.generations:
             raise RuntimeError(f"{self.key} spent {spent} evaluations: no fair comparison")
         X, F = ended.opt.get("X", "F")
         rows = final_rows(F, self.final_size)
         columns = (*problem.var_names, *problem.obj_names)
-        return Run(columns, np.hstack([X[rows], F[rows]]), ended.exec_time)
+        values = np.hstack([X[rows], F[rows]])
+        return Run(columns, values, ended.exec_time, trace=evaluator.trace)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from experiments.comparing.runs import robust_problem
+from pymoo_hdte._comparing.runs import robust_problem
 
 FITTED = ("calibrated", "resonant")
 """Presets whose values were fitted to the moments of Table 8, every band of it read as ±5 %."""

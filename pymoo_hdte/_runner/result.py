@@ -25,6 +25,21 @@ SHOWN, NOT_SHOWN, MISSED = "Shown", "Not shown", "Missed"
 itself does but its interval does not, as there are too few cases, or the score does not."""
 SCORE_STATES = (SHOWN, NOT_SHOWN, MISSED)
 
+MOODS = {
+    "Contradicts": "no",
+    "Consistent": "yes",
+    "Differs": "no",
+    "Agrees": "yes",
+    "Missed by the fit": "no",
+    "Fitted": "fitted",
+    "Fails": "no",
+    "Holds": "yes",
+    MISSED: "no",
+    NOT_SHOWN: "open",
+    SHOWN: "yes",
+}
+"""The style in which a page shows a finding, by its `Finding.verdict`."""
+
 
 @dataclass(frozen=True)
 class Finding:
@@ -182,6 +197,8 @@ class Result:
         Parts of the sections of `FIRST_PAGE`, each beginning in lower case.
     shown_first
         Name of the picture that the first page shows, if any.
+    question
+        What it answers, where that is not the question of the experiment.
     """
 
     title: str
@@ -194,6 +211,7 @@ class Result:
     notes: tuple[str, ...] = ()
     first_page: Mapping[str, str] = field(default_factory=dict)
     shown_first: str = ""
+    question: str = ""
 
     def __post_init__(self) -> None:
         unknown = set(self.first_page) - set(FIRST_PAGE)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import inspect
+import io
 import json
 import platform
 import sys
@@ -26,10 +27,10 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 from tqdm import tqdm
 
-from experiments.runner.provenance import environment, fingerprint
-from experiments.runner.store import TIMES, write_atomically
-from experiments.runner.workers import WorkerLost, WrongWorker, arithmetic, interrupts_held_off
 from pymoo_hdte._io.csv_table import csv_text, read_text_table
+from pymoo_hdte._runner.provenance import environment, fingerprint
+from pymoo_hdte._runner.store import TIMES, write_atomically
+from pymoo_hdte._runner.workers import WorkerLost, WrongWorker, arithmetic, interrupts_held_off
 
 SOURCE = "source or versions"
 ONE_JOB = Lock()
@@ -40,13 +41,15 @@ ONE_JOB = Lock()
 class Run:
     """What one job gives: named columns of numbers (n, columns), and the seconds it took.
 
-    ``parts`` are the seconds of its parts, where they are needed.
+    ``parts`` are the seconds of its parts, where they are needed; ``trace`` (k, columns) is what
+    it noted on its way, where it did.
     """
 
     columns: tuple[str, ...]
     values: NDArray[np.float64]
     seconds: float
     parts: tuple[float, ...] = ()
+    trace: NDArray[np.float64] | None = None
 
 
 class Job(Protocol):
@@ -77,11 +80,16 @@ class Campaign:
         Folder of the results.
     executor
         Where the jobs run; None for this process.
+    silent
+        Whether there is no bar of progress; None for one on terminals alone.
     """
 
-    def __init__(self, out: Path, executor: Executor | None = None) -> None:
+    def __init__(
+        self, out: Path, executor: Executor | None = None, silent: bool | None = False
+    ) -> None:
         self.out = out
         self.executor = executor
+        self.silent = silent
 
     def run(self, jobs: Sequence[Job], title: str) -> list[Run]:
         """Return the runs in the order of ``jobs``; only those not on disk are executed.
@@ -101,7 +109,8 @@ class Campaign:
         """
         pending = [job for job in jobs if not self._finished(job)]
         done = len(jobs) - len(pending)
-        with tqdm(total=len(jobs), initial=done, desc=title, unit="run", delay=2.0) as progress:
+        bar = {"desc": title, "unit": "run", "delay": 2.0, "disable": self.silent}
+        with tqdm(total=len(jobs), initial=done, **bar) as progress:
 
             def keep(job: Job, run: Run) -> None:
                 self._keep(job, run)
@@ -132,6 +141,11 @@ class Campaign:
         path = self._path(job).relative_to(self.out)
         return (self.out / TIMES / path).with_suffix(".txt")
 
+    def _trace_path(self, job: Job) -> Path:
+        # Not with_suffix, which takes what follows a point in the name of a job for a suffix.
+        path = self._path(job)
+        return path.with_name(f"{job.key}.npy")
+
     def _finished(self, job: Job) -> bool:
         return self._path(job).is_file() and self._time_path(job).is_file()
 
@@ -142,13 +156,18 @@ class Campaign:
             write_atomically(settings, f"{described}\n".encode())
         times = "".join(f"{seconds!r}\n" for seconds in (run.seconds, *run.parts))
         write_atomically(self._time_path(job), times.encode())
+        if run.trace is not None:
+            np.save(buffer := io.BytesIO(), run.trace)
+            write_atomically(self._trace_path(job), buffer.getvalue())
         table = csv_text(run.columns, run.values.tolist())
         write_atomically(self._path(job), table.encode())
 
     def _read(self, job: Job) -> Run:
         run = read_run(self._path(job))
         seconds, *parts = map(float, self._time_path(job).read_text().split())
-        return Run(run.columns, run.values, seconds, tuple(parts))
+        noted = self._trace_path(job)
+        trace = np.load(noted) if noted.is_file() else None
+        return Run(run.columns, run.values, seconds, tuple(parts), trace)
 
 
 def read_run(path: Path) -> Run:

@@ -10,10 +10,10 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from experiments.runner.provenance import environment, report_fingerprint
-from experiments.runner.result import Column, Finding, Picture, Result, Table, significant
 from pymoo_hdte._io.csv_table import csv_text
 from pymoo_hdte._io.whole_file import write_whole
+from pymoo_hdte._runner.provenance import environment, fingerprint
+from pymoo_hdte._runner.result import Column, Finding, Picture, Result, Table, significant
 
 RESULT = "result.json"
 TIMES = "times"
@@ -38,6 +38,7 @@ class StoredResult:
     name: str
     title: str
     command: str
+    question: str
     answer: str
     paragraphs: tuple[str, ...]
     models: dict[str, str]
@@ -66,11 +67,12 @@ def write_atomically(path: Path, content: bytes) -> None:
     write_whole(path, content)
 
 
-def save(out: Path, name: str, result: Result) -> None:
+def save(out: Path, name: str, result: Result, made_by: str | None = None) -> None:
     """Store ``result`` of the experiment ``name`` under ``out``.
 
     Tables go to CSV and figures to PNG in ``out/name``; tables of wall times to ``out/times/name``.
-    ``result.json`` is written last, so it never names a file that is missing.
+    ``result.json`` is written last, so it never names a file that is missing. ``made_by`` is the
+    fingerprint of the source, by default that of the package.
     """
     timed = [table for table in result.tables if table.wall_times]
     steady = [table for table in result.tables if not table.wall_times]
@@ -84,6 +86,7 @@ def save(out: Path, name: str, result: Result) -> None:
     described = {
         "title": result.title,
         "command": result.command,
+        "question": result.question,
         "answer": result.answer,
         "paragraphs": result.paragraphs,
         "models": dict(result.models),
@@ -95,7 +98,7 @@ def save(out: Path, name: str, result: Result) -> None:
         "first_page": dict(result.first_page),
         "shown_first": result.shown_first,
         "versions": environment(),
-        "made_by": report_fingerprint(),
+        "made_by": made_by or fingerprint(),
     }
     _write_json(out / TIMES / name / RESULT, [asdict(table) for table in timed])
     _write_json(out / name / RESULT, described)

@@ -11,7 +11,6 @@ from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
-import experiments
 import pymoo_hdte
 
 PACKAGES = ("numpy", "scipy", "finufft", "numba", "pymoo", "moocore", "chaospy", "matplotlib")
@@ -42,7 +41,7 @@ def fingerprint(*sources: Path) -> str:
     the work of another.
     """
     digest = hashlib.sha256(json.dumps(environment()).encode())
-    for path in [*_files(Path(pymoo_hdte.__file__).parent), *sources]:
+    for path in [*files_below(Path(pymoo_hdte.__file__).parent), *sources]:
         digest.update(f"{path.name} {path.stat().st_size}\n".encode() + path.read_bytes())
     return digest.hexdigest()[:16]
 
@@ -56,7 +55,7 @@ def source_fingerprint() -> str:
     """
     digest = hashlib.sha256()
     package = Path(pymoo_hdte.__file__).parent
-    for path in [path for room in _COMPUTES for path in _files(package / room)]:
+    for path in [path for room in _COMPUTES for path in files_below(package / room)]:
         digest.update(f"{path.relative_to(package).as_posix()}\n".encode())
         digest.update(_code(path) if path.suffix == ".py" else path.read_bytes())
     return digest.hexdigest()[:16]
@@ -77,14 +76,7 @@ def _is_text(line: ast.stmt) -> bool:
     return isinstance(value, ast.Constant) and isinstance(value.value, str)
 
 
-def report_fingerprint() -> str:
-    """Identify the state of everything in this repository that a finished result depends on.
-
-    That is the source, and the stored outcomes and the template of the page beside it.
-    """
-    return fingerprint(*_files(Path(experiments.__file__).parent))
-
-
-def _files(folder: Path) -> list[Path]:
+def files_below(folder: Path) -> list[Path]:
+    """Return all files of a folder and of those in it, but compiled modules."""
     paths = (path for path in folder.rglob("*") if "__pycache__" not in path.parts)
     return sorted(path for path in paths if path.is_file())

@@ -2,22 +2,22 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import product
+from itertools import combinations, product
 
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.comparing.indicators import smaller_is_better
-from experiments.comparing.named import OpenRun, problem_named, source_of
-from experiments.comparing.quality import Quality, TrueFront
-from experiments.comparing.references import MODELS, objective_names, reference
-from experiments.comparing.runs import ALGORITHMS, OptimisationRun
-from experiments.comparing.statistics import effect_size, holm, wilcoxon_p
-from experiments.runner.campaign import Run
-from experiments.runner.registry import Context
-from experiments.runner.setting import Setting
+from pymoo_hdte._comparing.indicators import smaller_is_better
+from pymoo_hdte._comparing.named import OpenRun, problem_named, source_of
+from pymoo_hdte._comparing.quality import Quality, TrueFront
+from pymoo_hdte._comparing.references import MODELS, objective_names, reference
+from pymoo_hdte._comparing.runs import ALGORITHMS, OptimisationRun
+from pymoo_hdte._comparing.setting import Setting
+from pymoo_hdte._comparing.statistics import effect_size, holm, wilcoxon_p
+from pymoo_hdte._runner.campaign import Campaign, Run
 
 SIGNIFICANT = 0.05
 """Level of the paired tests, after Holm's correction."""
@@ -28,12 +28,14 @@ class PairedTest:
     """How one algorithm does against a rival on the same seeds.
 
     ``better`` is the probability that a run of the algorithm beats one of the rival (A12, ties
-    counted half); ``p`` is Wilcoxon's after Holm's correction over all rivals.
+    counted half); ``p`` is Wilcoxon's after Holm's correction over all rivals; ``equal`` is the
+    number of seeds on which both have the same value.
     """
 
     rival: str
     p: float
     better: float
+    equal: int
 
     @property
     def significant(self) -> bool:
@@ -41,15 +43,20 @@ class PairedTest:
         return self.p < SIGNIFICANT
 
 
-LEAST_SEEDS = 7
-"""With fewer, no Wilcoxon test against three rivals can fall below 5 % after Holm's correction."""
+def least_seeds(tests: int) -> int:
+    """Return with how many seeds the smallest of so many tests can fall below `SIGNIFICANT`.
+
+    Wilcoxon's least p of n pairs is 2 / 2**n, and Holm multiplies the smallest by their number.
+    """
+    return math.floor(math.log2(2 * max(tests, 1) / SIGNIFICANT)) + 1
 
 
 def too_few_seeds(comparisons: Sequence[Comparison]) -> tuple[str, ...]:
     """Return the note that explains missing verdicts, if there are too few seeds for them."""
     if all(comparison.can_be_judged for comparison in comparisons):
         return ()
-    return (f"Fewer than {LEAST_SEEDS} seeds: too few to judge differences, so no verdicts.",)
+    least = least_seeds(len(comparisons[0].algorithms) - 1)
+    return (f"Fewer than {least} seeds: too few to judge differences, so no verdicts.",)
 
 
 @dataclass(frozen=True)
@@ -93,8 +100,8 @@ class Comparison:
 
     @property
     def can_be_judged(self) -> bool:
-        """Whether there are seeds enough for a difference to be significant at all."""
-        return min(map(len, self.runs.values())) >= LEAST_SEEDS
+        """Whether there are seeds enough for one against its rivals to differ significantly."""
+        return len(self.seeds) >= least_seeds(len(self.algorithms) - 1)
 
     def values(self, algorithm: str, indicator: str) -> NDArray[np.float64]:
         """Return a field of `Quality` for every run, shape (seeds,)."""
@@ -103,6 +110,10 @@ class Comparison:
     def seconds(self, algorithm: str) -> NDArray[np.float64]:
         """Return the wall time of every run, shape (seeds,)."""
         return np.array([run.seconds for run in self.runs[algorithm]])
+
+    def traces(self, algorithm: str) -> list[NDArray[np.float64]]:
+        """Return what every run noted on its way, see `trace.TracingEvaluator`."""
+        return [run.trace for run in self.runs[algorithm] if run.trace is not None]
 
     def median_front(self, algorithm: str) -> NDArray[np.float64]:
         """Return the objectives (n, m) of the run whose IGD is the (lower) median."""
@@ -119,22 +130,76 @@ class Comparison:
             effect_size(values, ours) if smaller_is_better(indicator) else effect_size(ours, values)
             for values in theirs
         ]
-        return [PairedTest(*entry) for entry in zip(rivals, adjusted.tolist(), better, strict=True)]
+        equal = [int(np.sum(ours == values)) for values in theirs]
+        tests = zip(rivals, adjusted.tolist(), better, equal, strict=True)
+        return [PairedTest(*entry) for entry in tests]
+
+
+@dataclass(frozen=True)
+class Standing:
+    """How the algorithms of a comparison stand by one indicator.
+
+    Tests are Wilcoxon's on the same seeds, with Holm's correction over all pairs of algorithms.
+
+    Attributes
+    ----------
+    ordered
+        Names, the best mean first.
+    level, behind, ahead
+        Those that the tests do not tell from the first, those that are worse on the seeds' ranks,
+        and those that are better though their mean is not; each with its p.
+    same
+        Groups of two names or more that have the same value on every seed.
+    decidable
+        Whether there are seeds enough for any pair to differ significantly.
+    """
+
+    ordered: tuple[str, ...]
+    level: dict[str, float]
+    behind: dict[str, float]
+    ahead: dict[str, float]
+    same: tuple[tuple[str, ...], ...]
+    decidable: bool
+
+
+def standing(comparison: Comparison, indicator: str) -> Standing:
+    """Return who is ahead on an indicator of `Quality`, and who is level."""
+    sign = 1.0 if smaller_is_better(indicator) else -1.0
+    costs = {name: sign * comparison.values(name, indicator) for name in comparison.algorithms}
+    best, *others = ordered = sorted(costs, key=lambda name: float(costs[name].mean()))
+    pairs = list(combinations(ordered, 2))
+    p = holm([wilcoxon_p(costs[one], costs[other]) for one, other in pairs]).tolist()
+    # Pairs with the first come first.
+    beside = dict(zip(others, p, strict=False))
+    differ = [name for name in others if beside[name] < SIGNIFICANT]
+    better = {name: effect_size(costs[name], costs[best]) > 0.5 for name in differ}
+    groups: dict[bytes, tuple[str, ...]] = {}
+    for name, of_one in costs.items():
+        groups[of_one.tobytes()] = (*groups.get(of_one.tobytes(), ()), name)
+    return Standing(
+        tuple(ordered),
+        {name: beside[name] for name in others if name not in differ},
+        {name: beside[name] for name in differ if better[name]},
+        {name: beside[name] for name in differ if not better[name]},
+        tuple(names for names in groups.values() if len(names) > 1),
+        len(comparison.seeds) >= least_seeds(len(pairs)),
+    )
 
 
 Job = OptimisationRun | OpenRun
 
 
-def compare(context: Context, algorithms: Sequence[str], title: str) -> list[Comparison]:
-    """Run every algorithm on every problem of the setting with its seeds; measure the final sets.
+def compare(
+    setting: Setting, seeds: range, campaign: Campaign, algorithms: Sequence[str], title: str
+) -> list[Comparison]:
+    """Run every algorithm on every problem of the setting with every seed; measure final sets.
 
     ``algorithms`` are those of the table, unless the setting names others.
     """
-    setting, seeds = context.setting, context.seeds_to_run
     names = setting.algorithms or tuple(algorithms)
     entries = list(product(setting.problems, names, seeds))
     jobs = [_job(setting, *entry) for entry in entries]
-    runs = context.campaign.run(jobs, title)
+    runs = campaign.run(jobs, title)
     finished = {entry: (job, run) for entry, job, run in zip(entries, jobs, runs, strict=True)}
     return [
         _comparison(problem, {a: [finished[problem, a, s] for s in seeds] for a in names}, seeds)

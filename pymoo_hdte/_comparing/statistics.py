@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.stats import binomtest, bootstrap, quantile_test, wilcoxon
 from scipy.stats import t as student
 
-from experiments.runner.result import MISSED, NOT_SHOWN, SHOWN, significant
+from pymoo_hdte._runner.result import MISSED, NOT_SHOWN, SHOWN, significant
 from pymoo_hdte.identification.error_samples import holm
 
 SIGNIFICANCE = 0.01
@@ -140,7 +140,7 @@ def a12_intervals(first: NDArray[np.float64], second: NDArray[np.float64]) -> ND
 
 
 def _a12(first: NDArray[np.float64], second: NDArray[np.float64], axis: int) -> NDArray[np.float64]:
-    """As `experiments.comparing.statistics.effect_size`, of many cases at once."""
+    """As `pymoo_hdte._comparing.statistics.effect_size`, of many cases at once."""
     a, b = (np.moveaxis(x, axis, -1) for x in (first, second))
     difference = a[..., :, np.newaxis] - b[..., np.newaxis, :]
     return 0.5 + 0.5 * np.sign(difference).mean(axis=(-2, -1))
@@ -189,10 +189,11 @@ def summary(values: ArrayLike) -> Summary:
 def wilcoxon_p(first: ArrayLike, second: ArrayLike) -> float:
     """Two-sided p-value of the Wilcoxon signed-rank test on paired runs (n,) and (n,).
 
-    Pairs that are equal carry no sign and are dropped; if all are equal, p is 1. The result is NaN
-    where a run has no value.
+    Pairs that are equal, infinite ones too, carry no sign and are dropped; if all are equal, p is
+    1. The result is NaN where a run has no value.
     """
-    difference = np.asarray(first, dtype=float) - np.asarray(second, dtype=float)
+    a, b = _floats(first), _floats(second)
+    difference = np.subtract(a, b, where=a != b, out=np.zeros(a.shape))
     if np.isnan(difference).any():
         return float("nan")
     differing = difference[difference != 0.0]

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.stats import chi2, rankdata, studentized_range
 from scipy.stats import f as fisher
 
-from experiments.comparing.paired import SIGNIFICANT
+from pymoo_hdte._comparing.paired import SIGNIFICANT
 from pymoo_hdte.checks import InvalidInput, real_number, whole_number
 
 OF_PROBLEMS = ("problems", "algorithms")

@@ -76,3 +76,19 @@ class Setting:
         if self.algorithms:
             given += ["--algorithms", ",".join(self.algorithms)]
         return given
+
+    def command(self, program: str, seeds: range) -> str:
+        """Return the command line by which a program runs this with these seeds."""
+        return " ".join([program, "--seeds", counted(seeds), *self.options()])
+
+
+def counted(numbers: range) -> str:
+    """Return a range as the command line takes it."""
+    start, end = numbers[0], numbers[-1]
+    return f"{end}" if start == 1 else f"{start}-{end}"
+
+
+def in_words(seeds: range) -> str:
+    """Return the seeds for a sentence."""
+    start, end = seeds[0], seeds[-1]
+    return f"seeds {start} to {end}" if start < end else f"seed {start}"

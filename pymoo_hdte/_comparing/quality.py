@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 from moocore import is_nondominated
 from numpy.typing import ArrayLike, NDArray
 
-from experiments.comparing.indicators import IndicatorsAgainst
+from pymoo_hdte._comparing.indicators import IndicatorsAgainst
 from pymoo_hdte.checks import finite_array
 
 GAP = 0.02
@@ -59,6 +60,11 @@ class TrueFront:
         self.F = front
         self._in_pieces = in_pieces and front.shape[1] == 2
         self._indicators = IndicatorsAgainst(front)
+
+    @cached_property
+    def hypervolume(self) -> float:
+        """Its own hypervolume, as `Quality` has that of others."""
+        return self._indicators(self.F).hypervolume
 
     def normalise(self, F: NDArray[np.float64]) -> NDArray[np.float64]:
         """Map the ideal point to 0 and the nadir point to 1."""

@@ -2,33 +2,72 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
-from experiments.comparing.indicators import NAMES
-from experiments.comparing.paired import Comparison
-from experiments.comparing.runs import FINAL_SIZE
-from experiments.comparing.statistics import summary
-from experiments.paper.models import models_of
-from experiments.published_values import AlgorithmQuality
-from experiments.runner.registry import Context
-from experiments.runner.result import Cell, Column, Finding, Table, significant
+import numpy as np
+
+from pymoo_hdte._comparing.indicators import NAMES
+from pymoo_hdte._comparing.models import models_of
+from pymoo_hdte._comparing.paired import Comparison, least_seeds, standing
+from pymoo_hdte._comparing.published import AlgorithmQuality
+from pymoo_hdte._comparing.runs import FINAL_SIZE
+from pymoo_hdte._comparing.setting import Setting, in_words
+from pymoo_hdte._comparing.statistics import summary
+from pymoo_hdte._runner.result import Cell, Column, Finding, Table, significant
 from pymoo_hdte.drive import PRESETS
 
 WHO = (Column("problem"), Column("algorithm"))
 TESTED = ("igd", "spacing", "hypervolume")
 
 
-def least_igd(comparisons: Sequence[Comparison]) -> str:
-    """Say for every problem which algorithm has the least mean IGD."""
-    sentences = []
-    for comparison in comparisons:
-        means = {
-            name: float(comparison.values(name, "igd").mean()) for name in comparison.algorithms
-        }
-        best = min(means, key=means.__getitem__)
-        least = significant(means[best], 3)
-        sentences.append(f"On {comparison.model}, {best} has the least mean IGD, {least}.")
-    return " ".join(sentences)
+def answer(comparisons: Sequence[Comparison], seeds: range) -> str:
+    """Say for every problem which algorithm is ahead by IGD, or which are level, with p."""
+    return " ".join(_standing_in_words(comparison, in_words(seeds)) for comparison in comparisons)
+
+
+def _standing_in_words(comparison: Comparison, seeds: str) -> str:
+    found, where = standing(comparison, "igd"), f"On {comparison.model}, {seeds}"
+    values = {name: comparison.values(name, "igd") for name in found.ordered}
+    best, *others = found.ordered
+    if not np.isfinite(values[best].mean()):
+        return f"{where}: every algorithm has a run without a feasible design."
+    means = {name: significant(float(of_one.mean()), 3) for name, of_one in values.items()}
+    if not others:
+        median = significant(float(np.median(values[best])), 3)
+        return f"{where}: {best} has a mean IGD of {means[best]}, median {median}."
+    end = f"; mean IGD {', '.join(f'{name} {mean}' for name, mean in means.items())}"
+    end += "".join(f"; {_and(names)} have the same IGD on every seed" for names in found.same)
+    if [len(names) for names in found.same] == [len(found.ordered)]:
+        return f"{where}: no difference{end}."
+    if not found.decidable:
+        few = f"fewer than {least_seeds(math.comb(len(found.ordered), 2))} seeds"
+        return f"{where}: undecided, {few} cannot show a difference{end}."
+    clauses = []
+    if found.level:
+        least = significant(min(found.level.values()), 2)
+        clauses.append(f"{_and([best, *found.level])} are level (p ≥ {least})")
+    if found.behind:
+        largest = significant(max(found.behind.values()), 2)
+        clauses.append(f"{best} is ahead of {_and([*found.behind])} (p ≤ {largest})")
+    if found.ahead:
+        largest = significant(max(found.ahead.values()), 2)
+        clauses.append(f"{_and([*found.ahead])} do better on most seeds (p ≤ {largest})")
+    return f"{where}: {', '.join(clauses)}{end}."
+
+
+def _and(names: Sequence[str]) -> str:
+    """Join names as a sentence does."""
+    return f"{', '.join(names[:-1])} and {names[-1]}" if len(names) > 1 else names[0]
+
+
+def question(setting: Setting, comparisons: Sequence[Comparison]) -> str:
+    """Ask what a comparison in another setting than the paper's answers."""
+    names = _and(comparisons[0].algorithms)
+    return (
+        f"Which of {names} comes nearest to the front of "
+        f"{_and(setting.problems)} within {setting.evaluations:,} evaluations?"
+    )
 
 
 def models_compared(comparisons: Sequence[Comparison]) -> dict[str, str]:
@@ -38,19 +77,21 @@ def models_compared(comparisons: Sequence[Comparison]) -> dict[str, str]:
     )
 
 
-def open_paragraphs(context: Context, comparisons: Sequence[Comparison]) -> tuple[str, ...]:
+def open_paragraphs(setting: Setting, comparisons: Sequence[Comparison]) -> tuple[str, ...]:
     """Say what differs from the setting that the paper states; nothing if only the seeds do."""
-    setting = context.setting
     if setting.is_stated:
         return ()
     unions = [comparison.model for comparison in comparisons if not comparison.is_true]
     sentences = [
         "Not the setting of the paper, whose numbers are therefore left out: "
         f"{'; '.join(setting.differences())}.",
-        f"Every run may spend {setting.evaluations:,} evaluations with a population of "
-        f"{setting.population}, and its feasible, non-dominated designs are thinned to at most "
-        f"{FINAL_SIZE} by crowding.",
+        f"Every run may spend {setting.evaluations:,} evaluations, with a population of "
+        f"{setting.population} where the algorithm takes one, and its feasible, non-dominated "
+        f"designs are thinned to at most {FINAL_SIZE} by crowding.",
         "IGD and Spacing come from pymoo, with ideal and nadir point of the reference front.",
+        "p is that of paired Wilcoxon tests over the seeds, after Holm's correction: over all "
+        "pairs of algorithms in the sentences, over the rivals of one in the table; level means "
+        "that it is not below 5 %, not that there is no difference.",
     ]
     if unions:
         sentences.append(f"No true front is known of {', '.join(unions)}: the union of all runs.")
@@ -64,14 +105,14 @@ def _other_budgets(evaluations: int, comparisons: Sequence[Comparison]) -> Itera
                 few, many = min(spent), max(spent)
                 shown = f"{few:,}" if few == many else f"{few:,} to {many:,}"
                 yield (
-                    f"No fair comparison: on {comparison.model}, {algorithm} spent {shown} "
-                    f"evaluations instead of {evaluations:,}."
+                    f"On {comparison.model}, {algorithm} spent {shown} evaluations instead of "
+                    f"{evaluations:,}."
                 )
 
 
-def subject(context: Context, of_the_paper: str) -> str:
+def subject(setting: Setting, of_the_paper: str) -> str:
     """Return the algorithm that the others are tested against: the first that was asked for."""
-    return context.setting.algorithms[0] if context.setting.algorithms else of_the_paper
+    return setting.algorithms[0] if setting.algorithms else of_the_paper
 
 
 def quality_table(
@@ -126,7 +167,7 @@ def coverage_table(comparisons: Sequence[Comparison], findings: Sequence[Finding
 def paired_tests_table(comparisons: Sequence[Comparison], algorithm: str) -> Table:
     """Paired tests of ``algorithm`` against every other one."""
     rows = [
-        (comparison.model, NAMES[indicator], test.rival, test.p, test.better)
+        (comparison.model, NAMES[indicator], test.rival, test.p, test.better, test.equal)
         for comparison in comparisons
         for indicator in TESTED
         for test in comparison.paired_tests(algorithm, indicator)
@@ -137,6 +178,7 @@ def paired_tests_table(comparisons: Sequence[Comparison], algorithm: str) -> Tab
         Column("rival"),
         Column("p, Wilcoxon with Holm", digits=2),
         Column(f"A12: {algorithm} better", digits=3),
+        Column("seeds with equal values"),
     )
     title = f"{algorithm} against each rival on the same seeds (A12 = 0.5: no difference)"
     return Table("tests", title, columns, tuple(rows))

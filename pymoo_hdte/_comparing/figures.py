@@ -11,8 +11,9 @@ from matplotlib.patches import Rectangle
 from matplotlib.ticker import LogFormatter
 from numpy.typing import ArrayLike, NDArray
 
-from experiments.comparing.paired import MODELS, Comparison
-from experiments.comparing.ranks import cliques
+from pymoo_hdte._comparing.paired import MODELS, Comparison
+from pymoo_hdte._comparing.ranks import cliques
+from pymoo_hdte._comparing.trace import Profile
 from pymoo_hdte.checks import InvalidInput, finite_array, one_of
 
 # Okabe and Ito's palette, told apart by colour-blind readers.
@@ -45,39 +46,77 @@ def grid(
     figure = Figure(figsize=(columns * width, rows * height), layout="constrained")
     axes = figure.subplots(rows, columns, squeeze=False, sharey="row" if share_rows else "none")
     for axis in axes.flat:
-        axis.grid(color="#E4E8EC", linewidth=0.6)
-        axis.set_axisbelow(True)
-        axis.spines[["top", "right"]].set_visible(False)
+        _prepare(axis)
     return figure, axes
 
 
-def fronts(comparisons: Sequence[Comparison]) -> Figure:
-    """Draw the run of median IGD of every algorithm over the reference front, one row each.
+def _prepare(axis: Axes) -> None:
+    axis.grid(color="#E4E8EC", linewidth=0.6)
+    axis.set_axisbelow(True)
+    axis.spines[["top", "right"]].set_visible(False)
 
-    Of more than two objectives, the first two are drawn.
+
+PANELS = 3
+"""Panels side by side, which a page of 1280 pixels still shows large enough to be read."""
+
+
+def fronts(comparison: Comparison) -> Figure:
+    """Draw the run of median IGD of every algorithm on one problem over the reference front.
+
+    Three objectives are drawn in three dimensions, more as parallel coordinates in which the
+    reference front runs from 0 to 1.
     """
-    algorithms = comparisons[0].algorithms
-    figure, axes = grid(len(comparisons), len(algorithms))
-    for comparison, row in zip(comparisons, axes, strict=True):
-        for place, (algorithm, axis) in enumerate(zip(algorithms, row, strict=True)):
-            colour, marker = style(algorithm, place)
-            _draw_reference(axis, comparison)
-            points = comparison.median_front(algorithm)[:, :2]
-            axis.plot(*points.T, marker, color=colour, markersize=4, mfc="none", label=algorithm)
-            axis.set_title(f"{algorithm}, {comparison.model}", fontsize=10)
-            axis.set_xlabel(comparison.objectives[0])
-            axis.legend(fontsize=8, frameon=False)
-        row[0].set_ylabel(comparison.objectives[1])
+    algorithms, n_obj = comparison.algorithms, len(comparison.objectives)
+    draw = {2: _in_the_plane, 3: _in_space}.get(n_obj, _as_lines)
+    rows = -(-len(algorithms) // PANELS)
+    columns = -(-len(algorithms) // rows)
+    height = 4.0 if n_obj == 3 else 3.4
+    figure = Figure(figsize=(4.0 * columns, height * rows), layout="constrained")
+    for place, algorithm in enumerate(algorithms):
+        projection = "3d" if n_obj == 3 else None
+        axis = figure.add_subplot(rows, columns, place + 1, projection=projection)
+        colour, marker = style(algorithm, place)
+        draw(axis, comparison, comparison.median_front(algorithm), colour, marker)
+        axis.set_title(f"{algorithm}, {comparison.model}", fontsize=10)
     return figure
 
 
-def _draw_reference(axis: Axes, comparison: Comparison) -> None:
-    if comparison.is_true and len(comparison.objectives) == 2:
+def _in_the_plane(
+    axis: Axes, comparison: Comparison, points: NDArray[np.float64], colour: str, marker: str
+) -> None:
+    _prepare(axis)
+    if comparison.is_true:
         own = "front of the order-3 surrogate" if comparison.model in MODELS else "true front"
         draw_true_front(axis, comparison.truth.pieces, own)
-        return
-    label = "true front" if comparison.is_true else "union of runs"
-    axis.plot(*comparison.truth.F[:, :2].T, ".", color=GREY, markersize=2, label=label)
+    else:
+        axis.plot(*comparison.truth.F.T, ".", color=GREY, markersize=2, label="union of runs")
+    axis.plot(*points.T, marker, color=colour, markersize=4, mfc="none")
+    axis.set(xlabel=comparison.objectives[0], ylabel=comparison.objectives[1])
+    axis.legend(fontsize=8, frameon=False)
+
+
+def _in_space(
+    axis: Axes, comparison: Comparison, points: NDArray[np.float64], colour: str, marker: str
+) -> None:
+    axis.plot(*comparison.truth.F.T, ".", color=GREY, markersize=2, alpha=0.6)
+    axis.plot(*points.T, marker, color=colour, markersize=4)
+    axis.set(**dict(zip(("xlabel", "ylabel", "zlabel"), comparison.objectives, strict=True)))
+    axis.tick_params(labelsize=7)
+    # From the side of the ideal point, so that nothing hides the front.
+    axis.view_init(elev=25.0, azim=225.0)  # type: ignore[attr-defined]
+    # The layout knows nothing of the labels in space.
+    axis.set_box_aspect(None, zoom=0.86)  # type: ignore[call-arg]
+
+
+def _as_lines(
+    axis: Axes, comparison: Comparison, points: NDArray[np.float64], colour: str, marker: str
+) -> None:
+    _prepare(axis)
+    places = range(len(comparison.objectives))
+    axis.axhspan(0.0, 1.0, color="#E4E8EC")
+    axis.plot(places, comparison.truth.normalise(points).T, color=colour, linewidth=0.7)
+    axis.set_xticks(places, comparison.objectives, fontsize=8)
+    axis.set_ylabel("of the reference front's extent")
 
 
 def draw_true_front(
@@ -91,8 +130,11 @@ def draw_true_front(
 
 def igd_of_runs(comparisons: Sequence[Comparison]) -> Figure:
     """Draw every run's IGD on a logarithmic axis, with the median marked."""
-    figure, axes = grid(1, len(comparisons), width=5.0, height=3.2)
-    for comparison, axis in zip(comparisons, axes[0], strict=True):
+    columns = min(len(comparisons), 2)
+    figure, axes = grid(-(-len(comparisons) // columns), columns, width=5.0, height=3.2)
+    for axis in axes.flat[len(comparisons) :]:
+        axis.remove()
+    for comparison, axis in zip(comparisons, axes.flat, strict=False):
         for place, algorithm in enumerate(comparison.algorithms):
             colour, marker = style(algorithm, place)
             values = np.sort(comparison.values(algorithm, "igd"))
@@ -107,6 +149,25 @@ def igd_of_runs(comparisons: Sequence[Comparison]) -> Figure:
             axis.tick_params(axis="x", rotation=30)
         axis.set_ylabel("IGD")
         axis.set_title(comparison.model, fontsize=10)
+    return figure
+
+
+def targets_reached(comparisons: Sequence[Comparison], shares: Sequence[Profile]) -> Figure:
+    """Draw for every algorithm which share of all targets its runs had reached by each budget."""
+    figure, axes = grid(1, 1, width=8.5, height=4.2)
+    (axis,) = axes.flat
+    # The later the thinner, so that equal lines are all seen.
+    widths = np.linspace(4.0, 1.5, len(shares)).tolist()
+    for place, (algorithm, profile, width) in enumerate(
+        zip(comparisons[0].algorithms, shares, widths, strict=True)
+    ):
+        colour, marker = style(algorithm, place)
+        axis.step(*profile, where="post", color=colour, linewidth=width, label=algorithm)
+        axis.plot(*(values[-1] for values in profile), marker, color=colour, clip_on=False)
+    axis.set_xscale("log")
+    axis.xaxis.set_major_formatter("{x:,g}")
+    axis.set(ylim=(0.0, 1.0), xlabel="evaluations", ylabel="share of targets reached")
+    axis.legend(fontsize=9, frameon=False, loc="upper left")
     return figure
 
 
@@ -195,7 +256,7 @@ def rank_heatmap(
     Parameters
     ----------
     ranks : array_like, shape (problems, algorithms)
-        From `experiments.comparing.ranks.problem_ranks`.
+        From `pymoo_hdte._comparing.ranks.problem_ranks`.
     problems : sequence of str
         Names of the rows.
     groups : sequence of str
