@@ -12,8 +12,8 @@ from pymoo_hdte.drive._solve.free_angle import torus_of
 from pymoo_hdte.drive._solve.lead_response import lead_response, torque_lines
 from pymoo_hdte.drive._solve.torus import Torus
 from pymoo_hdte.effects.friction import CoulombFriction, NonlinearDrag
-from pymoo_hdte.effects.hysteresis import MaxwellSlip
 from pymoo_hdte.effects.gravity import Gravity
+from pymoo_hdte.effects.hysteresis import MaxwellSlip
 from pymoo_hdte.effects.ripple import BrakeRipple, CouplingTorque, PeriodicTorque
 from pymoo_hdte.effects.stiffness import HardeningStiffness, SoftWindup
 
