@@ -46,6 +46,7 @@ def _run(options: argparse.Namespace, say: Say) -> Outcome:
             f"Next: pymoo-hdte robust {first} --out report",
         ]
         return Outcome({"written": [str(first), str(simulator)]}, "\n".join(sentences))
+    from pymoo_hdte._interrupts import orderly
     from pymoo_hdte.cli.robust_report import FOLDER, write_robust_report
     from pymoo_hdte.cli.robust_study import read_study
 
@@ -53,11 +54,15 @@ def _run(options: argparse.Namespace, say: Say) -> Outcome:
         runs = options.study.with_name(f"{options.study.stem}_runs.jsonl")
         # As `say`: progress is for a terminal that is not to be quiet.
         shown = not options.quiet and _is_terminal()
-        with warnings.catch_warnings(record=True) as noted:
-            warnings.simplefilter("always", RuntimeWarning)
-            problem = _problem(study, runs, shown)
-            say("searching the front")
-            result = _searched(problem, study)
+        try:
+            with orderly(), warnings.catch_warnings(record=True) as noted:
+                warnings.simplefilter("always", RuntimeWarning)
+                problem = _problem(study, runs, shown)
+                say("searching the front")
+                result = _searched(problem, study)
+        except KeyboardInterrupt:
+            kept = f"finished runs are kept in {runs}; the same command goes on from there"
+            raise KeyboardInterrupt(kept) from None
         said = [str(entry.message) for entry in noted if entry.category is RuntimeWarning]
         say("writing the report")
         document = write_robust_report(study.title, problem, result, said, options.out)

@@ -5,6 +5,8 @@ import json
 import os
 import re
 import shlex
+import signal
+import subprocess
 import sys
 import time
 from contextlib import closing
@@ -12,9 +14,10 @@ from functools import partial
 
 import numpy as np
 import pytest
-from places import DOCS
+from places import DOCS, ROOT
 from scipy.stats import norm
 
+from pymoo_hdte._interrupts import INTERRUPTED
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.cli import command_line as cli
 from pymoo_hdte.cli import program
@@ -164,6 +167,35 @@ def test_finished_runs_are_not_made_again(folder):
     assert (folder / "calls").read_text() == calls + "x"
     (folder / "steps_of_a_test.py").write_text(STAIRCASE.replace("x * load", "x + load"))
     assert robust("study.toml", "--out", "report", "--quiet") == cli.MISTAKE
+
+
+def test_ctrl_c_tells_where_finished_runs_are_and_the_command_goes_on(folder):
+    slow = STAIRCASE.replace("    return", "    time.sleep(0.05)\n    return")
+    (folder / "steps_of_a_test.py").write_text("import time\n" + slow)
+    written(folder, goals=GOALS + "[surrogate]\naccuracy = 0.2\n")
+    command = [sys.executable, "-m", "pymoo_hdte.cli", "robust", "study.toml", "--out", "report"]
+    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+    # Whatever this process inherits: a shell starts programs in the background without Ctrl-C.
+    started = subprocess.Popen(
+        command,
+        stderr=subprocess.PIPE,
+        env=environment,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+    )
+    runs = folder / "study_runs.jsonl"
+    while not runs.exists() or runs.read_text().count('"at"') < 3:
+        time.sleep(0.02)
+        assert started.poll() is None
+    started.send_signal(signal.SIGINT)
+    _, errors = started.communicate(timeout=60)
+    assert started.returncode == INTERRUPTED
+    assert errors.decode() == (
+        "pymoo-hdte: interrupted, finished runs are kept in study_runs.jsonl;"
+        " the same command goes on from there\n"
+    )
+    kept = [line for line in runs.read_text().splitlines(True) if '"at"' in line]
+    assert robust("study.toml", "--out", "report", "--quiet") == 0
+    assert all(line in runs.read_text() for line in kept)
 
 
 def test_other_files_of_a_program_are_other_runs(folder):
