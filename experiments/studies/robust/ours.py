@@ -46,8 +46,8 @@ class Growth:
         Of the runs.
     whole_curve : bool
         Whether the errors of every fit are wanted.
-    others : bool
-        Whether other surrogates than polynomials are tried.
+    process : bool
+        Whether a normal process is tried, too.
 
     Attributes
     ----------
@@ -66,7 +66,7 @@ class Growth:
         budget: int,
         seed: int = 1,
         whole_curve: bool = True,
-        others: bool = False,
+        process: bool = False,
     ) -> None:
         self._task, self._accuracy, self._budget = task, accuracy, budget
         self._whole_curve, self._points = whole_curve, _cube(task)
@@ -80,7 +80,7 @@ class Growth:
         # An infinite accuracy has every fit shown, and `_watch` accepts none.
         with suppress(_Enough):
             fit_adaptively(
-                task.inputs.axes, function, np.inf, budget, rng, self._watch, others=others
+                task.inputs.axes, function, np.inf, budget, rng, self._watch, process=process
             )
 
     def _watch(self, fit: AdaptiveFit) -> bool:

@@ -61,7 +61,7 @@ def fitted_together(
         fitted(features, column, relevance, judged, lost, start, *others)
         for column, start in zip(values.T, found, strict=True)
     ]
-    parameters = [fit.regression.parameters for fit in fits]
+    parameters = [fit.parameters for fit in fits]
     if components is None:
         return fits, parameters
     field = _Field(components, fits)

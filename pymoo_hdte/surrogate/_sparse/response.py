@@ -28,6 +28,8 @@ COVERAGE_OF_DRAWS = 2.0
 
 Noise of a mesh is none: its errors belong to one function, too.
 """
+COVERAGE_OF_CUT = 1.96
+"""The same of what terms left out change, which is known: normal over the designs."""
 LEAST_SURPRISE = 0.3
 """Runs that are predicted better than expected make errors smaller by no more than this factor."""
 LOST = 0.05
@@ -45,6 +47,8 @@ As a share of the response's deviation over all runs.
 """
 MOST_CONVERTED = 3000
 """Terms that are looked at where another surrogate is made a polynomial."""
+LEARNT_FROM = 1000
+"""Points from which these terms are learnt; all points tell their coefficients."""
 MOST_FITTED = 0.4
 """Largest number of such terms as a share of the runs."""
 
@@ -79,6 +83,9 @@ class ResponseFit:
     Attributes
     ----------
     regression : Regression, Linked or Process
+        With which errors are estimated.
+    parameters : ndarray, shape (d, 3)
+        Of the regression of the response itself, from which that of more runs starts.
     indices : ndarray of int, shape (p, d)
         Degrees of the terms, a downward-closed set.
     coefficients : ndarray, shape (p,)
@@ -90,6 +97,7 @@ class ResponseFit:
     """
 
     regression: Surrogate
+    parameters: Array
     indices: Indices
     coefficients: Array
     left_out: Array
@@ -128,10 +136,11 @@ class ResponseFit:
             expected = np.hypot(expected, (COVERAGE_OF_DRAWS if counted else COVERAGE) * by_noise)
             expected = expected * max(self.regression.surprise, LEAST_SURPRISE)
             cut = np.array([abs(float(weights @ off)), _std(off, weights)])
+            expected = expected + COVERAGE_OF_CUT * cut
             # What runs scatter by themselves may as well be a part of the response.
             if not counted:
-                cut[1] += np.hypot(scatter, self.regression.noise_std) - scatter
-            errors.append(tuple((expected + cut) / scatter))
+                expected[1] += np.hypot(scatter, self.regression.noise_std) - scatter
+            errors.append(tuple(expected / scatter))
         mean, std = np.array(errors).T
         return mean, std
 
@@ -172,10 +181,10 @@ def fitted(
     left_out = float(np.sqrt(np.mean(regression.left_out**2)))
     if plain.alone or dense is None or left_out <= lost * float(np.std(values)):
         return plain
-    other = better(features, values, relevance, regression, start, process)
+    other = better(features, values, relevance, regression, process)
     if other is None:
         return plain
-    converted = _converted(other, dense(), judged, lost)
+    converted = _converted(other, regression.parameters, dense(), judged, lost)
     # A polynomial may follow it less well than it follows the response.
     least = LEAST_JUDGED * float(np.std(values))
 
@@ -206,6 +215,7 @@ def _plain(
     indices = closed(looked_at[essential])
     return ResponseFit(
         regression,
+        regression.parameters,
         indices,
         _posterior(regression, features, indices),
         regression.left_out,
@@ -214,21 +224,28 @@ def _plain(
 
 
 def _converted(
-    surrogate: Linked | Process, dense: list[Array], judged: Judged, lost: float
+    surrogate: Linked | Process,
+    parameters: Array,
+    dense: list[Array],
+    judged: Judged,
+    lost: float,
 ) -> ResponseFit:
     """Return a polynomial of another surrogate."""
     values = surrogate.predict(dense)
-    regression = Regression(dense, values, np.ones(len(values)), noisy=False)
+    some = [feature[:, :LEARNT_FROM] for feature in dense]
+    regression = Regression(some, values[:LEARNT_FROM], np.ones(LEARNT_FROM), noisy=False)
     scatters = [
         _std(surrogate.predict(features), weights)
         for features, weights in zip(judged.features, judged.weights, strict=True)
     ]
     looked_at = likely_terms(regression.variance, MOST_CONVERTED)
-    coefficients = _posterior(regression, dense, looked_at)
+    coefficients = _posterior(regression, some, looked_at)
     essential = largest(coefficients, lost * float(np.quantile(scatters, 0.1)))
     indices = closed(looked_at[essential])
-    own = _posterior(regression, dense, indices)
-    return ResponseFit(surrogate, indices, own, surrogate.left_out, alone=False)
+    # The regression tells which terms there are. Its own coefficients are differences of very
+    # large numbers, for the points are many more than the terms.
+    own, *_ = np.linalg.lstsq(products(dense, indices).copy(), values)
+    return ResponseFit(surrogate, parameters, indices, own, surrogate.left_out, alone=False)
 
 
 def _std(values: Array, weights: Array) -> float:
@@ -268,5 +285,8 @@ def _alone(
         leverage = np.minimum(np.sum(q**2, axis=1), 1.0 - 1e-12)
         left_out = (values - q @ (q.T @ values)) / (1.0 - leverage)
         if (error := float(np.sqrt(np.mean(left_out**2)))) < rms:
-            best, rms = ResponseFit(regression, chosen, solution, left_out, alone=True), error
+            fit = ResponseFit(
+                *(regression, regression.parameters, chosen, solution, left_out), alone=True
+            )
+            best, rms = fit, error
     return best

@@ -29,7 +29,6 @@ Array = NDArray[np.float64]
 class Surrogate(Protocol):
     """What stands behind a fit: `Regression`, or one of this module."""
 
-    parameters: Array
     left_out: Array
     surprise: float
     noise_std: float
@@ -90,22 +89,14 @@ class Linked:
     relevance : ndarray, shape (n,)
         As in `Regression`.
     link : Link
-    start : ndarray, shape (d, 3), or None
-        Parameters to start from.
     """
 
     def __init__(
-        self,
-        features: list[Array],
-        values: Array,
-        relevance: Array,
-        link: Link,
-        start: Array | None,
+        self, features: list[Array], values: Array, relevance: Array, link: Link
     ) -> None:
         self._link = link
         h = link.forth(values)
-        self._regression = Regression(features, h, relevance, start)
-        self.parameters = self._regression.parameters
+        self._regression = Regression(features, h, relevance)
         self.surprise = self._regression.surprise
         self.left_out: Array = values - link.back(h - self._regression.left_out)
         slope = float(np.sqrt(np.mean(link.slope(h) ** 2)))
@@ -138,14 +129,11 @@ class Process:
     """
 
     def __init__(
-        self, features: list[Array], values: Array, relevance: Array, start: Array | None
+        self, features: list[Array], values: Array, relevance: Array
     ) -> None:
         from sklearn.exceptions import ConvergenceWarning
         from sklearn.gaussian_process import GaussianProcessRegressor, kernels
 
-        self.parameters = np.tile((np.log(0.1), 0.0, 0.0), (len(features), 1))
-        if start is not None:
-            self.parameters = start
         points = _points(features)
         self._centre, self._unit = float(values.mean()), float(values.std()) or 1.0
         d = points.shape[1]
@@ -202,7 +190,6 @@ def better(
     values: Array,
     relevance: Array,
     plain: Regression,
-    start: Array | None,
     process: bool,
 ) -> Linked | Process | None:
     """Return another surrogate if it predicts the runs left out better by more than chance.
@@ -212,7 +199,7 @@ def better(
 
     Parameters
     ----------
-    features, values, relevance, start
+    features, values, relevance
         As in `Linked`.
     plain : Regression
         That of the response itself.
@@ -225,10 +212,10 @@ def better(
         return float(np.log(max(size, np.finfo(float).tiny)))
 
     others: list[Linked | Process] = [
-        Linked(features, values, relevance, link, None) for link in links_for(values)
+        Linked(features, values, relevance, link) for link in links_for(values)
     ]
     if process and _has_scikit_learn():
-        others.append(Process(features, values, relevance, start))
+        others.append(Process(features, values, relevance))
     best = min(others, key=off, default=None)
     if best is None or off(best) > off(plain) - 2.0 * np.sqrt(2.0 / len(values)):
         return None

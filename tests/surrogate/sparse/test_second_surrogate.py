@@ -56,7 +56,7 @@ ONES = np.ones(60)
 
 
 def chosen(values):
-    return better(FEATURES, values, ONES, Regression(FEATURES, values, ONES), None, process=True)
+    return better(FEATURES, values, ONES, Regression(FEATURES, values, ONES), process=True)
 
 
 def test_each_kind_is_taken_where_it_predicts_better():
@@ -95,12 +95,12 @@ def test_runs_left_out_are_predicted_as_if_they_had_not_been_made(kind):
     values = np.exp(np.sin(3.0 * x) + y) + 0.1
     if kind == "linked":
         (link,) = links_for(values)
-        whole = Linked(FEATURES, values, ONES, link, None)
+        whole = Linked(FEATURES, values, ONES, link)
         h = link.forth(values)
         expected = values - link.back(h - whole._regression.left_out)
         assert whole.left_out == pytest.approx(expected)
         return
-    whole = Process(FEATURES, values, ONES, None)
+    whole = Process(FEATURES, values, ONES)
     kernel, others = whole._model.kernel_, np.arange(60) != 7
     weights = np.linalg.solve(
         kernel(POINTS[others]), (values[others] - whole._centre) / whole._unit
@@ -113,7 +113,7 @@ def test_runs_left_out_are_predicted_as_if_they_had_not_been_made(kind):
 def test_the_spread_of_a_sum_is_that_of_the_posterior():
     x, y = POINTS.T
     values = np.abs(x) + y
-    process = Process(FEATURES, values, ONES, None)
+    process = Process(FEATURES, values, ONES)
     nodes, weights = leggauss(12)
     line = np.column_stack([nodes, 0.3 * np.ones(12)])
     features = EvenPolynomials(20)(line)
