@@ -358,9 +358,7 @@ FUNCTIONS = (
         {f"x{k}": _SHARE for k in range(1, 5)},
         ("x1", "x2"),
     ),
-    Function(
-        "jump", "Genz 1984, discontinuous", jump, dict.fromkeys(_THREE, _SHARE), ("x1", "x2")
-    ),
+    Function("jump", "Genz 1984, discontinuous", jump, dict.fromkeys(_THREE, _SHARE), ("x1", "x2")),
     Function("two kinks", "chosen here", two_kinks, dict.fromkeys(_THREE, _SHARE), ("x1", "x2")),
     Function(
         "failing region",

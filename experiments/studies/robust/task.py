@@ -20,6 +20,8 @@ Array = NDArray[np.float64]
 DESIGNS = 200
 JUDGED = 256
 """Draws of the scatter at every design at which surrogates are compared with the function."""
+OF_FIELD = 4
+"""Values of a field that others are tried on, each by itself; ours is on all of them."""
 TRUE_DRAWS = 2**14
 """Draws at every design for the true mean and deviation; these are off by some 0.01 %."""
 MIDDLE = 0.25
@@ -127,6 +129,12 @@ class Task:
             np.array([np.nanstd(block, axis=0) for block in values]),
         )
 
+    @cached_property
+    def tried(self) -> list[int]:
+        """Which of the values others are tried on: all, or a few over a field."""
+        count = self.judged[1].shape[2]
+        return np.unique(np.linspace(0, count - 1, OF_FIELD).round().astype(int)).tolist()
+
     def errors(self, estimates: Array) -> tuple[float, float]:
         """Return the errors of the standard deviation of a surrogate as shares of the true one.
 
@@ -134,7 +142,7 @@ class Task:
 
         Parameters
         ----------
-        estimates : ndarray, shape (200, 256, r)
+        estimates : ndarray, shape (200, 256, r) or (200, 256, len(tried))
             The surrogate at the judged points.
 
         Returns
@@ -145,6 +153,8 @@ class Task:
             Of the deviation over designs and scatter together.
         """
         _, true = self.judged
+        if estimates.shape[2] < true.shape[2]:
+            true = true[..., self.tried]
         estimates = np.where(np.isfinite(true), estimates, np.nan)
         ratios = np.abs(np.nanstd(estimates, axis=1) / np.nanstd(true, axis=1) - 1.0)
         together = np.nanstd(estimates, axis=(0, 1)) / np.nanstd(true, axis=(0, 1)) - 1.0

@@ -95,7 +95,7 @@ class Regression:
         self.parameters, self.noise = _learnt(features, standard, start, shares, noisy)
         self.variance, _ = variances(self.parameters, len(features[0]))
         self._noises = self.noise * shares
-        matrix = _with_nugget(covariance(features, features, self.variance), self._noises)
+        matrix = with_nugget(covariance(features, features, self.variance), self._noises)
         self._lower = cholesky(matrix, lower=True)
         self._inverse = cho_solve((self._lower, True), np.eye(len(values)))
         self.weights = self._inverse @ standard
@@ -147,7 +147,8 @@ class Regression:
         return self.unit * np.sqrt(self.size * variance)
 
 
-def _with_nugget(matrix: Array, noise: Array | float = 0.0) -> Array:
+def with_nugget(matrix: Array, noise: Array | float = 0.0) -> Array:
+    """Return a symmetric matrix whose diagonal is raised in place, by `NUGGET` and by noise."""
     matrix[np.diag_indices(len(matrix))] += NUGGET * np.trace(matrix) / len(matrix) + noise
     return matrix
 
@@ -202,7 +203,7 @@ def _misfit(
     of_axes = factors(features, features, variance)
     product = np.prod(of_axes, axis=0) if len(of_axes) < 3 else _product(of_axes)
     try:
-        lower = cholesky(_with_nugget(product.copy(), noise.sum() * shares), lower=True)
+        lower = cholesky(with_nugget(product.copy(), noise.sum() * shares), lower=True)
     except np.linalg.LinAlgError:
         return 1e10, np.zeros(flat.size + noise.size)
     inverse = cho_solve((lower, True), np.eye(len(standard)))

@@ -6,10 +6,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+
+# Its linear algebra loads when it is first used.
+import scipy
 from numpy.typing import NDArray
 
 from pymoo_hdte.surrogate._sparse.kernel import EvenPolynomials
-from pymoo_hdte.surrogate._sparse.regression import Regression
+from pymoo_hdte.surrogate._sparse.regression import Regression, with_nugget
 from pymoo_hdte.surrogate._sparse.second import Linked, Process, Surrogate, better
 from pymoo_hdte.surrogate._sparse.terms import closed, largest, likely_terms, products
 
@@ -244,7 +247,9 @@ def _converted(
     indices = closed(looked_at[essential])
     # The regression tells which terms there are. Its own coefficients are differences of very
     # large numbers, for the points are many more than the terms.
-    own, *_ = np.linalg.lstsq(products(dense, indices).copy(), values)
+    terms = products(dense, indices)
+    normal = with_nugget(terms.T @ terms)
+    own = scipy.linalg.solve(normal, terms.T @ values, assume_a="pos")
     return ResponseFit(surrogate, parameters, indices, own, surrogate.left_out, alone=False)
 
 

@@ -91,9 +91,7 @@ class Linked:
     link : Link
     """
 
-    def __init__(
-        self, features: list[Array], values: Array, relevance: Array, link: Link
-    ) -> None:
+    def __init__(self, features: list[Array], values: Array, relevance: Array, link: Link) -> None:
         self._link = link
         h = link.forth(values)
         self._regression = Regression(features, h, relevance)
@@ -128,9 +126,7 @@ class Process:
         If scikit-learn is not installed (extra ``process``).
     """
 
-    def __init__(
-        self, features: list[Array], values: Array, relevance: Array
-    ) -> None:
+    def __init__(self, features: list[Array], values: Array, relevance: Array) -> None:
         from sklearn.exceptions import ConvergenceWarning
         from sklearn.gaussian_process import GaussianProcessRegressor, kernels
 
