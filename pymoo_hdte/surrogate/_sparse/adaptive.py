@@ -42,10 +42,12 @@ of 8 % in one of twenty cases for 35 runs, but in one of three for 14.
 """
 BATCH = 0.12
 """Share of the runs that is added before all is judged anew; set by hand."""
-CONFIRMED, MARGIN = 0.02, 3.0
+CONFIRMED, MARGIN = 0.02, 2.0
 """Accuracy up to which stated errors are taken as they are, and by what coarser ones are divided.
 
-From few runs of a sum of log-normal values, stated errors were up to three times too small.
+Of three seeds of nineteen functions (kinks, jumps, peaks, waves, products of log-normal values),
+asked for 5, 10, 20 and 30 %, those that stopped were as accurate as asked for in 94 % without a
+margin, 98 % with 1.5 and all 160 with 2.
 """
 IN_A_ROW = 2
 """Judgements that have to pass one after the other; with few runs one may pass by chance."""
@@ -56,8 +58,8 @@ DEGREES = (6, 40)
 """Least and largest degree in one variable; between them a third of the runs."""
 OTHERS_AGAIN = 1.5
 """Ratio of runs from where no other surrogate was better to where one is tried again."""
-DENSE = 4000
-"""Points at which another surrogate than a polynomial is made one."""
+DENSE = 3000
+"""Points at which another surrogate than a polynomial is made one, two for each term."""
 LARGEST_ACCURACY = 0.01
 """Requested accuracy above which no more terms are left out."""
 SMALLEST_SCATTER = 0.1

@@ -155,8 +155,9 @@ class _Field:
             if fit.alone:
                 share = np.full(len(functionals), np.sqrt(np.mean(fit.left_out**2)))
             else:
-                surprise = max(fit.regression.surprise, LEAST_SURPRISE)
-                share = COVERAGE * surprise * fit.regression.spread(features, functionals)
+                of_mean, of_std = np.maximum(fit.regression.surprises, LEAST_SURPRISE)
+                share = COVERAGE * fit.regression.spread(features, functionals)
+                share *= np.append(of_mean, np.full(len(share) - 1, of_std))
                 off[:, k] = fit.regression.predict(features) - kept[:, k]
             squares += (np.array([np.full(len(pattern), share[0]), share[1:]]) * pattern) ** 2
         cut = off @ patterns

@@ -48,7 +48,7 @@ LEAST_JUDGED = 1e-2
 
 As a share of the response's deviation over all runs.
 """
-MOST_CONVERTED = 3000
+MOST_CONVERTED = 1500
 """Terms that are looked at where another surrogate is made a polynomial."""
 LEARNT_FROM = 1000
 """Points from which these terms are learnt; all points tell their coefficients."""
@@ -137,7 +137,7 @@ class ResponseFit:
             by_noise = self.regression.spread_by_noise(features, functionals)
             expected = COVERAGE * np.sqrt(np.maximum(expected**2 - by_noise**2, 0.0))
             expected = np.hypot(expected, (COVERAGE_OF_DRAWS if counted else COVERAGE) * by_noise)
-            expected = expected * max(self.regression.surprise, LEAST_SURPRISE)
+            expected = expected * np.maximum(self.regression.surprises, LEAST_SURPRISE)
             cut = np.array([abs(float(weights @ off)), _std(off, weights)])
             expected = expected + COVERAGE_OF_CUT * cut
             # What runs scatter by themselves may as well be a part of the response.

@@ -21,7 +21,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from pymoo_hdte.surrogate._sparse.regression import Regression
+from pymoo_hdte.surrogate._sparse.regression import Regression, surprises
 
 Array = NDArray[np.float64]
 
@@ -30,7 +30,7 @@ class Surrogate(Protocol):
     """What stands behind a fit: `Regression`, or one of this module."""
 
     left_out: Array
-    surprise: float
+    surprises: Array
     noise_std: float
 
     def predict(self, features: list[Array]) -> Array:
@@ -94,8 +94,8 @@ class Linked:
     def __init__(self, features: list[Array], values: Array, relevance: Array, link: Link) -> None:
         self._link = link
         h = link.forth(values)
-        self._regression = Regression(features, h, relevance)
-        self.surprise = self._regression.surprise
+        self._regression = Regression(features, h, relevance, of=values)
+        self.surprises = self._regression.surprises
         self.left_out: Array = values - link.back(h - self._regression.left_out)
         slope = float(np.sqrt(np.mean(link.slope(h) ** 2)))
         self.noise_std = self._regression.noise_std * slope
@@ -149,7 +149,7 @@ class Process:
         diagonal = np.diag(inverse)
         self.left_out: Array = self._unit * self._model.alpha_ / diagonal
         squares = (self._model.alpha_ / diagonal) ** 2 * diagonal
-        self.surprise = float(np.sqrt(np.average(squares, weights=relevance)))
+        self.surprises = surprises(squares, relevance, values)
         self._runs, self._inverse, self._noise = points, inverse, noise
 
     @cached_property
