@@ -208,8 +208,9 @@ def _needed_finding(outcome: Outcome) -> Finding:
         share.state(WANTED_AHEAD),
         "Our surrogate takes fewer runs than those of chaospy, OpenTURNS (chaos and Kriging) and a "
         f"plain Matern process on {len(won)} of {len(names)} functions, a share of "
-        f"{share.in_words}; at least {WANTED_AHEAD:g} is wanted. Of the {len(kept_out)} functions kept out of the choice of "
-        f"constants it does so on {len(set(won) & set(kept_out))}."
+        f"{share.in_words}; at least {WANTED_AHEAD:g} is wanted. Of the "
+        f"{len(kept_out)} functions kept out of the choice of constants it does so on "
+        f"{len(set(won) & set(kept_out))}."
         + (f" It does not on {lost}." if lost else "")
         + (f" Not run with all methods: {others}." if others else ""),
         answers=True,
