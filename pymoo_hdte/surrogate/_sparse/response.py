@@ -48,6 +48,12 @@ LEAST_JUDGED = 1e-2
 
 As a share of the response's deviation over all runs.
 """
+LOST_CONVERTED, OF_ITS_ERROR = 4.0, 0.1
+"""What terms left out of such a polynomial may lose: so many times `LOST`, or this of its error.
+
+Moments lose a fifth of it, which is part of the stated error; a product of eight inputs has 1500
+terms otherwise where 120 do.
+"""
 MOST_CONVERTED = 1500
 """Terms that are looked at where another surrogate is made a polynomial."""
 LEARNT_FROM = 1000
@@ -243,8 +249,9 @@ def _converted(
     ]
     looked_at = likely_terms(regression.variance, MOST_CONVERTED)
     coefficients = _posterior(regression, some, looked_at)
-    essential = largest(coefficients, lost * float(np.quantile(scatters, 0.1)))
-    indices = closed(looked_at[essential])
+    own_error = float(np.sqrt(np.mean(surrogate.left_out**2)))
+    lost = max(LOST_CONVERTED * lost * float(np.quantile(scatters, 0.1)), OF_ITS_ERROR * own_error)
+    indices = closed(looked_at[largest(coefficients, lost)])
     # The regression tells which terms there are. Its own coefficients are differences of very
     # large numbers, for the points are many more than the terms.
     terms = products(dense, indices)
