@@ -5,7 +5,9 @@ from importlib import import_module
 from pathlib import Path
 
 from numpydoc.xref import DEFAULT_LINKS
+from sphinx.application import Sphinx
 from sphinx.ext import autosummary
+from sphinx.util import logging
 
 import pymoo_hdte
 
@@ -28,6 +30,7 @@ extensions = [
     "numpydoc",
     "sphinx_gallery.gen_gallery",
 ]
+myst_enable_extensions = ["colon_fence"]
 exclude_patterns = ["guides"]
 templates_path = ["_templates"]
 html_theme = "furo"
@@ -81,3 +84,16 @@ sphinx_gallery_conf = {
     "min_reported_time": 1e9,
     "write_computation_times": False,
 }
+
+
+def setup(app: Sphinx) -> None:
+    """Say at the start how long it takes, since a first build otherwise seems to hang."""
+    app.connect("builder-inited", _announced, priority=0)
+
+
+def _announced(app: Sphinx) -> None:
+    guides = len(list(Path(__file__).with_name("guides").glob("*.py")))
+    logging.getLogger(__name__).info(
+        f"{guides} guides are run first, two at a time, and {app.outdir} is written then. A first "
+        "build takes some ten minutes; later ones run only what has changed."
+    )

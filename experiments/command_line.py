@@ -11,17 +11,18 @@ from concurrent.futures import BrokenExecutor
 from contextlib import ExitStack, nullcontext
 from pathlib import Path
 
-from experiments.runner.campaign import Campaign
 from experiments.runner.catalogue import EXPERIMENTS
 from experiments.runner.registry import Context, Experiment, ExtraMissing
-from experiments.runner.report import check_page, write_report
-from experiments.runner.setting import Setting
-from experiments.runner.store import save
-from experiments.runner.workers import WorkerLost, WrongWorker, make_executor
+from experiments.runner.report import check_page, report_fingerprint, write_report
+from pymoo_hdte._comparing.setting import Setting
 from pymoo_hdte._interrupts import INTERRUPTED, orderly
 from pymoo_hdte._reports.in_use import in_use
+from pymoo_hdte._runner.campaign import Campaign
+from pymoo_hdte._runner.store import save
+from pymoo_hdte._runner.workers import WorkerLost, WrongWorker, make_executor
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.cli.command import OneLineParser
+from pymoo_hdte.cli.table7 import NAMES, OPEN, SEEDS, add_setting_options, counted, positive
 from pymoo_hdte.surrogate.threads import usable_cores
 
 FAILED = 1
@@ -30,17 +31,8 @@ SMALL = [experiment for experiment in EXPERIMENTS if experiment.has_small_versio
 STORED = [experiment for experiment in EXPERIMENTS if experiment.reads_outcome]
 SEEDED = [experiment for experiment in EXPERIMENTS if experiment.takes_seeds]
 LIMITED = [experiment for experiment in EXPERIMENTS if experiment.takes_cases]
-SEEDS = 20
-"""Runs of every algorithm: the paper's number, and the default here."""
 IN_USE = ".in-use"
 """File that a run holds in its folder, so that a second one does not write there."""
-OPEN = {
-    "evaluations": "--evaluations",
-    "population": "--pop",
-    "problems": "--problems",
-    "algorithms": "--algorithms",
-}
-"""Fields of a setting, and the options that give them."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -93,7 +85,7 @@ def _run(chosen: Sequence[Experiment], context: Context) -> int:
     for experiment in chosen:
         print(f"{experiment.name}: {experiment.summary}", file=sys.stderr)
         try:
-            save(context.out, experiment.name, experiment.run(context))
+            save(context.out, experiment.name, experiment.run(context), report_fingerprint())
             report = write_report(context.out)
         except KeyboardInterrupt:
             # Further presses of Ctrl-C must not interrupt the orderly end of the workers.
@@ -128,14 +120,15 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--list", action="store_true", help="list the experiments and stop")
     parser.add_argument(
         "--seeds",
-        type=_counted,
+        type=counted,
         help=f"runs of every algorithm in {_names(SEEDED)} (default {SEEDS}), or their seeds: "
         "21-40",
     )
-    _add_open_options(parser)
+    about = f"another setting than the paper's, for {_names(SEEDED)}"
+    add_setting_options(parser.add_argument_group(about, NAMES))
     parser.add_argument(
         "--workers",
-        type=_positive,
+        type=positive,
         default=usable_cores(),
         help="processes (default: as many as there are cores to use)",
     )
@@ -144,7 +137,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument(
         "--cases",
-        type=_counted,
+        type=counted,
         help=f"with --full, only the first so many cases of {_names(LIMITED)}, or some: 97-192",
     )
     extent = parser.add_mutually_exclusive_group()
@@ -163,56 +156,6 @@ def _parser() -> argparse.ArgumentParser:
         "--dask", metavar="ADDRESS", help="run the jobs on this Dask scheduler instead"
     )
     return parser
-
-
-def _add_open_options(parser: argparse.ArgumentParser) -> None:
-    """Add the options that open a comparison to other problems, algorithms and budgets."""
-    opened = parser.add_argument_group(
-        f"another setting than the paper's, for {_names(SEEDED)}",
-        "Names are those of this package (calibrated, resonant, toy, the members of "
-        "robust_dte_family; AMP-MOPSO, MOPSO, NSGA-II, A-MOPSO, MP-MOPSO, ElitistSwarm, "
-        "CompactSwarm, which sizes itself), those of pymoo (zdt1; NSGA2), or module:name of a "
-        "module of yours. The first algorithm is tested against the others.",
-    )
-    opened.add_argument("--evaluations", type=_positive, help="of every run (default 10000)")
-    opened.add_argument(
-        "--pop", type=_positive, dest="population", help="size of the population (default 100)"
-    )
-    opened.add_argument(
-        "--problems", type=_listed, metavar="A,B", help="default calibrated,resonant"
-    )
-    opened.add_argument(
-        "--algorithms", type=_listed, metavar="A,B", help="default those of the paper's table"
-    )
-
-
-def _listed(text: str) -> tuple[str, ...]:
-    names = tuple(name.strip() for name in text.split(","))
-    if not all(names):
-        raise argparse.ArgumentTypeError(f"{text!r} is not a list of names like a,b")
-    return names
-
-
-def _counted(text: str) -> range:
-    """Return what a number, from 1 on, or a range stands for."""
-    start, dash, end = text.partition("-")
-    if not dash:
-        return range(1, _positive(text) + 1)
-    counted = range(_positive(start), _positive(end) + 1)
-    if not counted:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a range that rises, like 21-40")
-    return counted
-
-
-def _positive(text: str) -> int:
-    allowed = f"{text!r} is not a whole number of at least 1"
-    try:
-        number = int(text)
-    except ValueError:
-        raise argparse.ArgumentTypeError(allowed) from None
-    if number < 1:
-        raise argparse.ArgumentTypeError(allowed)
-    return number
 
 
 def _chosen(name: str | None, parser: argparse.ArgumentParser) -> list[Experiment]:

@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 
-from experiments.comparing.runs import AS_PRINTED, FIRST_STEP, VELOCITIES
 from experiments.paper import later_prototypes, published, table2, table5, table8
 from experiments.paper.anytime.data import OF_TABLE_7, Case, Contested, Scores, committed_scores
 from experiments.paper.anytime.measures import RETURNED
@@ -28,12 +27,14 @@ from experiments.paper.inference import experiment as inference
 from experiments.paper.inference.data import read_fits
 from experiments.paper.prototypes import consistency
 from experiments.paper.table8 import dominated
-from experiments.published_values import TABLE_5, TABLE_7, TABLE_8, TABLE_9, Moments
+from experiments.published_values import TABLE_5, TABLE_8, TABLE_9, Moments
 from experiments.runner.committed import committed_file
-from experiments.runner.result import WITHIN_PAPER, significant
-from experiments.runner.store import write_atomically
 from experiments.runner.texts import filled
 from experiments.studies import cost
+from pymoo_hdte._comparing.published import TABLE_7
+from pymoo_hdte._comparing.runs import AS_PRINTED, FIRST_STEP, VELOCITIES
+from pymoo_hdte._runner.result import WITHIN_PAPER, significant
+from pymoo_hdte._runner.store import write_atomically
 from pymoo_hdte.decision import PREFERENCES, WeightedUtopia
 from pymoo_hdte.problems import RobustDTE
 

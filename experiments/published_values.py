@@ -67,22 +67,6 @@ TABLE_6 = {
 """By number of the prototype."""
 
 
-class AlgorithmQuality(NamedTuple):
-    """One row of Table 7: means of 20 runs."""
-
-    igd: float
-    spacing: float
-    seconds: float
-
-
-TABLE_7 = {
-    "NSGA-II": AlgorithmQuality(0.2162, 0.1122, 22.86),
-    "MOPSO": AlgorithmQuality(0.0894, 0.0468, 22.13),
-    "AMP-MOPSO": AlgorithmQuality(0.0180, 0.0235, 22.28),
-}
-"""By name of the algorithm."""
-
-
 class Moments(NamedTuple):
     """One row of Table 8: mean and standard deviation of the DTE."""
 

@@ -15,16 +15,17 @@ from sphinx.application import Sphinx
 
 README = Path(__file__).parents[2] / "README.md"
 _BLOCK = re.compile(
-    r"^```(python|sh)\n(.*?)^```\n(?:\s*(?:This )?prints `(.*?)`)?", re.DOTALL | re.MULTILINE
+    r"^```(python|sh)\n(.*?)^```\n(?:This prints `(.*?)`|```text\n(.*?)^```)?",
+    re.DOTALL | re.MULTILINE,
 )
 
 
 def block_with(word: str, text: str) -> tuple[str, str, str]:
     """Return language, code and output of the only block with a word; the output may be empty."""
     (found,) = (one for one in _BLOCK.findall(text) if word in one[1])
-    language, code, printed = found
+    language, code, *printed = found
     # Sphinx colours code only if its source is the very text.
-    return language, code.rstrip("\n"), printed
+    return language, code.rstrip("\n"), "".join(printed).rstrip("\n")
 
 
 class ReadmeCode(Directive):

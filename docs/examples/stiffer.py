@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import matplotlib.pyplot as plt
 import numpy as np
 
-from experiments.runner.campaign import Run
 from experiments.runner.registry import Context
-from experiments.runner.result import Column, Finding, Picture, Result, Table
+from pymoo_hdte._runner.campaign import Run
+from pymoo_hdte._runner.result import Column, Finding, Picture, Result, Table
 from pymoo_hdte.problems import RobustDTE
 
 FACTORS = (0.8, 0.9, 1.0, 1.1, 1.2)

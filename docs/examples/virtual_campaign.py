@@ -54,4 +54,6 @@ if __name__ == "__main__":
     hidden = draw_effect("torque_ripple", BELIEVED, rng)
     campaign = run_campaign(draw_rig(BELIEVED, (hidden,), rng), BELIEVED, RIG, rng)
     write_campaign(campaign, folder)
-    print(f"{folder}: {len(campaign.running)} records; hidden is {hidden}")
+    ripple, order = (hidden.parameters[name] for name in ("ripple", "ripple_order"))
+    number = len(campaign.running)
+    print(f"{folder}: {number} records; hidden: a ripple of {ripple:.5f} N.m, order {order:g}")

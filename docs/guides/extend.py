@@ -345,9 +345,9 @@ sys.path[:0] = [str(HERE.parents[1]), str(HERE.parent / "examples")]
 
 from stiffer import run
 
-from experiments.runner.campaign import Campaign
 from experiments.runner.registry import Context
-from experiments.runner.store import load, save
+from pymoo_hdte._runner.campaign import Campaign
+from pymoo_hdte._runner.store import load, save
 
 with tempfile.TemporaryDirectory() as folder:
     out = Path(folder)

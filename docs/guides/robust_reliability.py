@@ -12,6 +12,7 @@ scatters normally by 0.3, and three limits.
 import matplotlib.pyplot as plt
 import numpy as np
 from pymoo.optimize import minimize
+from scipy.optimize import minimize as minimize_one
 from scipy.stats import norm
 
 from pymoo_hdte.algorithms import ElitistSwarm
@@ -19,6 +20,7 @@ from pymoo_hdte.problems import (
     Design,
     FailureProbability,
     Mean,
+    Quantile,
     Response,
     failure_probability,
     robust_problem,
@@ -111,3 +113,51 @@ margins = part(x1, x2)
 sampled = np.mean((margins["g1"] < 0.0) | (margins["g2"] < 0.0) | (margins["g3"] < 0.0))
 inside = abs(probability[place] - sampled) <= half[place] + 2e-7 * np.sqrt(sampled * 1e7)
 print(f"the stated band holds {sampled:.2e}:", bool(inside))
+
+# %%
+# The published problem
+# ---------------------
+#
+# Youn and Choi ask for the least cost at which each limit fails with at most the probability of
+# three standard deviations. As a limit on a quantile the same has a gradient, so that some steps of
+# a gradient method suffice.
+
+share = norm.cdf(-3.0)
+names = "g1", "g2", "g3"
+cheapest = robust_problem(
+    part,
+    {name: Design(2.5, 5.0, deviation=norm(0.0, 0.3)) for name in ("x1", "x2")},
+    objectives=[Mean(response="cost")],
+    constraints=[Quantile(share, response=name) >= 0.0 for name in names],
+    vectorised=True,
+    progress=False,
+)
+
+
+def cost_at(x):
+    """Return the mean cost and its gradient."""
+    F, dF = cheapest.evaluate(x[None], return_values_of=["F", "dF"])
+    return F[0, 0], dF[0, 0]
+
+
+limits = {
+    "type": "ineq",
+    "fun": lambda x: -cheapest.evaluate(x[None], return_values_of=["G"])[0],
+    "jac": lambda x: -cheapest.evaluate(x[None], return_values_of=["dG"])[0],
+}
+bounds = list(zip(*cheapest.bounds(), strict=True))
+optimum = minimize_one(
+    cost_at, [4.0, 4.0], jac=True, bounds=bounds, constraints=limits, method="SLSQP"
+)
+print(f"x1 = {optimum.x[0]:.2f}, x2 = {optimum.x[1]:.2f}, cost {optimum.fun:.2f}")
+print(f"{cheapest.n_runs} runs")
+
+# %%
+# The published optimum, (3.439, 3.287) at a cost of 6.73, replaces each limit by a plane at its
+# most probable point. Here the limits are taken as they are. At both designs, ten million samples
+# give these probabilities in units of the one that was asked for:
+
+for title, design in (("published", (3.439, 3.287)), ("here", optimum.x)):
+    x1, x2 = np.asarray(design)[:, None] + 0.3 * rng.normal(size=(2, 10**7))
+    margins = part(x1, x2)
+    print(f"{title:9}", *(f"{name}: {np.mean(margins[name] < 0.0) / share:.2f}" for name in names))

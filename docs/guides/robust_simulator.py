@@ -52,7 +52,8 @@ def mount(stiffness, damping, mass, speed):
 # What is designed has bounds, and a relative ``tolerance`` or an absolute ``deviation``. A number
 # stands for a uniform band; any distribution of `chaospy`, or a frozen one of `scipy.stats`, may be
 # given in its place. What is noise has a distribution; variables that depend on each other share a
-# joint one under a tuple of their names.
+# joint one under a tuple of their names. In the place of a distribution, ``Scenarios`` are values
+# with weights, and an ``Interval`` has ends alone: every goal is taken at its worst in between.
 
 designs = {
     "stiffness": Design(20.0, 60.0, tolerance=0.05),

@@ -1,1 +1,1 @@
-"""Seeded runs of algorithms: quality of their fronts, paired statistics, ranks and figures."""
+"""What several experiments compare with, and their outcomes on disk."""

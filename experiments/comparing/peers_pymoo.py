@@ -17,7 +17,7 @@ from pymoo.core.algorithm import Algorithm
 from pymoo.core.problem import Problem
 from pymoo.util.ref_dirs import get_reference_directions
 
-from experiments.comparing.named import seeded_default_rng
+from pymoo_hdte._comparing.named import seeded_default_rng
 from pymoo_hdte.algorithms import AMPMOPSO, ElitistSwarm, FirstStepWithinBounds
 
 POPULATION = 100
@@ -60,7 +60,7 @@ def _nsga3(problem: Problem) -> Algorithm:
     return NSGA3(directions)
 
 
-class _EndingAGEMOEA2(AGEMOEA2):
+class EndingAGEMOEA2(AGEMOEA2):
     """Ends where pymoo 0.6.2 divides by zero, because its front is degenerate.
 
     So does a run that finds no new design; what it held counts.
@@ -78,7 +78,7 @@ PYMOO: dict[str, Callable[[Problem], Algorithm]] = {
     "NSGA-II": lambda _: NSGA2(pop_size=POPULATION),
     "NSGA-III": _nsga3,
     "SMS-EMOA": lambda _: SMSEMOA(pop_size=POPULATION),
-    "AGE-MOEA-II": lambda _: _EndingAGEMOEA2(pop_size=POPULATION),
+    "AGE-MOEA-II": lambda _: EndingAGEMOEA2(pop_size=POPULATION),
     "MOPSO-CD": lambda _: MOPSO_CD(pop_size=POPULATION),
     "CMOPSO": lambda _: CMOPSO(pop_size=POPULATION),
 }

@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.stats import binomtest, mannwhitneyu, rankdata
 
-from experiments.comparing.indicators import smaller_is_better
-from experiments.comparing.paired import SIGNIFICANT
-from experiments.comparing.ranks import OF_PROBLEMS, OF_RUNS, costs_of
-from experiments.comparing.statistics import holm, state_of, wilcoxon_p
+from pymoo_hdte._comparing.indicators import smaller_is_better
+from pymoo_hdte._comparing.paired import SIGNIFICANT
+from pymoo_hdte._comparing.ranks import OF_PROBLEMS, OF_RUNS, costs_of
+from pymoo_hdte._comparing.statistics import holm, state_of, wilcoxon_p
 from pymoo_hdte.checks import InvalidInput, one_of
 
 

@@ -9,7 +9,7 @@ from typing import Generic, TypeVar
 
 from experiments.runner.committed import committed_file
 from experiments.runner.registry import Context
-from experiments.runner.store import TIMES, write_atomically
+from pymoo_hdte._runner.store import TIMES, write_atomically
 
 Scores = TypeVar("Scores")
 

@@ -6,24 +6,26 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from experiments.comparing.figures import fronts, igd_of_runs
-from experiments.comparing.named import check_setting
-from experiments.comparing.paired import Comparison, compare, too_few_seeds
-from experiments.paper.comparison_tables import (
+from experiments.runner.registry import Context
+from experiments.runner.texts import paragraphs
+from pymoo_hdte._comparing.named import check_setting
+from pymoo_hdte._comparing.paired import Comparison, compare, too_few_seeds
+from pymoo_hdte._comparing.pictures import front_pictures, run_pictures
+from pymoo_hdte._comparing.published import TABLE_7
+from pymoo_hdte._comparing.setting import in_words
+from pymoo_hdte._comparing.tables import (
+    answer,
     change,
     coverage_table,
-    least_igd,
     models_compared,
     open_paragraphs,
     paired_tests_table,
     quality_table,
+    question,
     runs_table,
     subject,
 )
-from experiments.published_values import TABLE_7
-from experiments.runner.registry import Context
-from experiments.runner.result import Finding, Picture, Result, significant
-from experiments.runner.texts import paragraphs
+from pymoo_hdte._runner.result import Finding, Result, significant
 
 __all__ = ["check_setting", "run"]
 
@@ -37,28 +39,27 @@ SETTING, FLOWCHART = paragraphs("ablation")
 def run(context: Context) -> Result:
     """Compare AMP-MOPSO with variants that lack strategies, or what the setting names."""
     stated = context.setting.is_stated
-    comparisons = compare(context, PARTS, "ablation")
+    setting, seeds = context.setting, context.seeds_to_run
+    comparisons = compare(setting, seeds, context.campaign, PARTS, "ablation")
     findings = [list(find(comparisons)) if stated else [] for find in (_evenness, _gaps)]
     return Result(
-        title=f"Fig. 17: ablation of AMP-MOPSO{'' if stated else ', open'}, "
-        f"{context.seeds_in_words}",
+        title=f"Fig. 17: ablation of AMP-MOPSO{'' if stated else ', open'}, {in_words(seeds)}",
         command=context.comparison_command("ablation"),
-        answer=_answer([*findings[0], *findings[1]]) if any(findings) else least_igd(comparisons),
-        paragraphs=(SETTING, FLOWCHART) if stated else open_paragraphs(context, comparisons),
+        question="" if stated else question(setting, comparisons),
+        answer=_answer([*findings[0], *findings[1]])
+        if any(findings)
+        else answer(comparisons, seeds),
+        paragraphs=(SETTING, FLOWCHART) if stated else open_paragraphs(setting, comparisons),
         models=models_compared(comparisons),
         tables=(
             quality_table(comparisons, TABLE_7 if stated else {}, findings[0]),
             coverage_table(comparisons, findings[1]),
-            paired_tests_table(comparisons, subject(context, FULL)),
+            paired_tests_table(comparisons, subject(setting, FULL)),
             runs_table(comparisons),
         ),
         pictures=(
-            Picture(
-                "fronts",
-                "As Fig. 17: for every variant the run of median IGD over the reference front.",
-                fronts(comparisons),
-            ),
-            Picture("igd", "IGD of every run; bars mark the medians.", igd_of_runs(comparisons)),
+            *front_pictures(comparisons, "Fig. 17" if stated else ""),
+            *run_pictures(comparisons, setting, subject(setting, FULL)),
         ),
         notes=too_few_seeds(comparisons) if stated else (),
     )

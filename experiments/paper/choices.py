@@ -9,11 +9,11 @@ from functools import cache
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from experiments.comparing.paired import designs, objectives
-from experiments.comparing.runs import OptimisationRun, robust_problem
 from experiments.paper.scatter import Inputs, dte_samples, exact_moments, scatter_of
 from experiments.published_values import TABLE_9, Moments
-from experiments.runner.campaign import Campaign
+from pymoo_hdte._comparing.paired import designs, objectives
+from pymoo_hdte._comparing.runs import OptimisationRun, robust_problem
+from pymoo_hdte._runner.campaign import Campaign
 from pymoo_hdte.decision import PREFERENCES, WeightedUtopia
 from pymoo_hdte.problems import RobustDTE
 from pymoo_hdte.problems.drive_response import SURROGATE_BOX

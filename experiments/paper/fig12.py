@@ -11,15 +11,15 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from scipy.stats import gaussian_kde, norm, skew
 
-from experiments.comparing.figures import BLUE, GREEN, GREY, ORANGE, grid
-from experiments.comparing.runs import robust_problem
 from experiments.paper.choices import scatter_indices
-from experiments.paper.models import FITTED, models_of
 from experiments.paper.scatter import dte_samples
 from experiments.published_values import TABLE_8, Moments
 from experiments.runner.registry import Context
-from experiments.runner.result import Column, Finding, Picture, Result, Table, significant
 from experiments.runner.texts import paragraphs
+from pymoo_hdte._comparing.figures import BLUE, GREEN, GREY, ORANGE, grid
+from pymoo_hdte._comparing.models import FITTED, models_of
+from pymoo_hdte._comparing.runs import robust_problem
+from pymoo_hdte._runner.result import Column, Finding, Picture, Result, Table, significant
 from pymoo_hdte.drive import PRESETS
 
 PAPER = TABLE_8["initial"]

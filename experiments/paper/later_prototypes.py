@@ -13,10 +13,10 @@ import numpy as np
 from scipy.stats import t as student
 from scipy.stats import ttest_ind_from_stats
 
-from experiments.comparing.statistics import holm
 from experiments.paper.bench.campaign import COEFFICIENTS, N_PROTOTYPES, NOMINAL_STIFFNESS
 from experiments.published_values import TABLE_3, TABLE_6
-from experiments.runner.result import WITHIN_PAPER, Column, Finding, Table, significant
+from pymoo_hdte._comparing.statistics import holm
+from pymoo_hdte._runner.result import WITHIN_PAPER, Column, Finding, Table, significant
 
 ALIKE = 0.05
 """Level of the test that tells two series of prototypes apart."""

@@ -13,10 +13,10 @@ from scipy.optimize import brentq
 from scipy.special import gamma
 from scipy.stats import gennorm
 
-from experiments.comparing.figures import BLUE, GREEN, GREY, ORANGE, grid
 from experiments.published_values import TABLE_5
-from experiments.runner.result import Cell, Column, Finding, Table, significant
 from experiments.runner.texts import paragraphs
+from pymoo_hdte._comparing.figures import BLUE, GREEN, GREY, ORANGE, grid
+from pymoo_hdte._runner.result import Cell, Column, Finding, Table, significant
 from pymoo_hdte.drive import PARAMETERS
 from pymoo_hdte.surrogate.tensor import chebyshev_basis, coefficients_from_nodes, products
 

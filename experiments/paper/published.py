@@ -9,12 +9,12 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from experiments.comparing.figures import BLUE, GREEN, GREY, ORANGE, grid
-from experiments.paper.models import models_of
 from experiments.paper.scatter import exact_moments
 from experiments.published_values import TABLE_8
 from experiments.runner.registry import Context
-from experiments.runner.result import (
+from pymoo_hdte._comparing.figures import BLUE, GREEN, GREY, ORANGE, grid
+from pymoo_hdte._comparing.models import models_of
+from pymoo_hdte._runner.result import (
     OF_MODELS,
     Column,
     Finding,

@@ -6,7 +6,6 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from experiments.comparing.statistics import at_least
 from experiments.paper.static_error.statistics import (
     N_PROTOTYPES,
     N_REPEATS,
@@ -36,7 +35,9 @@ from experiments.paper.static_error.tables import (
 )
 from experiments.published_values import TABLE_2
 from experiments.runner.registry import Context
-from experiments.runner.result import (
+from experiments.runner.texts import paragraphs
+from pymoo_hdte._comparing.statistics import at_least
+from pymoo_hdte._runner.result import (
     WITHIN_PAPER,
     Cell,
     Column,
@@ -46,7 +47,6 @@ from experiments.runner.result import (
     Table,
     significant,
 )
-from experiments.runner.texts import paragraphs
 from pymoo_hdte.drive import hs_20_100
 from pymoo_hdte.identification import (
     ErrorStatistics,

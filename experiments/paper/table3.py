@@ -9,8 +9,6 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from experiments.comparing.figures import BLUE, GREEN, ORANGE, PINK, grid
-from experiments.comparing.statistics import at_least, rate_p
 from experiments.paper.bench.campaign import (
     COEFFICIENTS,
     N_PROTOTYPES,
@@ -25,7 +23,10 @@ from experiments.paper.bench.campaign import (
 from experiments.paper.later_prototypes import later_prototypes_table, of_the_first_page
 from experiments.published_values import TABLE_3
 from experiments.runner.registry import Context
-from experiments.runner.result import (
+from experiments.runner.texts import paragraphs
+from pymoo_hdte._comparing.figures import BLUE, GREEN, ORANGE, PINK, grid
+from pymoo_hdte._comparing.statistics import at_least, rate_p
+from pymoo_hdte._runner.result import (
     Cell,
     Column,
     Finding,
@@ -34,7 +35,6 @@ from experiments.runner.result import (
     Table,
     significant,
 )
-from experiments.runner.texts import paragraphs
 from pymoo_hdte.drive import hs_20_100
 from pymoo_hdte.identification import LinearFit, Series, hysteresis_width, lost_energy, stiffness
 from pymoo_hdte.identification.damping import INPUT_SPEEDS, OUTPUT_SPEEDS

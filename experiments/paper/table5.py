@@ -11,9 +11,6 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from experiments.comparing.figures import BLUE, grid, reference_line
-from experiments.comparing.runs import robust_problem
-from experiments.paper.models import FITTED, models_of
 from experiments.paper.node_faults import (
     HIGH,
     LOW,
@@ -26,7 +23,10 @@ from experiments.paper.node_faults import (
 )
 from experiments.published_values import TABLE_5
 from experiments.runner.registry import Context
-from experiments.runner.result import (
+from pymoo_hdte._comparing.figures import BLUE, grid, reference_line
+from pymoo_hdte._comparing.models import FITTED, models_of
+from pymoo_hdte._comparing.runs import robust_problem
+from pymoo_hdte._runner.result import (
     WITHIN_PAPER,
     Cell,
     Column,

@@ -10,9 +10,6 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
-from experiments.comparing.figures import BLUE, GREY, ORANGE, grid
-from experiments.comparing.runs import robust_problem
-from experiments.paper.models import models_of
 from experiments.paper.prototypes.consistency import (
     Prediction,
     best_case_table,
@@ -30,7 +27,11 @@ from experiments.paper.prototypes.printed_validation import (
 )
 from experiments.published_values import TABLE_6
 from experiments.runner.registry import Context
-from experiments.runner.result import (
+from experiments.runner.texts import paragraphs
+from pymoo_hdte._comparing.figures import BLUE, GREY, ORANGE, grid
+from pymoo_hdte._comparing.models import models_of
+from pymoo_hdte._comparing.runs import robust_problem
+from pymoo_hdte._runner.result import (
     Column,
     Finding,
     Picture,
@@ -38,7 +39,6 @@ from experiments.runner.result import (
     Table,
     significant,
 )
-from experiments.runner.texts import paragraphs
 from pymoo_hdte.drive import PRESETS, DriveModel, low_pass, measured_dte, simulate_drive
 from pymoo_hdte.drive.measurement import CUTOFF, SAMPLING_RATE
 from pymoo_hdte.units import ARCSEC

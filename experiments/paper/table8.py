@@ -9,8 +9,6 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from scipy.stats import gaussian_kde
 
-from experiments.comparing.figures import BLUE, GREEN, GREY, ORANGE, PINK, grid
-from experiments.comparing.runs import robust_problem
 from experiments.paper.choices import (
     BAND,
     INITIAL,
@@ -24,7 +22,6 @@ from experiments.paper.choices import (
     paper_choices,
     preferred_choices,
 )
-from experiments.paper.models import FITTED, models_of
 from experiments.published_values import (
     BATCH_MODEL_SECONDS,
     BATCH_SIZE,
@@ -38,12 +35,16 @@ from experiments.published_values import (
     SPEED_UPS,
     SURROGATE_SECONDS,
     TABLE_6,
-    TABLE_7,
     TABLE_8,
     TABLE_9,
 )
 from experiments.runner.registry import Context
-from experiments.runner.result import (
+from experiments.runner.texts import paragraphs
+from pymoo_hdte._comparing.figures import BLUE, GREEN, GREY, ORANGE, PINK, grid
+from pymoo_hdte._comparing.models import FITTED, models_of
+from pymoo_hdte._comparing.published import TABLE_7
+from pymoo_hdte._comparing.runs import robust_problem
+from pymoo_hdte._runner.result import (
     OF_MODELS,
     WITHIN_PAPER,
     Cell,
@@ -55,7 +56,6 @@ from experiments.runner.result import (
     signed_percent,
     significant,
 )
-from experiments.runner.texts import paragraphs
 from pymoo_hdte.decision import deviation_degree, tolerance_band
 from pymoo_hdte.drive import hs_20_100
 

@@ -1,1 +1,1 @@
-"""What runs experiments: jobs on workers, their store, resume, provenance and the report."""
+"""Which experiments there are, their stored outcomes, provenance and report."""

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from experiments.runner.registry import Experiment
+from pymoo_hdte._comparing.published import QUESTION
 
 EXPERIMENTS = (
     Experiment(
         "table7",
         "paper.table7",
         "Table 7 and Fig. 18: AMP-MOPSO against MOPSO and NSGA-II",
-        "At the paper's budget, does AMP-MOPSO find a better front than MOPSO and NSGA-II?",
+        QUESTION,
         takes_seeds=True,
     ),
     Experiment(

@@ -11,9 +11,9 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
-from experiments.runner.provenance import environment, source_fingerprint
 from experiments.runner.registry import Context
 from pymoo_hdte._io.csv_table import csv_text, read_text_table
+from pymoo_hdte._runner.provenance import environment, source_fingerprint
 
 DATA = Path(__file__).parents[1] / "data"
 _ORIGIN = "# {"

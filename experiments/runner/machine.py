@@ -8,8 +8,8 @@ from pathlib import Path
 
 from threadpoolctl import threadpool_info
 
-from experiments.runner.provenance import environment
-from experiments.runner.result import Column, Table
+from pymoo_hdte._runner.provenance import environment
+from pymoo_hdte._runner.result import Column, Table
 from pymoo_hdte.surrogate.threads import usable_cores
 
 

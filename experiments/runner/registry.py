@@ -7,9 +7,9 @@ from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
 
-from experiments.runner.campaign import Campaign
-from experiments.runner.result import Result
-from experiments.runner.setting import Setting
+from pymoo_hdte._comparing.setting import Setting, counted
+from pymoo_hdte._runner.campaign import Campaign
+from pymoo_hdte._runner.result import Result
 
 
 class ExtraMissing(RuntimeError):
@@ -67,29 +67,16 @@ class Context:
         """The seeds of the experiments that take their number."""
         return range(self.setting.first_seed, self.setting.first_seed + self.seeds)
 
-    @property
-    def seeds_in_words(self) -> str:
-        """The seeds for a title."""
-        start, end = self.seeds_to_run[0], self.seeds_to_run[-1]
-        return f"seeds {start} to {end}" if start < end else f"seed {start}"
-
     def comparison_command(self, experiment: str) -> str:
         """Return the command for this setting of an experiment that compares algorithms."""
-        options = " ".join(["--seeds", _counted(self.seeds_to_run), *self.setting.options()])
-        return f"python -m experiments {experiment} {options}"
+        return self.setting.command(f"python -m experiments {experiment}", self.seeds_to_run)
 
     def command(self, experiment: str) -> str:
         """Return the command for this extent of an experiment."""
         option = " --full" if self.full else " --quick" if self.quick else ""
         if self.full and self.cases is not None:
-            option += f" --cases {_counted(self.cases)}"
+            option += f" --cases {counted(self.cases)}"
         return f"python -m experiments {experiment}{option}"
-
-
-def _counted(numbers: range) -> str:
-    """Return a range as the command line takes it."""
-    start, end = numbers[0], numbers[-1]
-    return f"{end}" if start == 1 else f"{start}-{end}"
 
 
 @dataclass(frozen=True)

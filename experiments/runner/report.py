@@ -6,12 +6,14 @@ from collections.abc import Mapping, Sequence
 from functools import cache
 from pathlib import Path
 
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
+from jinja2 import Environment
 
+import experiments
 from experiments.runner.catalogue import EXPERIMENTS
-from experiments.runner.provenance import report_fingerprint
-from experiments.runner.result import FIRST_PAGE, MISSED, NOT_SHOWN, SHOWN, Finding
-from experiments.runner.store import TIMES, StoredPicture, StoredResult, load, write_atomically
+from pymoo_hdte._runner.page import environment_of
+from pymoo_hdte._runner.provenance import files_below, fingerprint
+from pymoo_hdte._runner.result import FIRST_PAGE, MISSED, MOODS, NOT_SHOWN, SHOWN, Finding
+from pymoo_hdte._runner.store import TIMES, StoredPicture, StoredResult, load, write_atomically
 from pymoo_hdte.checks import InvalidInput
 
 PAGE = "index.html"
@@ -21,19 +23,27 @@ _TITLE = "Robust design of a harmonic drive: results"
 _LEADING = ("robust", "table6", "table2", "table3")
 """Experiments that come first in a section of the first page, where they have a part in it."""
 _VERDICTS = {
-    "Contradicts": ("Contradictions within the paper", "no"),
-    "Consistent": ("Consistent within the paper", "yes"),
-    "Differs": ("Our models or runs differ from the paper", "no"),
-    "Agrees": ("Our models or runs agree with the paper", "yes"),
-    "Missed by the fit": ("Not given back, though the model was fitted to it", "no"),
-    "Fitted": ("Given back, because the model was fitted to it", "fitted"),
-    "Fails": ("Checks of our own that fail", "no"),
-    "Holds": ("Checks of our own that hold", "yes"),
-    MISSED: ("Scores that miss what was demanded", "no"),
-    NOT_SHOWN: ("Scores that meet it, but with too few cases to show it", "open"),
-    SHOWN: ("Scores shown to meet what was demanded", "yes"),
+    "Contradicts": "Contradictions within the paper",
+    "Consistent": "Consistent within the paper",
+    "Differs": "Our models or runs differ from the paper",
+    "Agrees": "Our models or runs agree with the paper",
+    "Missed by the fit": "Not given back, though the model was fitted to it",
+    "Fitted": "Given back, because the model was fitted to it",
+    "Fails": "Checks of our own that fail",
+    "Holds": "Checks of our own that hold",
+    MISSED: "Scores that miss what was demanded",
+    NOT_SHOWN: "Scores that meet it, but with too few cases to show it",
+    SHOWN: "Scores shown to meet what was demanded",
 }
-"""Heading of the findings of one verdict, and the style that they are shown in."""
+"""Headings of the findings of one verdict."""
+
+
+def report_fingerprint() -> str:
+    """Identify the state of everything in this repository that a finished result depends on.
+
+    That is the source, and the stored outcomes and the template of the page beside it.
+    """
+    return fingerprint(*files_below(Path(experiments.__file__).parent))
 
 
 def check_page(out: Path) -> None:
@@ -65,21 +75,24 @@ def write_report(out: Path, notice: str = "") -> Path:
     stored = [load(out, experiment.name) for experiment in EXPERIMENTS]
     results = [result for result in stored if result is not None]
     present = report_fingerprint()
+    questions = {experiment.name: experiment.question for experiment in EXPERIMENTS}
     common = {
         "site": _TITLE,
         "results": results,
-        "questions": {experiment.name: experiment.question for experiment in EXPERIMENTS},
-        "moods": {verdict: mood for verdict, (_, mood) in _VERDICTS.items()},
+        "questions": questions,
+        "moods": MOODS,
         "outdated": [result.title for result in results if result.made_by != present],
     }
     for result in results:
-        page = _page("experiment.html", common, up="../", result=result, times=f"../{TIMES}")
+        times = f"../{TIMES}/{result.name}/"
+        own = {"question": questions[result.name], "folder": "", "times": times}
+        page = _page("experiment.html", common, up="../", result=result, **own)
         write_atomically(out / result.name / PAGE, page)
     models = {name: text for result in results for name, text in result.models.items()}
     write_atomically(out / MODELS, _page(MODELS, common, up="", models=models))
     verdicts = [
-        (heading, mood, _findings(results, verdict))
-        for verdict, (heading, mood) in _VERDICTS.items()
+        (heading, MOODS[verdict], _findings(results, verdict))
+        for verdict, heading in _VERDICTS.items()
     ]
     write_atomically(out / COMPARISONS, _page(COMPARISONS, common, up="", verdicts=verdicts))
     values = {
@@ -101,15 +114,7 @@ def _page(template: str, common: Mapping[str, object], **values: object) -> byte
 @cache
 def _environment() -> Environment:
     """Return what compiles each template once."""
-    environment = Environment(
-        loader=FileSystemLoader(Path(__file__).parents[1] / "templates"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    environment.globals["zip"] = zip
-    return environment
+    return environment_of(Path(__file__).parents[1] / "templates")
 
 
 def _parts(results: Sequence[StoredResult], about: str) -> list[tuple[StoredResult, str]]:

@@ -12,16 +12,16 @@ from pymoo.algorithms.moo.nsga2 import NSGA2
 from pymoo.core.algorithm import Algorithm
 from tqdm import tqdm
 
-from experiments.comparing.runs import robust_problem
-from experiments.paper.models import models_of
 from experiments.runner.machine import machine_table
 from experiments.runner.own_time import seconds_of_run
 from experiments.runner.registry import Context
-from experiments.runner.result import Column, Finding, Result, Table
 from experiments.studies.benchmark_parts import ratios_of_parts
 from experiments.studies.benchmark_verdicts import verdict_times
 from experiments.studies.benchmark_workers import ratios_of_workers, virtual_table
 from experiments.studies.timing import Ratio, best_time, integration_time, ratio_table
+from pymoo_hdte._comparing.models import models_of
+from pymoo_hdte._comparing.runs import robust_problem
+from pymoo_hdte._runner.result import Column, Finding, Result, Table
 from pymoo_hdte.algorithms import AMPMOPSO, CompactSwarm, ElitistSwarm
 from pymoo_hdte.drive import (
     PARAMETERS,

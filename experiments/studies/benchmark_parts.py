@@ -13,11 +13,11 @@ from pymoo.core.problem import Problem
 from pymoo.util.nds.non_dominated_sorting import NonDominatedSorting
 from threadpoolctl import threadpool_limits
 
-from experiments.comparing.runs import robust_problem
 from experiments.studies.blind.cases import BELIEVED, RIG
 from experiments.studies.timing import Ratio, best_time
 from experiments.studies.virtual_rig.hidden_forms import draw_effect
 from experiments.studies.virtual_rig.rig import draw_rig, run_campaign
+from pymoo_hdte._comparing.runs import robust_problem
 from pymoo_hdte.algorithms.crowding import least_crowded
 from pymoo_hdte.algorithms.spread import most_spread
 from pymoo_hdte.discrepancy._verdicts.drive import examine_drive

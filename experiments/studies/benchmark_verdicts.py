@@ -6,11 +6,11 @@ from importlib.util import find_spec
 
 from tqdm import tqdm
 
-from experiments.runner.result import Table
 from experiments.studies.blind.cases import BLOCK, Case, all_cases
 from experiments.studies.blind.data import outcome
 from experiments.studies.blind.scoring import BlindJob
 from experiments.studies.blind.tables import times_tables
+from pymoo_hdte._runner.result import Table
 
 CASES = tuple(all_cases()[: len(BLOCK)])
 """The first of the list of blind campaigns, with all kinds in the shares of the whole."""

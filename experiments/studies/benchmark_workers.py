@@ -12,8 +12,8 @@ from pymoo.core.problem import ElementwiseProblem
 from pymoo.indicators.hv import HV
 from pymoo.optimize import minimize
 
-from experiments.runner.result import Column, Table
 from experiments.studies.timing import Ratio
+from pymoo_hdte._runner.result import Column, Table
 from pymoo_hdte.algorithms import ElitistSwarm
 from pymoo_hdte.parallel import ExecutorParallelization, VirtualWorkers, minimize_asynchronously
 

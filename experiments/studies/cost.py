@@ -8,8 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.comparing.runs import robust_problem
-from experiments.paper.models import models_of
 from experiments.published_values import (
     BATCH_MODEL_SECONDS,
     BATCH_SIZE,
@@ -22,10 +20,12 @@ from experiments.published_values import (
 )
 from experiments.runner.machine import machine_table, processor
 from experiments.runner.registry import Context
-from experiments.runner.result import OF_MODELS, Column, Finding, Result, Table, significant
 from experiments.runner.texts import paragraphs
 from experiments.studies.timing import best_time, integration_time
+from pymoo_hdte._comparing.models import models_of
+from pymoo_hdte._comparing.runs import robust_problem
 from pymoo_hdte._one_thread import ONE_THREAD
+from pymoo_hdte._runner.result import OF_MODELS, Column, Finding, Result, Table, significant
 from pymoo_hdte.drive import PRESETS, DriveModel, harmonic_balance
 from pymoo_hdte.problems import RobustDTEDirect
 from pymoo_hdte.problems.drive_response import PAPERS_ORDER

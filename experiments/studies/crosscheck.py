@@ -11,16 +11,16 @@ from matplotlib.figure import Figure
 from numpy.typing import ArrayLike, NDArray
 from tqdm import tqdm
 
-from experiments.comparing.figures import BLUE, GREEN, GREY, ORANGE, PINK, YELLOW, grid
-from experiments.comparing.runs import robust_problem
 from experiments.paper.choices import scatter_indices, study_designs
-from experiments.paper.models import models_of
 from experiments.paper.scatter import theta_s_of
 from experiments.paper.table5 import N_TEST, TEST_SEED
 from experiments.published_values import REEVALUATION_LIMITS, TABLE_5
 from experiments.runner.registry import Context
-from experiments.runner.result import Cell, Column, Finding, Picture, Result, Table, significant
 from experiments.runner.texts import paragraphs
+from pymoo_hdte._comparing.figures import BLUE, GREEN, GREY, ORANGE, PINK, YELLOW, grid
+from pymoo_hdte._comparing.models import models_of
+from pymoo_hdte._comparing.runs import robust_problem
+from pymoo_hdte._runner.result import Cell, Column, Finding, Picture, Result, Table, significant
 from pymoo_hdte.drive import PRESETS
 from pymoo_hdte.problems import RobustDTE
 from pymoo_hdte.surrogate import (

@@ -11,12 +11,12 @@ from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 from tqdm import tqdm
 
-from experiments.comparing.figures import BLUE, GREEN, GREY, ORANGE, grid
-from experiments.comparing.runs import robust_problem
-from experiments.paper.models import models_of
 from experiments.runner.registry import Context
-from experiments.runner.result import Cell, Column, Picture, Result, Table, significant
 from experiments.runner.texts import paragraphs
+from pymoo_hdte._comparing.figures import BLUE, GREEN, GREY, ORANGE, grid
+from pymoo_hdte._comparing.models import models_of
+from pymoo_hdte._comparing.runs import robust_problem
+from pymoo_hdte._runner.result import Cell, Column, Picture, Result, Table, significant
 from pymoo_hdte.drive import PRESETS
 from pymoo_hdte.drive.dte_map import (
     SpeedLoadMap,

@@ -9,8 +9,6 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from experiments.comparing.figures import BLUE, GREEN, GREY, ORANGE, PINK, grid
-from experiments.comparing.runs import robust_problem
 from experiments.paper.choices import (
     BAND,
     MODEL,
@@ -19,10 +17,12 @@ from experiments.paper.choices import (
     scatter_indices,
     study_designs,
 )
-from experiments.paper.models import models_of
 from experiments.runner.registry import Context
-from experiments.runner.result import Cell, Column, Finding, Picture, Result, Table, significant
 from experiments.runner.texts import paragraphs
+from pymoo_hdte._comparing.figures import BLUE, GREEN, GREY, ORANGE, PINK, grid
+from pymoo_hdte._comparing.models import models_of
+from pymoo_hdte._comparing.runs import robust_problem
+from pymoo_hdte._runner.result import Cell, Column, Finding, Picture, Result, Table, significant
 from pymoo_hdte.drive import PARAMETERS, PRESETS
 from pymoo_hdte.surrogate import SobolIndices
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.runner.result import Column, Finding, Table
+from pymoo_hdte._runner.result import Column, Finding, Table
 from pymoo_hdte.drive import DriveModel, simulate_drive
 
 

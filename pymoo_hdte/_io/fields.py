@@ -32,7 +32,8 @@ class Fields:
         self._unread = dict(table)
         self._path = path
 
-    def _name(self, field: str) -> str:
+    def name_of(self, field: str) -> str:
+        """Return the name of a field in error messages."""
         return f"{self._path}.{field}"
 
     def take(self, field: str, allowed: str) -> Any:
@@ -40,54 +41,61 @@ class Fields:
         if field not in self._unread:
             similar = get_close_matches(field, self._unread, 1)
             what = f"missing; is it {similar[0]!r}?" if similar else "missing"
-            raise InvalidInput(self._name(field), None, f"{allowed} (the field is {what})")
+            raise InvalidInput(self.name_of(field), None, f"{allowed} (the field is {what})")
         return self._unread.pop(field)
 
     def table(self, field: str) -> Fields:
         """Return a nested table."""
-        return Fields(self.take(field, "a table of fields"), self._name(field))
+        return Fields(self.take(field, "a table of fields"), self.name_of(field))
 
     def tables(self, field: str) -> list[Fields]:
         """Return a non-empty array of tables."""
         rows = self.take(field, "an array of tables")
         if not isinstance(rows, list) or not rows:
-            raise InvalidInput(self._name(field), rows, "a non-empty array of tables")
-        return [Fields(row, f"{self._name(field)}[{index}]") for index, row in enumerate(rows)]
+            raise InvalidInput(self.name_of(field), rows, "a non-empty array of tables")
+        return [Fields(row, f"{self.name_of(field)}[{index}]") for index, row in enumerate(rows)]
 
     def text(self, field: str) -> str:
         """Return a non-empty string."""
         value = self.take(field, "a non-empty string")
         if not isinstance(value, str) or not value.strip():
-            raise InvalidInput(self._name(field), value, "a non-empty string")
+            raise InvalidInput(self.name_of(field), value, "a non-empty string")
         return value
 
     def choice(self, field: str, words: Collection[str]) -> str:
         """Return a string that is one of ``words``."""
-        return one_of(self._name(field), self.take(field, f"one of {', '.join(words)}"), words)
+        return one_of(self.name_of(field), self.take(field, f"one of {', '.join(words)}"), words)
+
+    def truth(self, field: str) -> bool:
+        """Return a truth value."""
+        value = self.take(field, "true or false")
+        if not isinstance(value, bool):
+            raise InvalidInput(self.name_of(field), value, "true or false")
+        return value
 
     def whole(self, field: str, at_least: int) -> int:
         """Return a whole number."""
         allowed = f"a whole number of at least {at_least}"
-        return whole_number(self._name(field), self.take(field, allowed), at_least)
+        return whole_number(self.name_of(field), self.take(field, allowed), at_least)
 
     def number(self, field: str, **limits: float) -> float:
         """Return a dimensionless finite number within ``limits`` (see `checks.real_number`)."""
-        return real_number(self._name(field), self.take(field, "a finite number"), **limits)
+        return real_number(self.name_of(field), self.take(field, "a finite number"), **limits)
 
     def numbers(self, field: str) -> tuple[float, ...]:
         """Return a list of finite numbers."""
         raw = self.take(field, "a list of numbers")
         if not isinstance(raw, list):
-            raise InvalidInput(self._name(field), raw, "a list of numbers")
+            raise InvalidInput(self.name_of(field), raw, "a list of numbers")
         return tuple(
-            real_number(f"{self._name(field)}[{index}]", value) for index, value in enumerate(raw)
+            real_number(f"{self.name_of(field)}[{index}]", value) for index, value in enumerate(raw)
         )
 
     def texts(self, field: str) -> tuple[str, ...]:
         """Return a list of non-empty strings."""
         raw = self.take(field, "a list of strings")
         if not isinstance(raw, list) or not all(isinstance(text, str) and text for text in raw):
-            raise InvalidInput(self._name(field), raw, "a list of non-empty strings")
+            raise InvalidInput(self.name_of(field), raw, "a list of non-empty strings")
         return tuple(raw)
 
     def quantity(self, field: str, kind: str, **limits: float) -> float:
@@ -99,12 +107,12 @@ class Fields:
         allowed = f'{{ value = ..., unit = "..." }} with a unit among {", ".join(units)}'
         raw = self.take(field, allowed)
         if not isinstance(raw, Mapping) or set(raw) != {"value", "unit"}:
-            raise InvalidInput(self._name(field), raw, allowed)
+            raise InvalidInput(self.name_of(field), raw, allowed)
         unit = usual_spelling(raw["unit"]) if isinstance(raw["unit"], str) else ""
         if unit not in units:
             allowed = f"{', '.join(units)}{suggestion(str(raw['unit']), units)}"
-            raise InvalidInput(f"{self._name(field)}.unit", raw["unit"], allowed)
-        return real_number(f"{self._name(field)}.value", raw["value"], **limits) * units[unit]
+            raise InvalidInput(f"{self.name_of(field)}.unit", raw["unit"], allowed)
+        return real_number(f"{self.name_of(field)}.value", raw["value"], **limits) * units[unit]
 
     def names(self) -> tuple[str, ...]:
         """Return the names of the remaining fields."""
@@ -127,5 +135,5 @@ class Fields:
         complaints = Complaints()
         for field, value in self._unread.items():
             with complaints.noted():
-                raise InvalidInput(self._name(field), value, "no such field here")
+                raise InvalidInput(self.name_of(field), value, "no such field here")
         complaints.finish()

@@ -147,7 +147,7 @@ def layout_from_fields(table: Fields, usual: TableLayout | None = None) -> Table
     if table.has("time"):
         time = _channel(table.table("time"), form, UNITS["time"])
         if table.has("sample_rate"):
-            raise InvalidInput(table._name("time"), time.column, "absent if sample_rate is given")
+            raise InvalidInput(table.name_of("time"), time.column, "absent if sample_rate is given")
     form = form or _form_of(table, [*mapped.values(), *([time] if time else [])])
     rate = usual.sample_rate if usual else None
     if table.has("sample_rate") or (time is None and rate is None):
@@ -177,7 +177,7 @@ def with_zeros(table: Fields, layout: TableLayout) -> TableLayout:
     channels = dict(layout.channels)
     there = [name for name, channel in channels.items() if channel.column != ""]
     for name in table.names():
-        one_of(table._name("channel"), name, there)
+        one_of(table.name_of("channel"), name, there)
         zero = table.number(name, at_least=-LARGEST, at_most=LARGEST)
         channels[name] = replace(channels[name], zero=zero)
     return replace(layout, channels=channels)
@@ -188,7 +188,7 @@ def _form_of(table: Fields, channels: Sequence[Channel]) -> str:
     numbered = {isinstance(channel.column, int) for channel in channels}
     if len(numbered) > 1:
         columns = [channel.column for channel in channels]
-        raise InvalidInput(table._name("columns"), columns, "titles for all, or numbers for all")
+        raise InvalidInput(table.name_of("columns"), columns, "titles for all, or numbers for all")
     return "plain" if True in numbered else "csv"
 
 
@@ -200,11 +200,11 @@ def _channels(table: Fields, form: str | None, usual: TableLayout | None) -> dic
     # Fields does not tell its names, because its other users know theirs beforehand.
     names = channels.names()
     if not names:
-        raise InvalidInput(table._name("channels"), {}, "at least one channel")
+        raise InvalidInput(table.name_of("channels"), {}, "at least one channel")
     mapped = dict(known)
     for name in names:
         if usual:
-            one_of(channels._name("name"), name, tuple(known))
+            one_of(channels.name_of("name"), name, tuple(known))
         units = _units_beside(known[name]) if name in known else CHANNEL_UNITS
         mapped[name] = _channel(channels.table(name), form, units)
     return mapped
@@ -221,9 +221,7 @@ def _channel(table: Fields, form: str | None, units: Collection[str]) -> Channel
     # A CSV file whose titles are missing, or twice there, has columns by number all the same.
     numbered = form == "plain" or (form in (None, "csv") and table.is_number("column"))
     column = table.whole("column", 0) if numbered else table.text("column")
-    unwrap = table.take("unwrap", "") if table.has("unwrap") else False
-    if not isinstance(unwrap, bool):
-        raise InvalidInput(table._name("unwrap"), unwrap, "true or false")
+    unwrap = table.truth("unwrap") if table.has("unwrap") else False
     units = UNITS["angle"] if unwrap else units
     unit = _unit(table, (COUNTS, *units) if set(UNITS["angle"]) <= set(units) else tuple(units))
     options: dict[str, Any] = {
@@ -234,13 +232,13 @@ def _channel(table: Fields, form: str | None, units: Collection[str]) -> Channel
     if table.has("divided_by"):
         divisor = table.number("divided_by", at_least=-LARGEST, at_most=LARGEST)
         if divisor == 0.0:
-            raise InvalidInput(table._name("divided_by"), divisor, "another number than 0")
+            raise InvalidInput(table.name_of("divided_by"), divisor, "another number than 0")
         options["scale"] = options.get("scale", 1.0) / divisor
     table.finish()
     try:
         return Channel(column, unit, unwrap=unwrap, **options)
     except InvalidInput as error:
-        raise InvalidInput(table._name(error.field), error.value, error.allowed) from None
+        raise InvalidInput(table.name_of(error.field), error.value, error.allowed) from None
 
 
 def _unit(table: Fields, units: tuple[str, ...]) -> str:
@@ -254,4 +252,4 @@ def _unit(table: Fields, units: tuple[str, ...]) -> str:
     if unit in CHANNEL_UNITS:
         kind = next(quantity for quantity in MEASURED if unit in UNITS[quantity])
         allowed = f"no unit of {kind}, which this column does not hold, but one of {known}"
-    raise InvalidInput(table._name("unit"), stated, allowed)
+    raise InvalidInput(table.name_of("unit"), stated, allowed)

@@ -70,11 +70,11 @@ def part_from_fields(entry: Fields) -> Part | None:
         return None
     by, *others = stated
     for word in others:
-        raise InvalidInput(entry._name(word), entry.numbers(word), f"absent beside {by}")
+        raise InvalidInput(entry.name_of(word), entry.numbers(word), f"absent beside {by}")
     limits = entry.numbers(by)
     if len(limits) != 2:
-        raise InvalidInput(entry._name(by), limits, "two numbers, [from, to]")
+        raise InvalidInput(entry.name_of(by), limits, "two numbers, [from, to]")
     try:
         return Part(by, *limits)
     except InvalidInput as error:
-        raise InvalidInput(entry._name(by), error.value, error.allowed) from None
+        raise InvalidInput(entry.name_of(by), error.value, error.allowed) from None

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 from moocore import is_nondominated
 from numpy.typing import NDArray
@@ -11,7 +9,7 @@ from pymoo.core.population import Population
 
 from pymoo_hdte.algorithms.crowding import crowding_tournaments, least_crowded
 from pymoo_hdte.algorithms.dominance import best_front
-from pymoo_hdte.algorithms.points import Points
+from pymoo_hdte.algorithms.points import Points, judged
 from pymoo_hdte.algorithms.survival import Truncation
 
 
@@ -119,28 +117,26 @@ class FrontArchive:
     def __len__(self) -> int:
         return len(self.members)
 
-    def update(
-        self, population: Population, points: Points, points_of: Callable[[Population], Points]
-    ) -> None:
+    def update(self, population: Population, constrained: bool) -> None:
         """Add an evaluated population and keep what is feasible and non-dominated.
 
         Parameters
         ----------
         population : Population
             n evaluated individuals.
-        points : Points
-            The same as arrays, row for row.
-        points_of : callable
-            Reads the members anew, since what counts as feasible may have changed.
+        constrained : bool
+            Whether their problem has constraints.
         """
-        everyone = Population.merge(self.members, population)
-        if not len(everyone):
+        # Members are read again, since what counts as feasible may have changed.
+        groups = [group for group in (self.members, population) if len(group)]
+        if not groups:
             return
-        if len(self.members):
-            points = points_of(self.members).followed_by(points)
-        rows = np.flatnonzero(points.violation == 0.0)
+        everyone = Population.merge(self.members, population)
+        parts = zip(*(judged(group, constrained) for group in groups), strict=True)
+        F, violation = map(np.concatenate, parts)
+        rows = np.flatnonzero(violation == 0.0)
         if len(rows):
-            rows = rows[is_nondominated(points.F[rows])]
+            rows = rows[is_nondominated(F[rows])]
         if len(rows) > self._capacity:
-            rows = rows[self._truncation(points.F[rows], self._thinned_to)]
+            rows = rows[self._truncation(F[rows], self._thinned_to)]
         self.members = everyone[rows]

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from pymoo.core.individual import Individual
 from pymoo.core.population import Population
 from pymoo.core.problem import Problem
 from pymoo.core.repair import NoRepair, Repair
@@ -27,8 +28,9 @@ from pymoo_hdte.algorithms.moves import (
 from pymoo_hdte.algorithms.points import Points
 from pymoo_hdte.algorithms.success_shares import SuccessShares
 from pymoo_hdte.algorithms.survival import Quality, survivors, truncation_of
-from pymoo_hdte.checks import InvalidInput, whole_number
+from pymoo_hdte.checks import InvalidInput, real_number, whole_number
 
+_EVALUATIONS = "n_evaluations"
 _MOST_OBJECTIVES = 4
 """With five, both swarms have 1.6 times the IGD+ of NSGA-III on DTLZ2; with four, 1.2 times."""
 
@@ -70,6 +72,11 @@ class ElitistSwarm(Swarm):
         New positions in a generation, ``pop_size`` by default.
     repair : Repair, optional
         Repair of pymoo for positions before they are evaluated; `RoundingRepair` makes integers.
+    reevaluated : float
+        Share of every generation, 0 to below 1, that evaluates members of the result again, those
+        first that were evaluated least often; a member then has the mean of all its evaluations.
+        For objectives or constraints with noise, of which a swarm otherwise keeps lucky draws for
+        ever; 0.3 is a good start.
     **kwargs
         Any other argument of `pymoo.core.algorithm.Algorithm`.
 
@@ -89,6 +96,7 @@ class ElitistSwarm(Swarm):
     -----
     - a leader is the less crowded of two random members of the best front;
     - a position beyond the box is cut to it;
+    - how often a solution was evaluated is in its ``data["n_evaluations"]``, if more than once;
     - feasible solutions come before infeasible ones, these by total violation (Deb et al. 2002); a
       solution that is not finite comes last, copies of another one after that;
     - the result of a run is the best front of the swarm, at most ``pop_size`` solutions;
@@ -113,6 +121,7 @@ class ElitistSwarm(Swarm):
         quality: Quality = "spread",
         n_offsprings: int | None = None,
         repair: Repair | None = None,
+        reevaluated: float = 0.0,
         **kwargs: Any,
     ) -> None:
         super().__init__(pop_size, sampling, **kwargs)
@@ -126,6 +135,8 @@ class ElitistSwarm(Swarm):
             self.n_offsprings = whole_number("n_offsprings", n_offsprings, at_least=1)
         self.repair = NoRepair() if repair is None else repair
         self.initialization.repair = self.repair
+        self.reevaluated = real_number("reevaluated", reevaluated, at_least=0.0, below=1.0)
+        self._repeated = Population.empty()
 
     def _initialize_advance(self, infills: Population | None = None, **kwargs: Any) -> None:
         self._evaluated(infills)
@@ -161,20 +172,35 @@ class ElitistSwarm(Swarm):
             rows = self.chosen == number
             around = self._around(move, swarm, movers[rows])
             steps[rows] = move(X[rows], leaders[rows], around, random_state)
-        exact = [number for number, move in enumerate(self.moves) if getattr(move, "EXACT", False)]
+        exact = np.array([getattr(move, "EXACT", False) for move in self.moves])
         # A particle that stays would be evaluated twice.
-        mutated = ~np.isin(self.chosen, exact) | ~steps.any(axis=1)
+        mutated = ~exact[self.chosen] | ~steps.any(axis=1)
         steps[mutated] += self.mutation(steps[mutated], highest - lowest, random_state)
-        moved = particles_at(np.clip(X + steps, lowest, highest))
-        if type(self.repair) is NoRepair:
-            return moved
-        return self.repair.do(self.problem, moved, random_state=random_state)
+        moved = particles_at(self._within(X, X + steps, swarm))
+        if type(self.repair) is not NoRepair:
+            moved = self.repair.do(self.problem, moved, random_state=random_state)
+        return self._with_repeats(moved) if self.reevaluated else moved
+
+    def _with_repeats(self, moved: Population) -> Population:
+        """Return new positions of which the first are those of members of the result."""
+        # One at least is new, from which the success of its move is learned.
+        n = min(round(self.reevaluated * len(moved)), len(self.opt), len(moved) - 1)
+        evaluations = [member.data.get(_EVALUATIONS, 1) for member in self.opt]
+        self._repeated = self.opt[np.argsort(evaluations, kind="stable")[:n]]
+        self.chosen = self.chosen[n:]
+        return Population.merge(particles_at(self._repeated.get("X")), moved[n:]) if n else moved
+
+    def _within(
+        self, X: NDArray[np.float64], aims: NDArray[np.float64], swarm: Points
+    ) -> NDArray[np.float64]:
+        """Return ``aims`` (n, d) in the box, for which particles of a swarm head from ``X``."""
+        return np.clip(aims, *self.problem.bounds())
 
     def _movers(self, n: int) -> NDArray[np.int_]:
         """Return which of ``n`` particles move."""
         if self._n_requested() < min(n, self.pop_size):
             return self.random_state.permutation(n)[: self._n_requested()]
-        return np.resize(np.arange(n), self._n_requested())
+        return np.arange(self._n_requested()) % n
 
     def _front(self, swarm: Points) -> Points:
         """Return the points that lead."""
@@ -187,14 +213,18 @@ class ElitistSwarm(Swarm):
     def _around(self, move: Move, swarm: Points, rows: NDArray[np.int_]) -> NDArray[np.float64]:
         """Return the positions a move draws from: all, or the neighbours of every row."""
         k = getattr(move, "NEIGHBOURS", None)
-        return swarm.X if k is None else swarm.X[nearest_in_objectives(swarm.F, k)[rows]]
+        return swarm.X if k is None else swarm.X[nearest_in_objectives(swarm.F, k, rows)]
 
     def _survivors(self, points: Points) -> NDArray[np.int_]:
         """Return which of the old and the new points make up the next swarm."""
         return survivors(points, self.pop_size, self._truncation)
 
     def _advance(self, infills: Population | None = None, **kwargs: Any) -> None:
-        points = self._points(self.pop).followed_by(self._evaluated(infills))
+        arrived = self._evaluated(infills)
+        if len(self._repeated):
+            self._replace(averaged(self._repeated, infills))
+            arrived = self._points(infills)
+        points = self._points(self.pop).followed_by(arrived)
         everyone = Population.merge(self.pop, infills)
         self._note(everyone, points)
         rows = self._survivors(points)
@@ -203,6 +233,10 @@ class ElitistSwarm(Swarm):
         self.success.learn(self.chosen, survived[-len(self.chosen) :])
         self.pop = everyone[rows]
 
+    def _replace(self, means: dict[int, Individual]) -> None:
+        """Put individuals in the places of those with other evaluations, given by ``id``."""
+        self.pop = replaced(self.pop, means)
+
     def _note(self, everyone: Population, points: Points) -> None:
         """Take down what a swarm needs of old and new particles, before it chooses."""
 
@@ -210,3 +244,26 @@ class ElitistSwarm(Swarm):
         # pymoo reads the optimum in every generation, even if nothing could be judged so far.
         front = best_front(self._points(self.pop))
         self.opt = self.pop[front if len(front) else [0]]  # type: ignore[index]
+
+
+def averaged(members: Population, repeats: Population) -> dict[int, Individual]:
+    """Give ``repeats`` the means of their members' evaluations and their own; return by member.
+
+    A repeat that is not finite is left out: its evaluation was lost.
+    """
+    means = {}
+    for member, repeat in zip(members, repeats, strict=False):
+        if np.isfinite(repeat.F).all():
+            n = member.data.get(_EVALUATIONS, 1)
+            for name in ("F", "G", "H"):
+                mean = (n * getattr(member, name) + getattr(repeat, name)) / (n + 1)
+                setattr(repeat, name, mean)
+            repeat.CV = None  # pymoo computes it anew
+            repeat.data[_EVALUATIONS] = n + 1
+            means[id(member)] = repeat
+    return means
+
+
+def replaced(population: Population, means: dict[int, Individual]) -> Population:
+    """Return a population with the ``means`` in the places of members, given by ``id``."""
+    return Population([means.get(id(member), member) for member in population])

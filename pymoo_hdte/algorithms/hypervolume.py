@@ -123,11 +123,93 @@ def _selected_of_three(
     scaled: NDArray[np.float64], size: int, safe: NDArray[np.bool_]
 ) -> NDArray[np.int_]:
     """Return which rows stay, the ``safe`` ones among them."""
-    reference = np.full(3, _REFERENCE)
+    added = hv_contributions(scaled, ref=np.full(3, _REFERENCE))
+    added[safe] = np.inf
+    if COMPILES:
+        order = np.argsort(scaled[:, 2], kind="stable")
+        return np.flatnonzero(_selected_of_three_compiled(scaled, order, added, size))
     rows = np.arange(len(scaled))
     while len(rows) > size:
-        # All anew in O(n log n): in Python, recounting only what changed takes longer.
-        added = hv_contributions(scaled[rows], ref=reference)
-        added[safe[rows]] = np.inf
         rows = np.delete(rows, added.argmin())
+        added = hv_contributions(scaled[rows], ref=np.full(3, _REFERENCE))
+        added[safe[rows]] = np.inf
     return rows
+
+
+@compiled
+def _selected_of_three_compiled(
+    scaled: NDArray[np.float64],
+    order: NDArray[np.int_],
+    added: NDArray[np.float64],
+    size: int,
+) -> NDArray[np.bool_]:
+    """Say which of the rows stay, which ascend in the last objective by ``order``.
+
+    What a row adds only grows as others leave, so that ``added``, once counted, is a lower bound,
+    and only the row of the lowest one is counted again until it keeps that place.
+    """
+    n = len(scaled)
+    stays = np.ones(n, dtype=np.bool_)
+    fresh = np.ones(n, dtype=np.bool_)
+    stairs = np.empty((n + 1, 2))
+    for _ in range(n - size):
+        leaving = int(added.argmin())
+        while not fresh[leaving]:
+            added[leaving] = _added_to_three(scaled, order, stays, leaving, stairs)
+            fresh[leaving] = True
+            leaving = int(added.argmin())
+        stays[leaving] = False
+        added[leaving] = np.inf
+        fresh[:] = added == np.inf
+    return stays
+
+
+@compiled
+def _added_to_three(
+    scaled: NDArray[np.float64],
+    order: NDArray[np.int_],
+    stays: NDArray[np.bool_],
+    row: int,
+    stairs: NDArray[np.float64],
+) -> float:
+    """Return what a row adds to the hypervolume of those that stay; ``stairs`` is a buffer.
+
+    The box of the row is cut into slices at the last objectives of the others; in a slice, what
+    those below it leave of the row's rectangle lies under a descending flight of stairs.
+    """
+    first, second, level = scaled[row, 0], scaled[row, 1], scaled[row, 2]
+    # The first step, which no row makes, bounds the rectangle.
+    stairs[0, 0], stairs[0, 1] = first, _REFERENCE
+    steps, area, volume = 1, (_REFERENCE - first) * (_REFERENCE - second), 0.0
+    for other in order:
+        if other == row or not stays[other]:
+            continue
+        x, y = max(scaled[other, 0], first), max(scaled[other, 1], second)
+        begin = steps
+        while begin > 1 and stairs[begin - 1, 0] > x:
+            begin -= 1
+        if stairs[begin - 1, 1] <= y:
+            continue
+        if scaled[other, 2] > level:
+            volume += area * (scaled[other, 2] - level)
+            level = scaled[other, 2]
+        end = begin
+        while end < steps and stairs[end, 1] >= y:
+            end += 1
+        # Steps from begin to end lie behind the new one.
+        shift = begin + 1 - end
+        if shift > 0:
+            for step in range(steps - 1, end - 1, -1):
+                stairs[step + 1, 0], stairs[step + 1, 1] = stairs[step, 0], stairs[step, 1]
+        elif shift < 0:
+            for step in range(end, steps):
+                stairs[step + shift, 0], stairs[step + shift, 1] = stairs[step, 0], stairs[step, 1]
+        steps += shift
+        stairs[begin, 0], stairs[begin, 1] = x, y
+        area = 0.0
+        for step in range(steps):
+            right = stairs[step + 1, 0] if step + 1 < steps else _REFERENCE
+            area += (right - stairs[step, 0]) * (stairs[step, 1] - second)
+        if area == 0.0:
+            return volume
+    return volume + area * (_REFERENCE - level)

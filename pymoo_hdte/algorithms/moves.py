@@ -172,8 +172,10 @@ class SparseMutation:
         return mutation
 
 
-def nearest_in_objectives(F: NDArray[np.float64], k: int) -> NDArray[np.int_]:
-    """Return for each row of objectives ``F`` (n, m) the ``k`` nearest others, all if fewer.
+def nearest_in_objectives(
+    F: NDArray[np.float64], k: int, rows: NDArray[np.int_]
+) -> NDArray[np.int_]:
+    """Return for some ``rows`` of objectives ``F`` (n, m) the ``k`` nearest others, all if fewer.
 
     A single row is its own neighbour.
 
@@ -185,7 +187,7 @@ def nearest_in_objectives(F: NDArray[np.float64], k: int) -> NDArray[np.int_]:
     if good.any():
         lowest, span = F[good].min(axis=0), np.ptp(F[good], axis=0)
         scaled[good] = (F[good] - lowest) / np.where(span > 0.0, span, 1.0)
-    distance = ((scaled[:, np.newaxis] - scaled) ** 2).sum(axis=2)
-    np.fill_diagonal(distance, np.inf)
+    distance = ((scaled[rows, np.newaxis] - scaled) ** 2).sum(axis=2)
+    distance[np.arange(len(rows)), rows] = np.inf
     k = max(1, min(k, len(F) - 1))
     return np.argpartition(distance, k - 1, axis=1)[:, :k]

@@ -32,16 +32,8 @@ class Points:
     @classmethod
     def of(cls, population: Population, constrained: bool) -> Points:
         """Read the points of an evaluated pymoo population, whose problem may have constraints."""
-        # Attributes in a list, because Population.get costs more than all else in a generation.
-        individuals = population.tolist()
-        X = np.array([individual.X for individual in individuals], dtype=float)
-        F = np.array([individual.F for individual in individuals], dtype=float)
-        violation = np.zeros(len(individuals))
-        if constrained:
-            violation = np.array([individual.CV[0] for individual in individuals])
-            violation[violation <= individuals[0].config.get("cv_eps", 0.0)] = 0.0
-        judged = np.isfinite(F).all(axis=1) & ~np.isnan(violation)
-        return cls(X, F, np.where(judged, violation, np.inf))
+        X = np.array([individual.X for individual in population.tolist()], dtype=float)
+        return cls(X, *judged(population, constrained))
 
     @classmethod
     def none(cls, n_var: int, n_obj: int) -> Points:
@@ -66,3 +58,18 @@ class Points:
             np.concatenate([part.F for part in parts]),
             np.concatenate([part.violation for part in parts]),
         )
+
+
+def judged(
+    population: Population, constrained: bool
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return F (n, m) and violation (n,) of `Points` of an evaluated pymoo population."""
+    # Attributes in a list, because Population.get costs more than all else in a generation.
+    individuals = population.tolist()
+    F = np.array([individual.F for individual in individuals], dtype=float)
+    violation = np.zeros(len(individuals))
+    if constrained:
+        violation = np.array([individual.CV[0] for individual in individuals])
+        violation[violation <= individuals[0].config.get("cv_eps", 0.0)] = 0.0
+    known = np.isfinite(F).all(axis=1) & ~np.isnan(violation)
+    return F, np.where(known, violation, np.inf)

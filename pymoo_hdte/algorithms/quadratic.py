@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from pymoo_hdte._compilation import compiled
 from pymoo_hdte.algorithms.points import Points
 
 
@@ -48,7 +49,7 @@ def fitted(Z: NDArray[np.float64], F: NDArray[np.float64]) -> Quadratic:
     """
     products = Z @ Z.T
     kernel = _LINEAR_WEIGHT * (1.0 + products) + 0.5 * products**2
-    kernel[np.diag_indices(len(Z))] += _RIDGE * np.trace(kernel) / len(Z)
+    kernel.flat[:: len(Z) + 1] += _RIDGE * np.trace(kernel) / len(Z)
     parts = np.linalg.solve(kernel, F)
     return Quadratic(
         _LINEAR_WEIGHT * parts.T @ Z,
@@ -132,11 +133,25 @@ def lowest_within(
     least = np.maximum(-values[:, :1], 0.0) + 1e-14 * np.abs(values).max(axis=1, keepdims=True)
     least = np.maximum(least * (1.0 + 1e-9), _LEAST_SHIFT)
     most = least + np.linalg.norm(slopes, axis=1, keepdims=True) / radii
+    shift = _halved(slopes**2, values, radii**2, least, most)
+    return np.einsum("kij,kj->ki", vectors[which], -slopes / (values + shift))
+
+
+@compiled
+def _halved(
+    squares: NDArray[np.float64],
+    values: NDArray[np.float64],
+    largest: NDArray[np.float64],
+    least: NDArray[np.float64],
+    most: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """Return the shifts (k, 1), between two bounds, that leave a step no longer than its radius."""
     for _ in range(_HALVINGS):
         middle = np.sqrt(least * most)
-        long = (slopes**2 / (values + middle) ** 2).sum(axis=1, keepdims=True) > radii**2
+        lengths = (squares / (values + middle) ** 2).sum(axis=1)
+        long = lengths.reshape(middle.shape) > largest
         least, most = np.where(long, middle, least), np.where(long, most, middle)
-    return np.einsum("kij,kj->ki", vectors[which], -slopes / (values + most))
+    return most
 
 
 class ModelStep:
@@ -179,7 +194,8 @@ class ModelStep:
     def learn(self, points: Points) -> None:
         """Remember evaluated points."""
         # In pieces, which copies of a swarm share: a history would hold all points many times.
-        self._told.append(points[np.flatnonzero(np.isfinite(points.F).all(axis=1))])
+        finite = np.isfinite(points.F).all(axis=1)
+        self._told.append(points if finite.all() else points[np.flatnonzero(finite)])
         while sum(map(len, self._told[1:])) >= self.MEMORY:
             del self._told[0]
 
@@ -200,7 +216,9 @@ class ModelStep:
         if not n or len(known := self._known()) < 3:
             return np.zeros((n, d))
         centre = leaders[0]
-        away = (known.X - centre) / np.where(self._reach > 0.0, self._reach, 1.0)
+        away = known.X - centre
+        if np.any(self._reach != 1.0):
+            away /= np.where(self._reach > 0.0, self._reach, 1.0)
         distances = np.sqrt((away**2).sum(axis=1))
         nearest = min(len(distances), 3 * d + 20, self.LARGEST_FIT)
         neighbours = np.argpartition(distances, nearest - 1)[:nearest]

@@ -31,18 +31,22 @@ def most_spread(F: NDArray[np.float64], size: int) -> NDArray[np.int_]:
         order = np.lexsort(scaled.T[::-1])
         if np.all(np.diff(scaled[order, 1]) <= 0.0):
             return np.sort(order[_selected_of_chain(scaled[order], order, size)])
-    return np.flatnonzero(_selected(scaled, size))
+    order = np.argsort(scaled[:, 0], kind="stable")
+    return np.flatnonzero(_selected(scaled, order, size))
 
 
 @compiled
-def _selected(scaled: NDArray[np.float64], size: int) -> NDArray[np.bool_]:
+def _selected(scaled: NDArray[np.float64], order: NDArray[np.int_], size: int) -> NDArray[np.bool_]:
+    """Say which rows stay; ``order`` is that of the first objective."""
     n = len(scaled)
     stays = np.ones(n, dtype=np.bool_)
+    places = np.empty(n, dtype=np.int64)
+    places[order] = np.arange(n)
     # Of every row the two nearest that stay, and their squared distances.
     neighbours = np.empty((n, 2), dtype=np.int64)
     gaps = np.empty((n, 2))
     for row in range(n):
-        _find_neighbours(scaled, stays, neighbours, gaps, row)
+        _find_neighbours(scaled, stays, order, places, neighbours, gaps, row)
     for _ in range(n - size):
         leaving = -1
         for row in range(n):
@@ -51,7 +55,7 @@ def _selected(scaled: NDArray[np.float64], size: int) -> NDArray[np.bool_]:
         stays[leaving] = False
         for row in range(n):
             if stays[row] and (neighbours[row, 0] == leaving or neighbours[row, 1] == leaving):
-                _find_neighbours(scaled, stays, neighbours, gaps, row)
+                _find_neighbours(scaled, stays, order, places, neighbours, gaps, row)
     return stays
 
 
@@ -136,21 +140,30 @@ def _closer(gaps: NDArray[np.float64], row: int, reference: int) -> bool:
 def _find_neighbours(
     scaled: NDArray[np.float64],
     stays: NDArray[np.bool_],
+    order: NDArray[np.int_],
+    places: NDArray[np.int_],
     neighbours: NDArray[np.int_],
     gaps: NDArray[np.float64],
     row: int,
 ) -> None:
     nearest, second, gap, second_gap = row, row, np.inf, np.inf
-    for candidate in range(len(scaled)):
-        if not stays[candidate] or candidate == row:
-            continue
-        distance = 0.0
-        for objective in range(scaled.shape[1]):
-            distance += (scaled[row, objective] - scaled[candidate, objective]) ** 2
-        if distance < gap:
-            nearest, second, gap, second_gap = candidate, nearest, distance, gap
-        elif distance < second_gap:
-            second, second_gap = candidate, distance
+    for direction in (-1, 1):
+        place = places[row] + direction
+        while 0 <= place < len(order):
+            candidate = order[place]
+            place += direction
+            # Nobody further along the first objective is nearer.
+            if (scaled[row, 0] - scaled[candidate, 0]) ** 2 > second_gap:
+                break
+            if not stays[candidate]:
+                continue
+            distance = 0.0
+            for objective in range(scaled.shape[1]):
+                distance += (scaled[row, objective] - scaled[candidate, objective]) ** 2
+            if distance < gap:
+                nearest, second, gap, second_gap = candidate, nearest, distance, gap
+            elif distance < second_gap:
+                second, second_gap = candidate, distance
     # One by one: assigning a tuple to a row takes three seconds more to compile.
     neighbours[row, 0], neighbours[row, 1] = nearest, second
     gaps[row, 0], gaps[row, 1] = gap, second_gap

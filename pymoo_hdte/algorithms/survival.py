@@ -60,10 +60,13 @@ def survivors(points: Points, size: int, truncation: Truncation = most_spread) -
 
 def _copies(points: Points) -> NDArray[np.bool_]:
     """Return which rows (n,) repeat an earlier one in objectives and violation."""
+    copies = np.zeros(len(points), dtype=bool)
+    first = np.sort(points.F[:, 0])
+    if not np.any(first[1:] == first[:-1]):
+        return copies
     keys = np.column_stack([points.F, points.violation])
     order = np.lexsort(keys.T)
     # Stable sorting leaves the earliest of equal rows in front.
     same = np.all(keys[order[1:]] == keys[order[:-1]], axis=1)
-    copies = np.zeros(len(points), dtype=bool)
     copies[order[1:][same]] = True
     return copies

@@ -18,9 +18,11 @@ from pymoo_hdte.cli.identify import IDENTIFY
 from pymoo_hdte.cli.init import INIT
 from pymoo_hdte.cli.optimise import OPTIMISE
 from pymoo_hdte.cli.plan import PLAN
+from pymoo_hdte.cli.robust import ROBUST
 from pymoo_hdte.cli.simulate import SIMULATE
+from pymoo_hdte.cli.table7 import TABLE_7
 
-COMMANDS = (OPTIMISE, SIMULATE, IDENTIFY, PLAN, INIT, DISCREPANCY, EXPORT)
+COMMANDS = (ROBUST, OPTIMISE, SIMULATE, IDENTIFY, PLAN, INIT, DISCREPANCY, EXPORT, TABLE_7)
 """Commands in the order of the help."""
 
 
@@ -42,8 +44,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         for line in _message(error).splitlines():
             print(f"pymoo-hdte: error: {line}", file=sys.stderr)
         return MISTAKE
-    except KeyboardInterrupt:
-        print("pymoo-hdte: interrupted, nothing was written", file=sys.stderr)
+    except KeyboardInterrupt as stopped:
+        kept = str(stopped) or "nothing was written"
+        print(f"pymoo-hdte: interrupted, {kept}", file=sys.stderr)
         return INTERRUPTED
     return 0
 
@@ -51,7 +54,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _parser() -> argparse.ArgumentParser:
     parser = OneLineParser(
         prog="pymoo-hdte",
-        description="Robust design of harmonic drives, and what a model lacks.",
+        description="Robust design of simulators and of harmonic drives, and what a model lacks.",
         epilog="pymoo-hdte COMMAND --help shows options, an example and the files of a command.",
     )
     parser.add_argument("--version", action="version", version=f"pymoo-hdte {__version__}")

@@ -54,7 +54,7 @@ def errors_by_line(path: Path | None) -> Iterator[None]:
     except Exception as error:
         if path is None or not _line(error, path):
             raise
-        allowed = f"a Python file whose effects make no errors; {_on_one_line(error, path)}"
+        allowed = f"a Python file whose effects make no errors; {on_one_line(error, path)}"
         raise InvalidInput(OPTION, str(path), allowed) from error
 
 
@@ -73,12 +73,12 @@ def _names_of(path: Path) -> dict[str, Any]:
         loader.exec_module(module)
     except (Exception, SystemExit) as error:
         del sys.modules[name]
-        allowed = f"a Python file that runs without errors; {_on_one_line(error, path)}"
+        allowed = f"a Python file that runs without errors; {on_one_line(error, path)}"
         raise InvalidInput(OPTION, str(path), allowed) from error
     return vars(module)
 
 
-def _on_one_line(error: BaseException, path: Path) -> str:
+def on_one_line(error: BaseException, path: Path) -> str:
     """Return an error with its line of the file, on one line."""
     message = " ".join(f"{type(error).__name__}: {error}".split())
     return f"{_line(error, path)}{message}"

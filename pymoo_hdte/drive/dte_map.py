@@ -82,10 +82,11 @@ class TorsionalMode:
 def torsional_mode(model: DriveModel) -> TorsionalMode:
     """Return the torsional mode of the nominal design, its bearings left out.
 
-    With an inertia in a clutch, it is the least damped vibration, bearings included.
+    With an inertia that is not rigidly on the output, it is the least damped vibration, bearings
+    included.
     """
     coefficients = model.coefficients(model.nominal[None])
-    if coefficients.coupled:
+    if coefficients.is_loose:
         steady = replace(coefficients, laws=(), stiffness_depth=0.0)
         values = np.linalg.eigvals(state_matrix(steady, 0.0)[0])
         swinging = values[values.imag > 0.0]

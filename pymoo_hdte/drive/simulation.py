@@ -145,11 +145,12 @@ def simulate_drive(
             allowed = f"at least {_CLUTCH_TIMES * late:.3g} s, {_CLUTCH_TIMES:g} times of a clutch"
             raise InvalidInput("settle", settle, allowed)
     memory = sum(law.states for law in memories(coefficients))
-    clutches = len(coefficients.coupled)
-    start = np.array([start_up.angle(0.0), *np.zeros(3 + memory + clutches)])
+    clutches, twists = len(coefficients.coupled), 0 if coefficients.shaft is None else 1
+    start = np.array([start_up.angle(0.0), *np.zeros(3 + memory + clutches + 2 * twists)])
     # theta_d is of the order of arcseconds and its rate of the order of arcseconds times 100 1/s.
-    further = [*[1e-4 * ARCSEC] * memory, *[1e-2 * ARCSEC] * clutches]
-    atol = np.array([1e-8, 1e-6, 1e-4 * ARCSEC, 1e-2 * ARCSEC, *further]) * (rtol / 1e-8)
+    twist, rate = 1e-4 * ARCSEC, 1e-2 * ARCSEC
+    further = [*[twist] * memory, *[rate] * clutches, *[twist, rate] * twists]
+    atol = np.array([1e-8, 1e-6, twist, rate, *further]) * (rtol / 1e-8)
     solution = scipy.integrate.solve_ivp(
         equations_of_motion(coefficients, start_up, prescribed=angle == "prescribed"),
         (0.0, times[-1]),

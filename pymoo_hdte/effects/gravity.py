@@ -6,11 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pymoo_hdte.checks import real_number
 from pymoo_hdte.effects.effect import Effect, register
 from pymoo_hdte.effects.guess import Guess, Sizes
-from pymoo_hdte.effects.law import Behaviour, Law, PortState, Response
+from pymoo_hdte.effects.law import Behaviour, Law, PortState, Response, Values
 from pymoo_hdte.effects.portable import Formula, Lumped
 from pymoo_hdte.effects.unknowns import is_among, polar, starts_along_each, wave
 
@@ -42,6 +43,10 @@ class Gravity(Behaviour):
     def respond(self, state: PortState) -> Response:
         """Return torque and tangents."""
         return Response(self.torque * np.cos(state.phase(1.0) + self.phase))
+
+    def line(self, load: Values) -> NDArray[np.complex128]:
+        """Return its phasors, N.m."""
+        return np.full(np.shape(load), self.torque * np.exp(1j * self.phase))
 
     def with_input_locked(self) -> Law | None:
         """Return None: the weight of what does not turn is a constant."""

@@ -80,6 +80,10 @@ class Sizes:
         sensor of its torque.
     highest : float
         Order below which records show every significant line; per turn of the reference shaft.
+    motor : tuple of float
+        Orders at which the motor is known to cog; empty where it is not known.
+    folded : tuple of float
+        Orders above those of ``shown`` that averaging folds down onto these in some record.
     braked : float
         Largest load, N.m, of a port where a brake holds it; 0 elsewhere.
     between : bool
@@ -110,6 +114,8 @@ class Sizes:
     together: bool = False
     coupling: bool = False
     highest: float = 0.0
+    motor: tuple[float, ...] = ()
+    folded: tuple[float, ...] = ()
     braked: float = 0.0
     between: bool = False
 

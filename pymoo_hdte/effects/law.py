@@ -123,8 +123,7 @@ class Law(Protocol):
         """See `Behaviour`."""
         ...
 
-    @property
-    def driving(self) -> complex:
+    def line(self, load: Values) -> NDArray[np.complex128] | None:
         """See `Behaviour`."""
         ...
 
@@ -244,10 +243,21 @@ class Behaviour:
         """Size of the part of the force that is against the motion and the same at all speeds."""
         return 0.0
 
-    @property
-    def driving(self) -> complex:
-        """Phasor of a driving force, which a sensor of that force reads; 0 otherwise."""
-        return 0.0
+    def line(self, load: Values) -> NDArray[np.complex128] | None:
+        """Return the phasors of a torque that is one line of its order, whatever else moves.
+
+        It is Re phasor exp(i order angle), N.m, against the motion; None for any other law.
+
+        Parameters
+        ----------
+        load : ndarray, shape (n,)
+            Torque that the machine passes on through the port, N.m.
+
+        Returns
+        -------
+        ndarray of complex, shape (n,), or None
+        """
+        return None
 
     @property
     def creep(self) -> float:

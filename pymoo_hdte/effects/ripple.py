@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pymoo_hdte.checks import real_number
 from pymoo_hdte.effects.effect import Effect, register
 from pymoo_hdte.effects.guess import Guess, Sizes, guess_of_lines
-from pymoo_hdte.effects.law import Periodic, PortState, Response
+from pymoo_hdte.effects.law import Periodic, PortState, Response, Values
 from pymoo_hdte.effects.portable import Formula
 from pymoo_hdte.effects.unknowns import Family, is_among, is_whole
 
@@ -32,10 +33,9 @@ class PeriodicTorque(Periodic):
         """Return torque and tangents; negative, as the driving torque does not oppose."""
         return Response(-self.amplitude * self.cosine(state))
 
-    @property
-    def driving(self) -> complex:
-        """Its phasor, N.m: the torque is that of motor or brake."""
-        return complex(self.amplitude * np.exp(1j * self.phase))
+    def line(self, load: Values) -> NDArray[np.complex128]:
+        """Return its phasors, N.m; negative, as the driving torque does not oppose."""
+        return np.full(np.shape(load), -self.amplitude * np.exp(1j * self.phase))
 
     @property
     def formula(self) -> Formula:
@@ -51,11 +51,6 @@ class CouplingTorque(PeriodicTorque):
     """
 
     drives: ClassVar[bool] = False
-
-    @property
-    def driving(self) -> complex:
-        """Zero: it is no torque of the motor."""
-        return 0.0
 
 
 @dataclass(frozen=True)
@@ -92,6 +87,10 @@ class BrakeRipple(Periodic):
         """
         load = state.known_load("brake_ripple", "load")
         return Response(self.share * load * self.cosine(state))
+
+    def line(self, load: Values) -> NDArray[np.complex128]:
+        """Return its phasors, N.m."""
+        return np.asarray(self.share * np.exp(1j * self.phase) * load)
 
     @property
     def formula(self) -> Formula:
@@ -166,30 +165,45 @@ def _of_brake(family: Family, sizes: Sizes) -> Guess:
 def _cogging(sizes: Sizes) -> list[Guess]:
     """Guess the cogging of a motor with poles and slots that show all lines that records could.
 
-    It has the least common multiple of both and, as neither are quite even, the number of poles
-    and that of slots as well (Hendershot and Miller, Design of Brushless Permanent-Magnet Machines,
-    2010).
+    Of a known motor any of its lines is enough. Lines above all those that records analyse go with
+    it where rows are averages that fold them down.
     """
     if sizes.slower != 1.0 or not sizes.coupling:
         return []
-    motors = [
-        tuple(order for order in orders if order < sizes.highest)
-        for slots, poles in _MOTORS
-        for orders in [(float(poles), float(slots), float(math.lcm(poles, slots)))]
-    ]
     seen = (*sizes.seen, *sizes.clear)
+    families = list[Family]()
     # Several motors may differ in lines only that no record could show.
-    families = [
-        Family(lines, harmonic=False)
-        for lines in dict.fromkeys(motors)
-        if lines and all(is_among(seen, order) for order in lines)
-    ]
+    for lines in [sizes.motor] if sizes.motor else dict.fromkeys(cogging_of(*m) for m in _MOTORS):
+        could_show = [order for order in lines if _could_show(sizes, order)]
+        if sizes.motor:
+            could_show = [order for order in could_show if is_among(seen, order)]
+        if could_show and all(is_among(seen, order) for order in could_show):
+            folded = [order for order in lines if is_among(sizes.folded, order)]
+            families.append(Family(tuple(sorted({*could_show, *folded})), harmonic=False))
     return [
         guess_of_lines(
             family, "amplitude", sizes.largest, sizes.residual, torque_line, form=family.form
         )
-        for family in families
+        for family in dict.fromkeys(families)
     ]
+
+
+def _could_show(sizes: Sizes, order: float) -> bool:
+    return order < sizes.highest or is_among(sizes.shown, order)
+
+
+def cogging_of(slots: int, poles: int) -> tuple[float, ...]:
+    """Return the orders at which a motor cogs.
+
+    It has the least common multiple of both and, as neither are quite even, the number of poles
+    and that of slots as well (Hendershot and Miller, Design of Brushless Permanent-Magnet Machines,
+    2010).
+
+    Parameters
+    ----------
+    slots, poles : int
+    """
+    return tuple(sorted({float(poles), float(slots), float(math.lcm(poles, slots))}))
 
 
 _MOTORS = tuple(
@@ -199,6 +213,22 @@ _MOTORS = tuple(
     if poles != slots and 2 * slots <= 3 * poles <= 4 * slots
 )
 """Slots and poles of motors with concentrated windings, of which nearly all of the flux is used."""
+COGGING_ORDERS = tuple(sorted({order for motor in _MOTORS for order in cogging_of(*motor)}))
+"""Orders at which any of these motors cogs."""
+
+
+def orders_beside(seen: Sequence[float], motor: tuple[float, ...] = ()) -> set[float]:
+    """Return the orders of all motors that have a line at one of some orders, or of the known one.
+
+    Parameters
+    ----------
+    seen : sequence of float
+    motor : tuple of float
+        As of `Sizes`.
+    """
+    motors = [cogging_of(*motor) for motor in _MOTORS]
+    beside = [lines for lines in motors if any(is_among(seen, line) for line in lines)]
+    return set(motor) if motor else {order for lines in beside for order in lines}
 
 
 def _coupling(sizes: Sizes) -> list[Guess]:

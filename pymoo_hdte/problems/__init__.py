@@ -5,6 +5,7 @@ from pymoo_hdte.problems._simulator.data import Runs
 from pymoo_hdte.problems._simulator.direct import DirectProblem
 from pymoo_hdte.problems._simulator.existing import Robust
 from pymoo_hdte.problems._simulator.inputs import Design
+from pymoo_hdte.problems._simulator.kinds_of_noise import Interval, Scenarios
 from pymoo_hdte.problems._simulator.problem import SimulatorProblem
 from pymoo_hdte.problems._simulator.reliability import Reliability, failure_probability
 from pymoo_hdte.problems._simulator.robust_problem import robust_problem
@@ -41,6 +42,7 @@ __all__ = [
     "DirectProblem",
     "Event",
     "FailureProbability",
+    "Interval",
     "Mean",
     "MeanPlusStd",
     "OperatingCondition",
@@ -56,6 +58,7 @@ __all__ = [
     "RobustProblem",
     "RobustToy",
     "Runs",
+    "Scenarios",
     "SimulatorFailed",
     "SimulatorProblem",
     "Std",

@@ -120,9 +120,10 @@ class RobustDTEGrades(StoredFront, RobustProblem):
         self.model, self.conditions = response.model, response.conditions
         self.nominal = response.nominal
         coefficients = self.model.coefficients(self.model.nominal[None])
-        if coefficients.coupled:
+        if coefficients.is_loose:
             allowed = "inertias rigidly on the output, whose resonance is known in closed form"
-            raise InvalidInput("model.effects", "coupled_inertia", allowed)
+            loose = "coupled_inertia" if coefficients.coupled else "load_shaft"
+            raise InvalidInput("model.effects", loose, allowed)
         self._output_inertia = coefficients.output_inertia
         classes = _classes(self.model)
         sources = np.array([len(_sources(self.model.sheet, names)) for names in classes])

@@ -54,22 +54,22 @@ def test_the_move_among_neighbours_stays_in_the_flat_they_span(rng):
 @pytest.mark.parametrize("n_obj", [2, 3, 5])
 def test_neighbours_are_the_nearest_in_scaled_objectives(rng, n_obj):
     F = rng.random((30, n_obj)) * 10.0 ** np.arange(n_obj)
-    near = nearest_in_objectives(F, 12)
+    near = nearest_in_objectives(F, 12, np.arange(len(F)))
     scaled = (F - F.min(axis=0)) / np.ptp(F, axis=0)
     distance = np.linalg.norm(scaled[:, np.newaxis] - scaled, axis=2)
     expected = np.argsort(distance, axis=1)[:, 1:13]
     np.testing.assert_array_equal(np.sort(near), np.sort(expected))
-    assert nearest_in_objectives(F[:4], 12).shape == (4, 3)
+    assert nearest_in_objectives(F[:4], 12, np.arange(4)).shape == (4, 3)
 
 
 @pytest.mark.parametrize("lost", [np.nan, np.inf])
 def test_objectives_that_are_not_finite_have_neighbours_like_themselves(rng, lost):
     F = rng.random((20, 2))
     F[:5, 1] = lost
-    near = nearest_in_objectives(F, 4)
+    near = nearest_in_objectives(F, 4, np.arange(len(F)))
     assert np.all(np.sort(near[:5]) < 5)
     assert np.all(near[5:] >= 5)
-    assert nearest_in_objectives(np.full((6, 2), lost), 3).shape == (6, 3)
+    assert nearest_in_objectives(np.full((6, 2), lost), 3, np.arange(6)).shape == (6, 3)
 
 
 # --- archive --------------------------------------------------------------------------------------
@@ -81,13 +81,9 @@ def evaluated(F):
     return population
 
 
-def read(population):
-    return Points.of(population, False)
-
-
 def offer(archive, F):
     population = evaluated(F)
-    archive.update(population, read(population), read)
+    archive.update(population, constrained=False)
 
 
 def test_the_archive_has_the_front_of_all_it_was_given(rng):
@@ -130,15 +126,15 @@ def test_the_archive_is_thinned_out_once_it_is_more_than_full(offered, kept):
 def test_the_archive_forgets_what_is_no_longer_feasible():
     """As constraint handling that grows stricter needs."""
     archive = FrontArchive(10, most_spread)
-    offer(archive, np.array([[0.0, 1.0], [1.0, 0.0]]))
-    allowed = {"least": 0.0}
-
-    def stricter(population):
-        F = population.get("F")
-        return points(F, np.where(F[:, 0] < allowed["least"], 1.0, 0.0))
-
-    allowed["least"] = 0.5
-    archive.update(Population.empty(), Points.none(1, 2), stricter)
+    population = evaluated(np.array([[0.0, 1.0], [1.0, 0.0]]))
+    population.set("G", np.array([[0.1], [-0.1]]))
+    for particle in population:
+        particle.config["cv_eps"] = 0.5
+    archive.update(population, constrained=True)
+    assert len(archive) == 2
+    for particle in population:
+        particle.config["cv_eps"] = 0.0
+    archive.update(Population.empty(), constrained=True)
     np.testing.assert_array_equal(archive.members.get("F"), [[1.0, 0.0]])
 
 

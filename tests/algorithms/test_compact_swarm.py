@@ -2,11 +2,13 @@
 
 import copy
 import pickle
+import tracemalloc
 
 import numpy as np
 import pytest
 from moocore import is_nondominated
 from night import others_at_night
+from pymoo.algorithms.moo.nsga2 import NSGA2
 from pymoo.core.problem import Problem
 from pymoo.core.variable import Integer, Real
 from pymoo.indicators.hv import HV
@@ -14,12 +16,14 @@ from pymoo.indicators.igd_plus import IGDPlus
 from pymoo.operators.repair.rounding import RoundingRepair
 from pymoo.optimize import minimize
 from pymoo.problems import get_problem
+from scipy.stats import binomtest, kstest
 from swarm_problems import Cliff, Parabolas, Unreachable, assert_clean_front, digest
 
 from experiments.studies.contest.problems import MovedZDT
 from pymoo_hdte.algorithms import CompactSwarm, ElitistSwarm
 from pymoo_hdte.algorithms.compact import size_for
 from pymoo_hdte.algorithms.moves import Attraction
+from pymoo_hdte.algorithms.points import Points
 from pymoo_hdte.algorithms.quadratic import ModelStep
 from pymoo_hdte.checks import InvalidInput
 
@@ -198,13 +202,50 @@ class OnASphere(Parabolas):
 
 
 def test_an_equality_constraint_is_met_and_followed():
-    volume = HV(np.array([1.5, 12.0]))
-    reached = {}
-    for make in (CompactSwarm, ElitistSwarm):
-        results = [run(OnASphere(), 4000, seed, make) for seed in range(3)]
-        assert all(np.abs(result.H).max() <= 1e-4 for result in results)
-        reached[make] = np.mean([volume(result.F) for result in results])
-    assert reached[CompactSwarm] > reached[ElitistSwarm]
+    results = [run(OnASphere(), 4000, seed) for seed in range(6)]
+    assert all(np.abs(result.H).max() <= 1e-4 for result in results)
+    # A front within the shell, without a move along it, would be as wide as the shell is thick.
+    assert max(np.ptp(result.X, axis=0).max() for result in results) > 100 * 1e-4
+
+
+class TwoBars(Problem):
+    """CRE21 of R. Tanabe, H. Ishibuchi (2020): cross-sections, feasible below 1e-4 of the box."""
+
+    def __init__(self):
+        super().__init__(
+            n_var=3, n_obj=2, n_ieq_constr=3, xl=[1e-5, 1e-5, 1.0], xu=[100.0, 100.0, 3.0]
+        )
+
+    def _evaluate(self, X, out, *args, **kwargs):
+        first, second, y = X.T
+        lengths = np.sqrt(16.0 + y**2), np.sqrt(1.0 + y**2)
+        volume = first * lengths[0] + second * lengths[1]
+        stresses = 20.0 * lengths[0] / (first * y), 80.0 * lengths[1] / (second * y)
+        out["F"] = np.column_stack([volume, stresses[0]])
+        out["G"] = np.column_stack([volume - 0.1, *(stress - 1e5 for stress in stresses)])
+
+
+def test_a_feasible_region_far_thinner_than_the_box_is_found_along_its_bounds():
+    assert sum(run(TwoBars(), 500, seed).F is not None for seed in range(10)) >= 9
+
+
+def test_what_would_pass_a_bound_stops_on_the_way_in_half_only_as_long_as_nothing_is_feasible():
+    swarm = CompactSwarm()
+    swarm.setup(TwoBars(), termination=("n_eval", 500), seed=1)
+    lowest, highest = swarm.problem.bounds()
+    X = np.random.default_rng(1).uniform(lowest, highest, (1000, 3))
+    aims = X + (highest - lowest) * [-2.0, 2.0, 0.0]
+    points = Points(X, np.ones((1000, 2)), np.ones(1000))
+    reached = swarm._within(X, aims, points)
+    assert np.all((lowest <= reached) & (reached <= highest))
+    np.testing.assert_array_equal(reached[:, 2], X[:, 2])
+    for column, bound in enumerate((lowest, highest)):
+        share = (reached - X)[:, column] / (bound[column] - X[:, column])
+        on_it = reached[:, column] == bound[column]
+        assert binomtest(int(on_it.sum()), 1000, 0.5).pvalue > 0.01
+        assert kstest(share[~on_it], "uniform").pvalue > 0.01
+    found = Points(X, points.F, np.append(0.0, np.ones(999)))
+    np.testing.assert_array_equal(swarm._within(X, aims, found), np.clip(aims, lowest, highest))
 
 
 def test_an_infeasible_problem_reports_like_pymoo():
@@ -334,6 +375,18 @@ def test_a_history_holds_each_generation_as_it_was():
     (model,) = (move for move in swarm.history[-2].moves if isinstance(move, ModelStep))
     (later,) = (move for move in swarm.history[-1].moves if isinstance(move, ModelStep))
     assert model._told[0].X is later._told[0].X
+
+
+def test_a_history_takes_at_most_three_times_the_memory_of_nsga2_s():
+    """It has nine times as many generations, which share what does not change."""
+    sizes = []
+    for make in (CompactSwarm, NSGA2):
+        run("zdt1", 100, make=make)  # what is loaded once is no part of a history
+        tracemalloc.start()
+        history = run("zdt1", 1000, make=make, save_history=True).history
+        sizes.append(tracemalloc.get_traced_memory()[0] if history else 0)
+        tracemalloc.stop()
+    assert 0 < sizes[0] <= 3 * sizes[1]
 
 
 def test_a_number_of_generations_is_told_in_evaluations():

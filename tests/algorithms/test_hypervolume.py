@@ -9,7 +9,7 @@ from pymoo.problems import get_problem
 from swarm_problems import run
 
 from pymoo_hdte.algorithms import ElitistSwarm
-from pymoo_hdte.algorithms.hypervolume import most_hypervolume
+from pymoo_hdte.algorithms.hypervolume import _added_to_three, most_hypervolume
 from pymoo_hdte.algorithms.spread import most_spread
 from pymoo_hdte.checks import InvalidInput
 
@@ -48,6 +48,20 @@ def test_the_row_that_adds_least_leaves(seed):
     np.testing.assert_array_equal(freely, by_definition(F, 9, corner))
     ends = set(F.argmax(axis=0))
     np.testing.assert_array_equal(most_hypervolume(F, 9), by_definition(F, 9, corner, ends))
+
+
+@pytest.mark.parametrize("grid", [False, True])
+def test_what_a_row_adds_is_counted_without_the_others(grid):
+    rng = np.random.default_rng(4)
+    F = rng.integers(0, 9, (150, 3)) / 8.0 if grid else front(80, 3, 4)
+    F = F[is_nondominated(F, keep_weakly=True)]
+    stays = rng.random(len(F)) < 0.8
+    order, buffer = np.argsort(F[:, 2], kind="stable"), np.empty((len(F) + 1, 2))
+    for row in np.flatnonzero(stays):
+        others = stays & (np.arange(len(F)) != row)
+        both = [hypervolume(F[some], ref=[1.1, 1.1, 1.1]) for some in (stays, others)]
+        added = _added_to_three(F, order, stays, row, buffer)
+        assert added == pytest.approx(both[0] - both[1], abs=1e-14)
 
 
 @pytest.mark.parametrize("n_obj", [2, 3])

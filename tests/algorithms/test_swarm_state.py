@@ -1,16 +1,23 @@
 """A swarm's state is in the population, which callbacks, wrappers and users of ask may change."""
 
+from functools import partial
+
 import numpy as np
 import pytest
+from pymoo.algorithms.moo.nsga2 import NSGA2
 from pymoo.constraints.eps import AdaptiveEpsilonConstraintHandling
 from pymoo.core.callback import Callback
 from pymoo.core.evaluator import Evaluator
 from pymoo.core.population import Population
+from pymoo.core.problem import Problem
+from pymoo.indicators.igd_plus import IGDPlus
 from pymoo.optimize import minimize
 from pymoo.problems import get_problem
 from swarm_problems import Parabolas, assert_clean_front, digest, run
 
+from experiments.studies.suites.limits import NoisyZDT1
 from pymoo_hdte.algorithms import AMPMOPSO, MOPSO, CompactSwarm, ElitistSwarm
+from pymoo_hdte.algorithms.moves import Difference
 from pymoo_hdte.checks import InvalidInput
 
 ELITIST = {"pop_size": 20}
@@ -231,3 +238,68 @@ def test_first_positions_beyond_the_bounds_are_named(value):
         run(ElitistSwarm(sampling=X, **ELITIST), Parabolas())
     np.testing.assert_equal(error.value.value, value)
     assert error.value.allowed == "-1.0 to 2.0, the bounds of the problem"
+
+
+# --- noise ----------------------------------------------------------------------------------------
+
+
+class Draws(Problem):
+    """Two parabolas with noise in objectives and constraint, which notes every evaluation."""
+
+    def __init__(self):
+        super().__init__(n_var=2, n_obj=2, n_ieq_constr=1, xl=0.0, xu=1.0)
+        self.generator, self.seen = np.random.default_rng(1), {}
+
+    def _evaluate(self, X, out, *args, **kwargs):
+        F = np.column_stack([(X**2).sum(axis=1), ((X - 1.0) ** 2).sum(axis=1)])
+        values = np.column_stack([F, 0.1 - X[:, 0]])
+        values += 0.05 * self.generator.standard_normal(values.shape)
+        for x, value in zip(X, values, strict=True):
+            self.seen.setdefault(x.tobytes(), []).append(value)
+        out["F"], out["G"] = values[:, :2], values[:, 2:]
+
+
+@pytest.mark.parametrize("make", [ElitistSwarm, CompactSwarm])
+def test_what_is_evaluated_again_has_the_mean_of_all_its_evaluations(make):
+    problem = Draws()
+    # Nothing but a repeat comes to a place a second time.
+    swarm = make(20, moves=(Difference(),), reevaluated=0.3)
+    result = minimize(problem, swarm, ("n_eval", 1500), seed=1, save_history=True)
+    everywhere = [*result.opt, *result.algorithm.pop]
+    if make is CompactSwarm:
+        everywhere += [*result.algorithm.archive_all()]
+    for particle in everywhere:
+        evaluations = problem.seen[particle.X.tobytes()]
+        assert particle.data.get("n_evaluations", 1) == len(evaluations)
+        mean = np.mean(evaluations, axis=0)
+        np.testing.assert_allclose([*particle.F, *particle.G], mean, rtol=1e-12, atol=1e-12)
+        assert particle.CV[0] == max(0.0, particle.G[0])
+    counts = [particle.data.get("n_evaluations", 1) for particle in result.opt]
+    assert np.mean(counts) > 2.0
+    assert sum(map(len, problem.seen.values())) == result.algorithm.evaluator.n_eval <= 1500
+    # What a history has is as it was.
+    early = result.history[3].opt
+    assert max(particle.data.get("n_evaluations", 1) for particle in early) <= 4
+
+
+def test_evaluating_again_needs_a_share():
+    for share in (-0.1, 1.0, np.nan):
+        with pytest.raises(InvalidInput, match="reevaluated"):
+            ElitistSwarm(reevaluated=share)
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize("make", [ElitistSwarm, CompactSwarm])
+def test_with_noise_evaluating_again_brings_the_swarms_nearer_than_nsga2(make):
+    exact = get_problem("zdt1")
+    distance = IGDPlus(exact.pareto_front())
+    for deviation in (0.05, 0.2):
+        reached = []
+        for algorithm in (partial(make, reevaluated=0.3), NSGA2):
+            values = []
+            for seed in range(1, 6):
+                problem = NoisyZDT1(deviation, seed)
+                X = minimize(problem, algorithm(), ("n_eval", 10_000), seed=seed).X
+                values.append(distance(exact.evaluate(np.atleast_2d(X))))
+            reached.append(values)
+        assert max(reached[0]) < min(reached[1])

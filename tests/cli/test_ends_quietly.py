@@ -37,6 +37,7 @@ ARGUMENTS = {
     "discrepancy": ["campaign"],
     "export": ["model.toml", "--to", "urdf"],
     "init": ["logs"],
+    "robust": ["study.toml", "--out", "new/out"],
 }
 HELD = """
 import sys, time

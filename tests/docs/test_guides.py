@@ -184,7 +184,7 @@ def test_site_shows_every_guide():
 
 def test_gate_builds_the_site_as_its_front_page_says():
     front, gate = (path.read_text() for path in (DOCS / "index.md", ROOT / ".ci" / "run"))
-    for command in re.findall(r"^(?:pip|python) .*", front, flags=re.M):
+    for command in re.findall(r"^(?:pip|python) .*docs.*", front, flags=re.M):
         assert f".venv/bin/{command}\n" in gate
 
 

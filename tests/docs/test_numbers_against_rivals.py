@@ -3,10 +3,10 @@
 import numpy as np
 from places import WORDS
 
-from experiments.runner.campaign import Campaign
 from experiments.runner.registry import Context
 from experiments.studies.robust.data import METHODS, OPENTURNS, OURS, ahead, outcome_for
 from experiments.studies.robust.functions import FUNCTIONS
+from pymoo_hdte._runner.campaign import Campaign
 
 
 def test_runs_of_robust_surrogates_are_those_of_the_stored_outcome(tmp_path):

@@ -6,19 +6,29 @@ import pytest
 from drawn_pictures import drawn_and_stored
 from places import DOCS
 
-from experiments.runner.campaign import Campaign
 from experiments.runner.registry import Context
 from experiments.studies.suites import data as suites
 from experiments.studies.suites.bbob_tables import CITED, reached
-from experiments.studies.suites.limits import NOISE, OBJECTIVES, SIZED, SIZES, limits_tables, stored
+from experiments.studies.suites.limits import (
+    AGAIN,
+    NOISE,
+    OBJECTIVES,
+    SHARE,
+    SIZES,
+    limits_tables,
+    stored,
+)
 from experiments.studies.suites.own_time import own_time_table
-from experiments.studies.suites.protocol import BUDGETS
+from experiments.studies.suites.peers import SIZED
+from experiments.studies.suites.protocol import BOTH_SIZES, BUDGETS
 from experiments.studies.suites.suite_tables import (
     feasible_runs,
     ranks_together,
     signs_together,
 )
 from experiments.studies.suites.suite_tables import ranks as suite_ranks
+from experiments.studies.suites.suite_tables import tests as suite_tests
+from pymoo_hdte._runner.campaign import Campaign
 
 WORDS = " ".join((DOCS / "which_algorithm.md").read_text(encoding="utf-8").split())
 
@@ -72,8 +82,8 @@ def test_noise_and_many_objectives():
         return " and ".join(f"{values[question, case, 10_000, algorithm]:.3f}" for case in cases)
 
     noise, objectives = ("0.05", "0.2"), ("4", "6")
-    assert f"{both(NOISE, 'ElitistSwarm', *noise)} (`CompactSwarm` " in WORDS
-    assert f"`CompactSwarm` {both(NOISE, 'CompactSwarm', *noise)}, NSGA-II " in WORDS
+    swarms = [both(NOISE, name + AGAIN, *noise) for name in ("ElitistSwarm", "CompactSwarm")]
+    assert f"{swarms[0]} (`CompactSwarm(reevaluated={SHARE})` {swarms[1]}, NSGA-II " in WORDS
     assert f"NSGA-II {both(NOISE, 'NSGA-II', *noise)})" in WORDS
     assert f"{both(OBJECTIVES, 'NSGA-III', *objectives)} (`CompactSwarm` " in WORDS
     assert f"`CompactSwarm` {both(OBJECTIVES, 'CompactSwarm', *objectives)})" in WORDS
@@ -92,6 +102,18 @@ def test_rivals_sized_to_the_budget():
             for n in (500, 2_000)
         )
         assert sentence in WORDS
+
+
+def test_rivals_of_both_sizes_on_a_suite_run_once(outcome):
+    for measure, name in (("hypervolume", "by hypervolume"), ("igd_plus", "by IGD+")):
+        ranks = [suite_ranks(outcome, BOTH_SIZES, n, measure) for n in BUDGETS]
+        assert {len(of_all) for of_all in ranks} == {8}
+        ours = ", ".join(f"{of_all['CompactSwarm']:.2f}" for of_all in ranks)
+        assert f"{name} {ours}" in WORDS
+        assert all(min(of_all, key=of_all.get) == "CompactSwarm" for of_all in ranks)
+        against = [test for n in BUDGETS for test in suite_tests(outcome, BOTH_SIZES, n, measure)]
+        assert all(test.beaten for test in against)
+    assert f"{len(outcome.problems(BOTH_SIZES, 500))} problems, one run each" in WORDS
 
 
 def test_tables_hold_all_that_is_stored():

@@ -48,9 +48,11 @@ def test_every_path_of_the_checklist_exists():
 
 def test_the_paper_has_the_sections_and_pictures_that_are_asked_for():
     assert tuple(re.findall(r"^# (.+)$", PAPER, re.MULTILINE)) == SECTIONS
-    for picture in re.findall(r"\]\((\S+\.png)\)", PAPER):
+    pictures = re.findall(r"Drawn by `(\S+)`\.\]\((\S+\.png)\)", PAPER)
+    assert len(pictures) == PAPER.count("![")
+    for script, picture in pictures:
         assert (ROOT / picture).is_file()
-        assert (ROOT / picture.replace(".png", "_picture.py")).is_file()
+        assert (ROOT / script).is_file()
     known = re.findall(r"^@\w+\{(\w+),", (ROOT / "paper.bib").read_text(), re.MULTILINE)
     cited = {one for group in re.findall(r"\[(@[^]]+)\]", PAPER) for one in group.split("; ")}
     assert {f"@{one}" for one in known} == cited

@@ -9,11 +9,12 @@ from scipy.integrate import solve_ivp
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.drive import LawAtPort, SpeedLoop, harmonic_balance, preset
 from pymoo_hdte.drive._solve.free_angle import torus_of
-from pymoo_hdte.drive._solve.lead_response import lead_response
+from pymoo_hdte.drive._solve.lead_response import lead_response, torque_lines
 from pymoo_hdte.drive._solve.torus import Torus
 from pymoo_hdte.effects.friction import CoulombFriction, NonlinearDrag
+from pymoo_hdte.effects.gravity import Gravity
 from pymoo_hdte.effects.hysteresis import MaxwellSlip
-from pymoo_hdte.effects.ripple import PeriodicTorque
+from pymoo_hdte.effects.ripple import BrakeRipple, CouplingTorque, PeriodicTorque
 from pymoo_hdte.effects.stiffness import HardeningStiffness, SoftWindup
 
 LAWS = [
@@ -145,6 +146,44 @@ def test_a_small_motion_is_answered_as_the_balance_answers_it(speed):
     for channel in ("torsion", "motor_torque", "coupling_torque"):
         change = (getattr(moved, channel) - getattr(still, channel))[0, place] / step
         assert change == pytest.approx(getattr(response, channel)[0, 0], rel=1e-3)
+
+
+TORQUES = [
+    ("torque_ripple", "input", PeriodicTorque(8.0, 0.4, 2e-3)),
+    ("coupling_ripple", "input", CouplingTorque(2.0, 0.4, 2e-3)),
+    ("torque_ripple", "output", PeriodicTorque(2.0, 1.4, 0.06)),
+    ("gravity", "load", Gravity(0.05, 0.3)),
+    ("brake_ripple", "load", BrakeRipple(9.0, -0.7, 0.002)),
+]
+
+
+@pytest.mark.parametrize(("name", "port", "law"), TORQUES)
+@pytest.mark.parametrize("speed", [200.0, -60.0])
+def test_a_torque_of_one_line_is_answered_as_the_balance_answers_it(name, port, law, speed):
+    """Exactly at the input; elsewhere but for what a varying stiffness and the error make of it."""
+    for depth in (0.0, 0.03):
+        plain = replace(coefficients_with(), stiffness_depth=depth)
+        coefficients = replace(plain, laws=(*plain.laws, (port, law)))
+        torus, load = torus_of(coefficients), np.array([30.0])
+        at = {"input_speed": np.array([speed]), "load_torque": load, "tolerance": 1e-13}
+        lead = lead_on(torus, {2.0: 1e-4})
+        without, present = (
+            harmonic_balance(one, torus=torus, lead=lead, **at) for one in (plain, coefficients)
+        )
+        lines = torque_lines(plain, [(port, law)], without, at["input_speed"], load)
+        place, conjugate = torus.place(float(lines.orders[0]))
+        for channel in ("torsion", "motor_torque", "coupling_torque", "brake_torque"):
+            change = (getattr(present, channel) - getattr(without, channel))[0]
+            expected = np.zeros_like(change)
+            expected[place] = getattr(lines, channel)[0, 0]
+            expected = expected.conj() if conjugate else expected
+            size = max(np.abs(expected).max(), np.abs(change).max())
+            if channel == "coupling_torque" and port != "input":
+                size = max(size, abs(law.line(load)[0]))
+            # The angle of the output varies by the error, which turns the line as well.
+            turned = 2.0 * law.orders[0] * np.abs(plain.error_phasors).sum()
+            share = 1e-6 if port == "input" else depth + turned + 2e-3
+            np.testing.assert_allclose(change, expected, rtol=0.0, atol=share * size + 1e-13)
 
 
 def test_a_motion_of_another_shape_is_refused():

@@ -3,7 +3,7 @@
 import numpy as np
 from matplotlib.figure import Figure
 
-from experiments.runner.result import (
+from pymoo_hdte._runner.result import (
     MISSED,
     NOT_SHOWN,
     OF_MODELS,

@@ -9,7 +9,7 @@ import sys
 
 PACKAGES = (
     "drive", "surrogate", "identification", "problems", "algorithms", "decision", "discrepancy",
-    "mechanism", "validation", "parallel", "export",
+    "mechanism", "validation", "parallel", "export", "benchmark",
 )  # fmt: skip
 
 HERE = ("pymoo_hdte", "test_public_docstrings")

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from experiments.runner.campaign import Run
+from pymoo_hdte._runner.campaign import Run
 
 
 @dataclass(frozen=True)

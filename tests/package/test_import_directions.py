@@ -33,7 +33,8 @@ LOWEST_FIRST = (
         "discrepancy._report",
     ),
     *("problems._simulator", "problems._closed_form", "problems"),
-    *("algorithms", "parallel", "decision", "discrepancy", "export", "cli"),
+    *("algorithms", "parallel", "decision", "discrepancy", "export"),
+    *("_runner", "_comparing", "benchmark", "cli"),
 )
 """Rooms of the package; a folder stands for the modules in it, not for the folders below it.
 

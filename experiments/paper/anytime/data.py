@@ -11,17 +11,17 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.comparing.references import true_front
-from experiments.comparing.runs import AS_PRINTED, VELOCITIES
 from experiments.comparing.stored import Stored
 from experiments.paper.anytime.job import AnytimeRun
 from experiments.paper.anytime.measures import MEASURES, RETURNED, measure
 from experiments.paper.anytime.moments import COMMON, EXACT, FRESH
-from experiments.published_values import TABLE_7
-from experiments.runner.campaign import Campaign
 from experiments.runner.committed import read_rows, rounded, table_with_origin
 from experiments.runner.registry import Context
+from pymoo_hdte._comparing.published import TABLE_7
+from pymoo_hdte._comparing.references import true_front
+from pymoo_hdte._comparing.runs import AS_PRINTED, VELOCITIES
 from pymoo_hdte._io.csv_table import csv_text
+from pymoo_hdte._runner.campaign import Campaign
 
 NAME = "anytime"
 OF_TABLE_7 = tuple(TABLE_7)

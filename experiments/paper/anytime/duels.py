@@ -8,11 +8,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.comparing.indicators import smaller_is_better
-from experiments.comparing.paired import SIGNIFICANT
-from experiments.comparing.statistics import a12_intervals, holm, wilcoxon_p
 from experiments.paper.anytime.data import Contested, Scores, cases
 from experiments.paper.anytime.measures import NORMALISED, RAW, RETURNED, TRUE, Scale
+from pymoo_hdte._comparing.indicators import smaller_is_better
+from pymoo_hdte._comparing.paired import SIGNIFICANT
+from pymoo_hdte._comparing.statistics import a12_intervals, holm, wilcoxon_p
 
 COMPARED = {
     "igd": f"igd_{Scale(TRUE, RAW).suffix}",

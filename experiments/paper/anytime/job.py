@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 from pymoo.core.problem import Problem
 
-from experiments.comparing.indicators import front_among
 from experiments.comparing.peers_pymoo import at_budgets
-from experiments.comparing.runs import (
+from experiments.paper.anytime.moments import problem_with
+from pymoo_hdte._comparing.indicators import front_among
+from pymoo_hdte._comparing.runs import (
     ALGORITHMS,
     AS_PRINTED,
     FINAL_SIZE,
@@ -20,8 +21,7 @@ from experiments.comparing.runs import (
     final_rows,
     robust_problem,
 )
-from experiments.paper.anytime.moments import problem_with
-from experiments.runner.campaign import Run
+from pymoo_hdte._runner.campaign import Run
 from pymoo_hdte.algorithms import ParticleSwarm
 from pymoo_hdte.algorithms.crowding import least_crowded
 

@@ -9,10 +9,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.comparing.indicators import Indicators, IndicatorsAgainst, front_among
-from experiments.comparing.runs import FINAL_SIZE
 from experiments.paper.anytime.job import sets_of
-from experiments.runner.campaign import Run
+from pymoo_hdte._comparing.indicators import Indicators, IndicatorsAgainst, front_among
+from pymoo_hdte._comparing.runs import FINAL_SIZE
+from pymoo_hdte._runner.campaign import Run
 
 TRUE, UNION = "true front", "union of runs"
 RAW, NORMALISED = "arcsec", "normalised"

@@ -8,7 +8,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from experiments.comparing.runs import robust_problem
+from pymoo_hdte._comparing.runs import robust_problem
 from pymoo_hdte.problems import RobustProblem
 from pymoo_hdte.surrogate import Box, ChebyshevSurrogate, SampledMoments
 from pymoo_hdte.surrogate.inputs import UncertainInput

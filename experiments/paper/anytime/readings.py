@@ -9,10 +9,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.comparing.statistics import mean_of_known, paired_interval
 from experiments.paper.anytime.data import OF_TABLE_7, Case, Contested, Scores
 from experiments.paper.anytime.measures import EQUAL, RETURNED, SCALES, Scale
-from experiments.published_values import TABLE_7
+from pymoo_hdte._comparing.published import TABLE_7
+from pymoo_hdte._comparing.statistics import mean_of_known, paired_interval
 
 PRINTED = np.array([[row.igd, row.spacing] for row in TABLE_7.values()])
 """IGD and Spacing of NSGA-II, MOPSO and AMP-MOPSO, shape (3, 2)."""

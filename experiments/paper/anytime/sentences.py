@@ -8,8 +8,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from experiments.comparing.indicators import NAMES
-from experiments.comparing.runs import AS_PRINTED
 from experiments.paper.anytime.data import OF_TABLE_7, Case, Contested, Scores, cases
 from experiments.paper.anytime.duels import COMPARED, Duel, duels
 from experiments.paper.anytime.measures import EQUAL, RETURNED
@@ -28,7 +26,9 @@ from experiments.paper.anytime.tables import (
     standing,
     stated_place,
 )
-from experiments.runner.result import AT_EVERY_BUDGET, Cell, Column, Finding, Table, significant
+from pymoo_hdte._comparing.indicators import NAMES
+from pymoo_hdte._comparing.runs import AS_PRINTED
+from pymoo_hdte._runner.result import AT_EVERY_BUDGET, Cell, Column, Finding, Table, significant
 
 EVERY_RIVAL = ("MOPSO", "A-MOPSO", "MP-MOPSO", "NSGA-II")
 BUDGETS = (200, 2000)
@@ -160,8 +160,8 @@ def leads_sentence(scores: Scores) -> str:
     totals = totals_of(scores, AS_PRINTED)
     counts = ", ".join(f"of {rival} in {count}" for rival, count in totals.ahead.items())
     return (
-        f"of {totals.cells} cells below 100 particles, {OURS} is ahead {counts}, and the paper's "
-        f"order of the three holds in {totals.in_order}"
+        f"in {totals.cells} settings with fewer particles, {OURS} is ahead {counts}, "
+        f"and the paper's order of the three holds in {totals.in_order}"
     )
 
 

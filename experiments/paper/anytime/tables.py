@@ -8,16 +8,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from experiments.comparing.indicators import NAMES
-from experiments.comparing.runs import AS_PRINTED
-from experiments.comparing.statistics import mean_intervals
 from experiments.paper.anytime.data import OF_TABLE_7, Case, Contested, Scores
 from experiments.paper.anytime.duels import COMPARED, Duel, duels
 from experiments.paper.anytime.measures import EQUAL, NORMALISED, RETURNED, TRUE, Scale
 from experiments.paper.anytime.moments import EXACT, N_SAMPLES
 from experiments.paper.anytime.readings import PRINTED, Reading
-from experiments.published_values import TABLE_7
-from experiments.runner.result import Cell, Column, Finding, Table
+from pymoo_hdte._comparing.indicators import NAMES
+from pymoo_hdte._comparing.published import TABLE_7
+from pymoo_hdte._comparing.runs import AS_PRINTED
+from pymoo_hdte._comparing.statistics import mean_intervals
+from pymoo_hdte._runner.result import Cell, Column, Finding, Table
 
 OURS = "AMP-MOPSO"
 RIVALS = tuple(name for name in OF_TABLE_7 if name != OURS)

@@ -11,8 +11,8 @@ import numpy as np
 from experiments.paper.calibrating.fitting import TRAITS, Bootstrap, Fit
 from experiments.paper.calibrating.ladder import EFFECTS, Candidate, ladder_rungs
 from experiments.paper.calibrating.predictions import PUBLISHED
-from experiments.runner.campaign import Run
 from experiments.runner.committed import read_rows, table_with_origin
+from pymoo_hdte._runner.campaign import Run
 
 _IDENTITY = ("kind", "direction", "candidate", "seed", "budget", "chi_square")
 

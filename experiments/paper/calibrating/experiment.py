@@ -22,9 +22,9 @@ from experiments.paper.calibrating.tables import (
 )
 from experiments.runner.committed import committed_file, stored_outcome
 from experiments.runner.registry import Context
-from experiments.runner.result import OF_MODELS, Picture, Result
-from experiments.runner.store import write_atomically
 from experiments.runner.texts import paragraphs
+from pymoo_hdte._runner.result import OF_MODELS, Picture, Result
+from pymoo_hdte._runner.store import write_atomically
 
 OUTCOMES = "calibration.csv"
 SEEDS = {"table8": (1, 2), "table5": (1,)}

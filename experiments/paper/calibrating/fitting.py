@@ -14,7 +14,7 @@ from scipy.stats import sobol_indices, uniform
 
 from experiments.paper.calibrating.ladder import Candidate
 from experiments.paper.calibrating.predictions import FITS, PUBLISHED, UNCERTAINTY, predict
-from experiments.runner.campaign import Run
+from pymoo_hdte._runner.campaign import Run
 from pymoo_hdte.drive import DriveModel, UnstableDrive
 from pymoo_hdte.problems import RobustDTE
 

@@ -8,7 +8,6 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from experiments.comparing.figures import BLUE, GREY, ORANGE, grid
 from experiments.paper.calibrating.data import (
     Outcome,
     gap,
@@ -26,7 +25,8 @@ from experiments.paper.calibrating.predictions import (
     surrogate_moments,
 )
 from experiments.paper.calibrating.rigid import N_PARAMETERS, RigidDrive, fit_rigid, simplest
-from experiments.runner.result import Cell, Column, Finding, Table, significant
+from pymoo_hdte._comparing.figures import BLUE, GREY, ORANGE, grid
+from pymoo_hdte._runner.result import Cell, Column, Finding, Table, significant
 from pymoo_hdte.drive import preset
 
 LEAST_WIDTH = dict(zip(WIDTHS, (0.5, 0.1), strict=True))

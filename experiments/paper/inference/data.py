@@ -16,8 +16,8 @@ from experiments.paper.inference.likelihood import OBSERVED, Evaluation, evaluat
 from experiments.paper.inference.posterior import OPTIMA, Posterior, Profile
 from experiments.paper.inference.rungs import Rung, rung_named
 from experiments.paper.inference.search import BASIN, Search
-from experiments.runner.campaign import Run
 from experiments.runner.committed import read_rows, table_with_origin
+from pymoo_hdte._runner.campaign import Run
 
 PARAMETERS = tuple(Rung(Candidate(EFFECTS, "semi_amplitude", NARROW), tuple(CLOSURES)).bounds)
 _FIT = ("target", "rung", "seed", "effort", "starts", "followed", "reached", "deviance")

@@ -14,7 +14,6 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from experiments.comparing.figures import BLACK, BLUE, GREEN, GREY, ORANGE, PINK, grid
 from experiments.paper.calibrating.ladder import EFFECTS, LOGARITHMIC, NARROW, WIDE, Candidate
 from experiments.paper.calibrating.predictions import ORDER
 from experiments.paper.inference.closures import CLOSURES
@@ -62,9 +61,10 @@ from experiments.paper.inference.verdicts import Named, chosen_fits, noisy_fits
 from experiments.published_values import TABLE_8
 from experiments.runner.committed import committed_file, stored_outcome
 from experiments.runner.registry import Context, require
-from experiments.runner.result import OF_MODELS, Picture, Result
-from experiments.runner.store import write_atomically
 from experiments.runner.texts import paragraphs
+from pymoo_hdte._comparing.figures import BLACK, BLUE, GREEN, GREY, ORANGE, PINK, grid
+from pymoo_hdte._runner.result import OF_MODELS, Picture, Result
+from pymoo_hdte._runner.store import write_atomically
 
 COLOURS = (BLUE, ORANGE, GREEN, PINK, GREY)
 _GRID = 17

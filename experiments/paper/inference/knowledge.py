@@ -12,7 +12,7 @@ from experiments.paper.inference.data import Draws, Fit, Profiled
 from experiments.paper.inference.likelihood import BOX, residuals_of
 from experiments.paper.inference.posterior import scaled_jacobian
 from experiments.paper.inference.rungs import PERIODIC, Rung
-from experiments.runner.result import Cell, Column, Finding, Table, significant
+from pymoo_hdte._runner.result import Cell, Column, Finding, Table, significant
 from pymoo_hdte.decision import PREFERENCES
 
 RANGE = (2.5, 97.5)

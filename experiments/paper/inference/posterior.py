@@ -22,8 +22,8 @@ from experiments.paper.inference.likelihood import (
 from experiments.paper.inference.moments import TensorSurrogate
 from experiments.paper.inference.rungs import COLUMNS, PERIODIC, Rung
 from experiments.paper.inference.search import STEP, Residuals, digest, refine
-from experiments.runner.campaign import Run
 from experiments.runner.registry import require
+from pymoo_hdte._runner.campaign import Run
 from pymoo_hdte.decision import PREFERENCES, WeightedUtopia
 
 DESIGNS_PER_AXIS = 17

@@ -14,7 +14,7 @@ from scipy.stats.qmc import LatinHypercube
 
 from experiments.paper.inference.likelihood import least_deviance, residuals_of
 from experiments.paper.inference.rungs import PERIODIC, Rung
-from experiments.runner.campaign import Run
+from pymoo_hdte._runner.campaign import Run
 
 TRIED = 6
 """Points of the Latin hypercube for each start; the start is the best of them."""

@@ -43,7 +43,7 @@ from experiments.paper.inference.verdicts import (
     without_noise,
 )
 from experiments.published_values import TABLE_5, TABLE_6
-from experiments.runner.result import Cell, Column, Finding, Table, significant
+from pymoo_hdte._runner.result import Cell, Column, Finding, Table, significant
 from pymoo_hdte.surrogate import ChebyshevSurrogate, latin_hypercube
 from pymoo_hdte.units import ARCSEC
 

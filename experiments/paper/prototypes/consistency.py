@@ -27,7 +27,7 @@ from experiments.paper.prototypes.printed_validation import (
     nearest_assignment,
 )
 from experiments.published_values import TABLE_6, TABLE_8
-from experiments.runner.result import WITHIN_PAPER, Cell, Column, Finding, Table, significant
+from pymoo_hdte._runner.result import WITHIN_PAPER, Cell, Column, Finding, Table, significant
 from pymoo_hdte.drive import hs_20_100
 from pymoo_hdte.units import ARCSEC
 from pymoo_hdte.validation import ValidationMetrics, validation_metrics

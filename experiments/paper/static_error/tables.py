@@ -11,8 +11,6 @@ from matplotlib.patches import Rectangle
 from scipy.optimize import brentq
 from scipy.stats import chi2, gaussian_kde, norm, shapiro
 
-from experiments.comparing.figures import BLUE, GREEN, GREY, ORANGE, PINK, YELLOW, grid
-from experiments.comparing.statistics import at_least
 from experiments.paper.static_error.statistics import (
     ANGLES,
     ASSUMED_ANGLE,
@@ -30,7 +28,9 @@ from experiments.paper.static_error.statistics import (
     tooth_order_error,
 )
 from experiments.published_values import TABLE_2, TABLE_6
-from experiments.runner.result import Cell, Column, Finding, Picture, Table, significant
+from pymoo_hdte._comparing.figures import BLUE, GREEN, GREY, ORANGE, PINK, YELLOW, grid
+from pymoo_hdte._comparing.statistics import at_least
+from pymoo_hdte._runner.result import Cell, Column, Finding, Picture, Table, significant
 from pymoo_hdte.drive import StaticErrorSample, hs_20_100
 from pymoo_hdte.identification import ErrorStatistics
 from pymoo_hdte.units import ARCSEC

@@ -19,8 +19,6 @@ from typing import Any
 
 import numpy as np
 
-from experiments.runner.campaign import Campaign, Run
-from experiments.runner.workers import make_executor
 from experiments.studies.blind.campaigns import IDEAL, campaign_of, hiding
 from experiments.studies.blind.cases import Case, all_cases
 from experiments.studies.blind.data import outcome
@@ -28,7 +26,15 @@ from experiments.studies.blind.outcome import Outcome
 from experiments.studies.blind.rig.nuisances import GROUPS, LEVELS, MILD, Nuisances
 from experiments.studies.blind.scoring import COLUMNS, verdict_scores
 from experiments.studies.blind.truth import may_be_named
+from pymoo_hdte._runner.campaign import Campaign, Run
+from pymoo_hdte._runner.workers import make_executor
 from pymoo_hdte.checks import InvalidInput
+from pymoo_hdte.discrepancy._answers.bench_faults import (
+    COARSE,
+    SATURATED,
+    SPEED_WANDERS,
+    bench_faults,
+)
 from pymoo_hdte.discrepancy._verdicts.drive import examine_drive
 
 IDEAL_BENCH = "ideal"
@@ -36,17 +42,23 @@ TOLD = "told"
 ALONE = tuple(group for group in GROUPS if MILD.has(group))
 """Groups that the level has, each a bench of its own."""
 TOLD_AS: Mapping[str, frozenset[str]] = {
+    "lag": frozenset({"loop_lag"}),
+    "wander": frozenset({SPEED_WANDERS}),
     "input_coupling": frozenset({"coupling_ripple"}),
     # On a load that hardly gives way both sides of its torque sensor are one place.
     "output_coupling": frozenset({"torque_ripple", "gravity"}),
+    "cogging": frozenset({"cogging"}),
     "mount": frozenset({"bench_resonance"}),
+    "shaft": frozenset({"load_shaft"}),
     "brake_ripple": frozenset({"torque_ripple"}),
     "gravity": frozenset({"torque_ripple", "gravity"}),
     "warming": frozenset({"warming"}),
     "drift": frozenset({"input_torque_drift", "output_torque_drift"}),
     "zeros": frozenset({"new_input_torque_zero", "new_output_torque_zero"}),
+    "saturation": frozenset({SATURATED}),
+    "resolution": frozenset({COARSE}),
 }
-"""Names of nuisances in a verdict, any of which tells a group. Others have no name there."""
+"""Names of nuisances and faults of a bench in a verdict, any of which tells a group."""
 PAIRS, CLEAN, EACH = 40, 16, 5
 """Paired campaigns, those of them that hide nothing, and campaigns with one nuisance alone."""
 SEEN = range(3001, 3421)
@@ -115,6 +127,7 @@ class BenchJob:
         scores = verdict_scores(self.case, finding.verdict)
         seconds = time.process_time() - begin
         names = {nuisance.name for nuisance, _ in finding.nuisances}
+        names |= {fault.name for fault in bench_faults(finding)}
         bits = sum(1 << k for k, group in enumerate(TOLD_AS) if TOLD_AS[group] & names)
         row = [*(scores.get(column, np.nan) for column in COLUMNS), float(bits)]
         return Run((*COLUMNS, TOLD), np.array([row]), seconds, (seconds,))

@@ -9,13 +9,13 @@ import math
 from collections.abc import Sequence
 from pathlib import Path
 
-from experiments.runner.campaign import Run
 from experiments.runner.committed import read_origin, read_rows, table_with_origin
 from experiments.studies.blind.cases import Case
 from experiments.studies.blind.outcome import Outcome
 from experiments.studies.blind.scoring import NUMBERS, PARTS, PLACES, RIVALS
 from experiments.studies.blind.truth import ERROR, NAMES, PORTS, STATUSES, word, words_of_set
 from pymoo_hdte._io.csv_table import csv_text
+from pymoo_hdte._runner.campaign import Run
 
 _CASE = ("kind", "number", "truth", "forms", "stress")
 _WORDS = ("status", "probability", "chosen", "equivalents", "members", "truth_in_class", *RIVALS)

@@ -13,13 +13,8 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.figure import Figure
 
-from experiments.comparing.figures import BLUE, GREY, grid
-from experiments.comparing.statistics import Estimate, rate
-from experiments.runner.campaign import Campaign
 from experiments.runner.committed import committed_file, stored_outcome
 from experiments.runner.registry import Context, require
-from experiments.runner.result import NEW, Picture, Result, Table, significant
-from experiments.runner.store import TIMES, write_atomically
 from experiments.runner.texts import paragraphs
 from experiments.studies.blind.cases import SCORING_SEED, Case, all_cases
 from experiments.studies.blind.data import format_outcomes, format_seconds, outcome, read_outcomes
@@ -50,6 +45,11 @@ from experiments.studies.blind.tables import (
 )
 from experiments.studies.blind.targets import reliability, reliability_table
 from experiments.studies.blind.truth import ERROR, PARAMETER
+from pymoo_hdte._comparing.figures import BLUE, GREY, grid
+from pymoo_hdte._comparing.statistics import Estimate, rate
+from pymoo_hdte._runner.campaign import Campaign
+from pymoo_hdte._runner.result import NEW, Picture, Result, Table, significant
+from pymoo_hdte._runner.store import TIMES, write_atomically
 from pymoo_hdte.drive._effects import ENCODER_LINE
 
 OUTCOMES = "blind.csv"

@@ -12,9 +12,9 @@ from dataclasses import astuple, dataclass, fields
 from pathlib import Path
 
 from experiments.runner.committed import read_rows
-from experiments.runner.result import Cell, Column, Table
 from experiments.studies.blind.outcome import Outcome
 from pymoo_hdte._io.csv_table import csv_text
+from pymoo_hdte._runner.result import Cell, Column, Table
 
 RUNS = "blind_runs.csv"
 SINCE = 2305

@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from experiments.runner.campaign import Run
 from experiments.studies.blind.campaigns import Hiding, campaign_of, hiding
 from experiments.studies.blind.cases import Case
 from experiments.studies.blind.truth import (
@@ -28,6 +27,7 @@ from experiments.studies.blind.truth import (
     one_name,
     to_be_named,
 )
+from pymoo_hdte._runner.campaign import Run
 from pymoo_hdte.discrepancy import Campaign
 from pymoo_hdte.discrepancy._answers.next_test_drive import next_experiment
 from pymoo_hdte.discrepancy._answers.where.location import locate

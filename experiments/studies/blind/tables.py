@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from experiments.comparing.statistics import Estimate, median
-from experiments.runner.result import SCORE_STATES, Cell, Column, Table, scored, significant
 from experiments.studies.blind.outcome import Outcome
 from experiments.studies.blind.rig.forms import LISTED
 from experiments.studies.blind.runs import BlindRun, total
@@ -23,6 +21,8 @@ from experiments.studies.blind.targets import (
     time_demand,
 )
 from experiments.studies.blind.truth import STATUSES
+from pymoo_hdte._comparing.statistics import Estimate, median
+from pymoo_hdte._runner.result import SCORE_STATES, Cell, Column, Table, scored, significant
 
 JUDGED_COLUMNS = (
     Column("demand"),

@@ -8,10 +8,10 @@ from itertools import pairwise
 
 import numpy as np
 
-from experiments.comparing.statistics import Estimate, median, rate
-from experiments.runner.result import Cell, Column, Table
 from experiments.studies.blind.outcome import Outcome
 from experiments.studies.blind.runs import Counts
+from pymoo_hdte._comparing.statistics import Estimate, median, rate
+from pymoo_hdte._runner.result import Cell, Column, Table
 
 # What must be reached, as rates.
 MOST_WRONG = {

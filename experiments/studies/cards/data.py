@@ -14,7 +14,6 @@ from tqdm import tqdm
 from experiments.comparing.contestants import CONTESTANTS
 from experiments.runner.committed import committed_file, read_rows, table_with_origin
 from experiments.runner.registry import Context
-from experiments.runner.store import write_atomically
 from experiments.studies.cards.hardness import STARTS, Hardness, hardness
 from experiments.studies.contest.peers_data import (
     MEASURES,
@@ -24,6 +23,7 @@ from experiments.studies.contest.peers_data import (
     contest_scores,
 )
 from experiments.studies.contest.problems import BENCHMARKS, CARDS, problem_of
+from pymoo_hdte._runner.store import write_atomically
 
 NAME = "cards"
 HARDNESS = "cards_hardness.csv"

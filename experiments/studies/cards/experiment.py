@@ -9,13 +9,13 @@ same tables when the documentation is built (``docs/_extensions/problem_cards.py
 
 from __future__ import annotations
 
-from experiments.comparing.quality import GAP
 from experiments.runner.committed import stored_outcome
 from experiments.runner.registry import Context
-from experiments.runner.result import Result
 from experiments.runner.texts import paragraphs
 from experiments.studies.cards.data import DIRECT, NAME, OF_DIRECT, numbers_for
 from experiments.studies.cards.tables import hardness_table, medians_table, separation_table
+from pymoo_hdte._comparing.quality import GAP
+from pymoo_hdte._runner.result import Result
 
 SETTING, LEFT_OUT = paragraphs(
     "cards", direct=DIRECT, of_direct=", ".join(OF_DIRECT), gap=f"{GAP:g}"

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from pymoo.core.problem import Problem
 from scipy.optimize import Bounds, NonlinearConstraint, minimize
 
-from experiments.comparing.indicators import IndicatorsAgainst
-from experiments.comparing.quality import TrueFront
+from pymoo_hdte._comparing.indicators import IndicatorsAgainst
+from pymoo_hdte._comparing.quality import TrueFront
 from pymoo_hdte.algorithms.spread import most_spread
 from pymoo_hdte.problems import RobustProblem
 

@@ -7,15 +7,15 @@ from typing import NamedTuple
 import numpy as np
 from scipy.stats import kruskal
 
-from experiments.comparing.indicators import NAMES, smaller_is_better
-from experiments.comparing.paired import SIGNIFICANT
-from experiments.comparing.ranks import costs_of, medians
-from experiments.comparing.statistics import holm, state_of
-from experiments.runner.result import Cell, Column, Finding, Table, scored
 from experiments.runner.texts import paragraphs
 from experiments.studies.cards.data import Numbers
 from experiments.studies.cards.hardness import NEAR, POINTS, STARTS, Hardness
 from experiments.studies.contest.peers_data import MEASURES, Scores
+from pymoo_hdte._comparing.indicators import NAMES, smaller_is_better
+from pymoo_hdte._comparing.paired import SIGNIFICANT
+from pymoo_hdte._comparing.ranks import costs_of, medians
+from pymoo_hdte._comparing.statistics import holm, state_of
+from pymoo_hdte._runner.result import Cell, Column, Finding, Table, scored
 
 RANDOM = "random search"
 REACHES = 2.0

@@ -18,9 +18,9 @@ from pymoo.core.problem import Problem
 from pymoo.util.ref_dirs import get_reference_directions
 from scipy.optimize import minimize
 
-from experiments.comparing.quality import N_POINTS, even_curve
 from experiments.runner.committed import DATA
 from experiments.studies.contest.problems import EVERY, problem_of
+from pymoo_hdte._comparing.quality import N_POINTS, even_curve
 
 _PARTITIONS = 99
 

@@ -12,13 +12,9 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from experiments.comparing.contestants import CONTESTANTS
-from experiments.comparing.figures import critical_difference_plot, rank_heatmap
-from experiments.comparing.indicators import NAMES
 from experiments.comparing.peers_pymoo import POPULATION
-from experiments.comparing.ranks import nemenyi_difference, problem_ranks
 from experiments.runner.committed import stored_outcome
 from experiments.runner.registry import Context
-from experiments.runner.result import NEW, Picture, Result
 from experiments.runner.texts import paragraphs
 from experiments.studies.contest.peers_data import FINAL_SIZE, Extent, Scores, scores_for
 from experiments.studies.contest.peers_tables import (
@@ -37,6 +33,10 @@ from experiments.studies.contest.peers_tables import (
     tuning_table,
 )
 from experiments.studies.contest.problems import BENCHMARKS
+from pymoo_hdte._comparing.figures import critical_difference_plot, rank_heatmap
+from pymoo_hdte._comparing.indicators import NAMES
+from pymoo_hdte._comparing.ranks import nemenyi_difference, problem_ranks
+from pymoo_hdte._runner.result import NEW, Picture, Result
 
 FULL = Extent(budgets=(10_000, 25_000), seeds=21)
 QUICK = Extent(budgets=(2_500,), seeds=5)

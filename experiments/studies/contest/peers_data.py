@@ -16,15 +16,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.comparing.contestants import EVALUATIONS, SPENT, ContestantRun
-from experiments.comparing.indicators import Indicators, IndicatorsAgainst, front_among
 from experiments.comparing.stored import Stored
-from experiments.runner.campaign import Campaign, Run
 from experiments.runner.committed import read_rows, rounded, table_with_origin
 from experiments.runner.registry import Context
 from experiments.studies.contest.benchmark_fronts import front_of
 from experiments.studies.contest.problems import BENCHMARKS, EVERY, problem_of
 from experiments.studies.contest.reduced_swarms import EVERYONE
+from pymoo_hdte._comparing.indicators import Indicators, IndicatorsAgainst, front_among
 from pymoo_hdte._io.csv_table import csv_text
+from pymoo_hdte._runner.campaign import Campaign, Run
 from pymoo_hdte.algorithms.crowding import least_crowded
 from pymoo_hdte.algorithms.spread import most_spread
 

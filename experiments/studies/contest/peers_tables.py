@@ -8,12 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import mannwhitneyu
 
-from experiments.comparing.indicators import NAMES, smaller_is_better
-from experiments.comparing.paired import SIGNIFICANT
-from experiments.comparing.ranks import average_ranks, friedman, medians, rank_intervals
 from experiments.comparing.rivals import better_than_each, tests_of_medians, win_tie_loss
-from experiments.comparing.statistics import median, state_of
-from experiments.runner.result import (
+from experiments.studies.contest.peers_data import Scores, takes_part
+from experiments.studies.contest.problems import BENCHMARKS
+from pymoo_hdte._comparing.indicators import NAMES, smaller_is_better
+from pymoo_hdte._comparing.paired import SIGNIFICANT
+from pymoo_hdte._comparing.ranks import average_ranks, friedman, medians, rank_intervals
+from pymoo_hdte._comparing.statistics import median, state_of
+from pymoo_hdte._runner.result import (
     Cell,
     Column,
     Finding,
@@ -22,8 +24,6 @@ from experiments.runner.result import (
     signed_percent,
     significant,
 )
-from experiments.studies.contest.peers_data import Scores, takes_part
-from experiments.studies.contest.problems import BENCHMARKS
 
 OURS = "ElitistSwarm"
 

@@ -8,16 +8,16 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.comparing.indicators import NAMES
-from experiments.comparing.ranks import medians
 from experiments.comparing.rivals import tests_of_medians
 from experiments.runner.committed import stored_outcome
 from experiments.runner.registry import Context
-from experiments.runner.result import Cell, Column, Result, Table
 from experiments.runner.texts import paragraphs
 from experiments.studies.contest.peers_data import Extent, Scores, scores_for
 from experiments.studies.contest.peers_tables import OURS
 from experiments.studies.contest.reduced_swarms import SWARM_VARIANTS
+from pymoo_hdte._comparing.indicators import NAMES
+from pymoo_hdte._comparing.ranks import medians
+from pymoo_hdte._runner.result import Cell, Column, Result, Table
 
 FULL = Extent(budgets=(10_000,), seeds=21)
 QUICK = Extent(budgets=(2_500,), seeds=5)

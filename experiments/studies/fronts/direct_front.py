@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from pymoo.util.nds.non_dominated_sorting import NonDominatedSorting
 from tqdm import tqdm
 
-from experiments.comparing.figures import BLUE, ORANGE, grid
 from experiments.runner.registry import Context
-from experiments.runner.result import Column, Finding, Picture, Result, Table
-from experiments.runner.store import write_atomically
+from pymoo_hdte._comparing.figures import BLUE, ORANGE, grid
+from pymoo_hdte._runner.result import Column, Finding, Picture, Result, Table
+from pymoo_hdte._runner.store import write_atomically
 from pymoo_hdte.algorithms import interpolated_front
 from pymoo_hdte.problems import RobustDTE, RobustDTEDirect
 from pymoo_hdte.problems.reference import ReferenceFront, format_reference

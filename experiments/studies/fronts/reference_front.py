@@ -17,11 +17,7 @@ from pymoo.core.problem import Problem
 from pymoo.optimize import minimize
 from tqdm import tqdm
 
-from experiments.comparing.figures import BLUE, grid
-from experiments.comparing.quality import GAP, TrueFront
 from experiments.runner.registry import Context
-from experiments.runner.result import Column, Finding, Picture, Result, Table
-from experiments.runner.store import write_atomically
 from experiments.studies.fronts.front_search import Solution, falling, find_true_front
 from experiments.studies.fronts.tolerance_front import (
     POINTS,
@@ -33,6 +29,10 @@ from experiments.studies.fronts.tolerance_front import (
     tolerance_disagreement,
     without_local_optima,
 )
+from pymoo_hdte._comparing.figures import BLUE, grid
+from pymoo_hdte._comparing.quality import GAP, TrueFront
+from pymoo_hdte._runner.result import Column, Finding, Picture, Result, Table
+from pymoo_hdte._runner.store import write_atomically
 from pymoo_hdte.problems import (
     RobustDTE,
     RobustDTEGrades,

@@ -16,15 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from experiments.comparing.statistics import rate
 from experiments.runner.committed import (
     stored_outcome,
     table_with_origin,
 )
 from experiments.runner.machine import processor
 from experiments.runner.registry import Context
-from experiments.runner.result import Column, Finding, Result, Table, scored
-from experiments.runner.store import TIMES, write_atomically
 from experiments.runner.texts import paragraphs
 from experiments.studies.measured.first_verdict import LOGS, FirstVerdict, first_verdict
 from experiments.studies.measured.known_answers import (
@@ -42,7 +39,10 @@ from experiments.studies.measured.known_answers import (
 from experiments.studies.measured.other_tools import SYSID, TOOLS, Answer, terms_of
 from experiments.studies.measured.rigs import MEASURED, Study, fitted_values, study
 from experiments.studies.measured.stored_rows import Rows, cells, headings, stored
+from pymoo_hdte._comparing.statistics import rate
 from pymoo_hdte._io.csv_table import csv_text
+from pymoo_hdte._runner.result import Column, Finding, Result, Table, scored
+from pymoo_hdte._runner.store import TIMES, write_atomically
 from pymoo_hdte.discrepancy._answers.descriptive_model import descriptive_model
 from pymoo_hdte.discrepancy._report.mechanism_values import effects
 from pymoo_hdte.discrepancy._report.torsion import torsion_document

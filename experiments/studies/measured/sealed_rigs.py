@@ -17,12 +17,12 @@ from experiments.runner.committed import (
     table_with_origin,
 )
 from experiments.runner.registry import Context
-from experiments.runner.result import Column, Result, Table
-from experiments.runner.store import TIMES, write_atomically
 from experiments.runner.texts import paragraphs
 from experiments.studies.measured.rigs import MEASURED
 from experiments.studies.measured.stored_rows import Rows, cells, headings, stored
 from pymoo_hdte._io.csv_table import csv_text
+from pymoo_hdte._runner.result import Column, Result, Table
+from pymoo_hdte._runner.store import TIMES, write_atomically
 from pymoo_hdte.discrepancy import DriveAnalysis, analyse, read_campaign
 from pymoo_hdte.discrepancy._report.words import in_a_sentence
 from pymoo_hdte.discrepancy._selection.candidate import Candidate

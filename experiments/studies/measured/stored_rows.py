@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from experiments.runner.committed import committed_file, read_rows
-from experiments.runner.result import Cell, Column
+from pymoo_hdte._runner.result import Cell, Column
 
 Rows = list[list[str]]
 

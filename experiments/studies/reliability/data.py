@@ -14,11 +14,11 @@ from pathlib import Path
 
 from scipy.stats import binomtest
 
-from experiments.runner.campaign import Run
 from experiments.runner.committed import read_rows, table_with_origin
 from experiments.studies.reliability.fuzz import ACCEPTED, REFUSED
 from experiments.studies.reliability.limits import LimitJob, MemoryJob
 from pymoo_hdte._io.csv_table import csv_text
+from pymoo_hdte._runner.campaign import Run
 
 FUZZ, KILL, LIMIT = "fuzz", "kill", "limit"
 LEVEL = 0.95

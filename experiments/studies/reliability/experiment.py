@@ -20,11 +20,8 @@ from threading import Timer
 
 import numpy as np
 
-from experiments.runner.campaign import Campaign, Run
 from experiments.runner.committed import committed_file, stored_outcome
 from experiments.runner.registry import Context
-from experiments.runner.result import Column, Finding, Result, Table, significant
-from experiments.runner.store import TIMES, write_atomically
 from experiments.runner.texts import paragraphs
 from experiments.studies.reliability.data import (
     FUZZ,
@@ -55,6 +52,9 @@ from experiments.studies.reliability.kill import (
     run_until,
 )
 from experiments.studies.reliability.limits import LIMITS, LimitJob, MemoryJob
+from pymoo_hdte._runner.campaign import Campaign, Run
+from pymoo_hdte._runner.result import Column, Finding, Result, Table, significant
+from pymoo_hdte._runner.store import TIMES, write_atomically
 
 TALLIES, PEAKS = "reliability.csv", "reliability_memory.csv"
 

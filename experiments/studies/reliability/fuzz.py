@@ -25,9 +25,9 @@ from pathlib import Path
 
 import numpy as np
 
-from experiments.runner.campaign import Run
 from experiments.studies.reliability.inputs import KINDS
 from experiments.studies.reliability.mutations import mutated, put
+from pymoo_hdte._runner.campaign import Run
 from pymoo_hdte.checks import InvalidInput, SeveralComplaints
 
 SEED = 20261122

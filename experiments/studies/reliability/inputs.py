@@ -18,6 +18,7 @@ from pymoo_hdte._reports.folder import ReportFolder
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.cli import command_line as cli
 from pymoo_hdte.cli import identification_report, optimum_report, simulation_report
+from pymoo_hdte.cli.robust_study import read_study
 from pymoo_hdte.discrepancy import read_campaign, write_campaign
 from pymoo_hdte.discrepancy._records.rig_files import read_rig
 from pymoo_hdte.discrepancy._records.rig_model import model_text
@@ -31,6 +32,7 @@ from pymoo_hdte.identification import (
 )
 from pymoo_hdte.identification.damping import bearing_damping
 from pymoo_hdte.identification.torsion import stiffness
+from pymoo_hdte.problems._simulator.inputs import Inputs
 from pymoo_hdte.problems.operating_conditions import load_conditions, shares
 from pymoo_hdte.surrogate import ChebyshevSurrogate
 
@@ -156,6 +158,12 @@ def _read_duty_cycle(folder: Path) -> None:
         raise Wrong(f"shares that sum to {parts.sum()}")
 
 
+def _read_robust_study(folder: Path) -> None:
+    with read_study(folder / "study.toml") as study:
+        for low, high in Inputs(**study.inputs).reach().values():
+            _finite("the reach of an input", (low, high))
+
+
 def _read_torsion(folder: Path) -> None:
     for loop in read_torsion_loops(folder / "loops.csv").values():
         _finite("a stiffness", stiffness(loop).slope)
@@ -190,6 +198,7 @@ KINDS = {
         Kind("data sheet", originals.datasheet_files, _read_datasheet),
         Kind("model", originals.model_files, _read_model),
         Kind("duty cycle", originals.duty_cycle_files, _read_duty_cycle),
+        Kind("robust study", originals.robust_study_files, _read_robust_study),
         Kind("torsion loops", originals.torsion_files, _read_torsion),
         Kind("no-load runs", originals.no_load_files, _read_no_load),
         Kind("error measurements", originals.error_files, _read_errors),

@@ -19,9 +19,9 @@ from pathlib import Path
 
 import numpy as np
 
-from experiments.runner.campaign import Run
-from experiments.runner.store import TIMES
 from pymoo_hdte._io import whole_file
+from pymoo_hdte._runner.campaign import Run
+from pymoo_hdte._runner.store import TIMES
 
 SEED = 20261123
 ROOT = Path(__file__).parents[3]

@@ -13,7 +13,6 @@ from pathlib import Path
 
 import numpy as np
 
-from experiments.runner.campaign import Run
 from experiments.studies.reliability.inputs import KINDS
 from experiments.studies.reliability.kill import (
     EXPERIMENT,
@@ -25,6 +24,7 @@ from experiments.studies.reliability.kill import (
     whole,
 )
 from experiments.studies.reliability.mutations import put
+from pymoo_hdte._runner.campaign import Run
 
 SIZES = (0, 4, 8, 16, 32, 64, 128, 256, 512)
 """Sizes of the full disks, kB."""

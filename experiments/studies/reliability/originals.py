@@ -155,6 +155,45 @@ def model_files() -> Files:
     return {"model.toml": path.read_bytes() + EFFECTS.encode()}
 
 
+ROBUST_STUDY = """
+[simulator]
+command = ["sh", "${study}/solve.sh", "${input_file}"]
+input_file = "case.in"
+template = "case.txt"
+responses = ["mass", "stress"]
+[design.width]
+lower = 0.02
+upper = 0.06
+deviation = { distribution = "normal", mean = 0, std = 0.0005 }
+[noise.load]
+scenarios = [1, 2, 5]
+weights = [0.5, 0.25, 0.25]
+[noise.heat]
+interval = [0, 1]
+[[scenarios]]
+names = ["speed", "torque"]
+rows = [[1, 2], [3, 4]]
+[[objective]]
+statistic = "quantile"
+p = 0.9
+response = "stress"
+[[constraint]]
+statistic = "failure_probability"
+any_of = [{ response = "mass", above = 3 }, { response = "stress", below = 1 }]
+at_most = 0.01
+[search]
+algorithm = "NSGA2"
+population = 20
+"""
+TEMPLATE = "w = ${width}, p = ${load}\nt = ${heat}, n = ${speed}, m = ${torque}\n"
+
+
+def robust_study_files() -> Files:
+    """Return a study of a program, its template and a script that no reader runs."""
+    texts = {"study.toml": ROBUST_STUDY, "case.txt": TEMPLATE, "solve.sh": "exit 1\n"}
+    return {name: text.encode() for name, text in texts.items()}
+
+
 def duty_cycle_files() -> Files:
     """Return the duty cycle of the package."""
     path = package_files("pymoo_hdte.problems") / "data" / "duty_cycle.csv"

@@ -10,10 +10,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.runner.campaign import Run
 from experiments.runner.committed import committed_file, read_rows, table_with_origin
 from experiments.runner.registry import Context, require
-from experiments.runner.store import write_atomically
 from experiments.studies.robust.functions import FUNCTIONS
 from experiments.studies.robust.limit_states import LIMIT_STATES
 from experiments.studies.robust.ours import Growth
@@ -31,6 +29,8 @@ from experiments.studies.robust.rivals import (
     until_it_stays,
 )
 from experiments.studies.robust.task import Task
+from pymoo_hdte._runner.campaign import Run
+from pymoo_hdte._runner.store import write_atomically
 
 OURS = "pymoo_hdte"
 OPENTURNS = "OpenTURNS"

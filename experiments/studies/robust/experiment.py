@@ -29,23 +29,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from experiments.comparing.figures import BLUE, GREEN, ORANGE, PINK, SKY, grid
-from experiments.comparing.statistics import rate
 from experiments.runner.committed import stored_outcome
 from experiments.runner.registry import Context
-from experiments.runner.result import (
-    MISSED,
-    NEW,
-    NOT_SHOWN,
-    SHOWN,
-    Cell,
-    Column,
-    Finding,
-    Picture,
-    Result,
-    Table,
-    scored,
-)
 from experiments.runner.texts import paragraphs
 from experiments.studies.robust.data import (
     ACCURACY,
@@ -67,6 +52,21 @@ from experiments.studies.robust.data import (
 from experiments.studies.robust.functions import BY_NAME, FUNCTIONS
 from experiments.studies.robust.limit_states import LIMIT_STATES
 from experiments.studies.robust.rare import METHODS as RARE_METHODS
+from pymoo_hdte._comparing.figures import BLUE, GREEN, GREY, ORANGE, PINK, SKY, grid, panel
+from pymoo_hdte._comparing.statistics import rate
+from pymoo_hdte._runner.result import (
+    MISSED,
+    NEW,
+    NOT_SHOWN,
+    SHOWN,
+    Cell,
+    Column,
+    Finding,
+    Picture,
+    Result,
+    Table,
+    scored,
+)
 
 Array = NDArray[np.float64]
 
@@ -100,8 +100,39 @@ def run(context: Context) -> Result:
                 error_over_runs(outcome),
                 leading=True,
             ),
+            Picture(
+                "runs",
+                "Model runs until the standard deviation is known to 1 %. Fewer is better. Arrow: "
+                f"more than these. No mark: ours needs more than {BUDGET}.",
+                runs_needed(outcome),
+            ),
         ),
+        shown_first="runs",
     )
+
+
+def runs_needed(outcome: Outcome) -> Figure:
+    """Draw the runs that every method needs on every function, where it gets there."""
+    figure, axis = panel()
+    names = outcome.functions()
+    for place, name in enumerate(names):
+        axis.axhline(place, color=GREY, linewidth=0.6)
+        for method, (colour, style) in STYLES.items():
+            runs = outcome.needed(name, method)
+            tried = outcome.tried(name, method)
+            if runs is not None:
+                axis.plot(runs, place, style[0], color=colour, markersize=9, mfc="none", mew=2)
+            elif tried:
+                # It needs more.
+                axis.plot(tried, place, ">", color=colour, markersize=4)
+    for method, (colour, style) in STYLES.items():
+        axis.plot([], [], style[0], color=colour, mfc="none", mew=2, markersize=9, label=method)
+    axis.set(xscale="log", xlabel="model runs for 1 %", ylim=(len(names) - 0.5, -0.5))
+    axis.set_yticks(range(len(names)), names)
+    axis.set_xticks([50, 100, 200, 500], ["50", "100", "200", "500"])
+    axis.xaxis.set_minor_formatter("")
+    figure.legend(loc="outside upper center", ncols=3, frameon=False, fontsize=12)
+    return figure
 
 
 STYLES = {

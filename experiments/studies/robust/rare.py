@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.runner.campaign import Run
 from experiments.studies.robust.limit_states import STATE_BY_NAME, Failure
+from pymoo_hdte._runner.campaign import Run
 from pymoo_hdte.problems import Response, failure_probability
 
 Array = NDArray[np.float64]

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 
 from experiments.comparing.rivals import RivalTest, holm_against
 from experiments.runner.committed import read_rows
-from experiments.runner.result import Cell, Column, Table
 from experiments.studies.suites.data import Outcome
 from experiments.studies.suites.peers import BBOB_PEERS, ON_BBOB, OURS
 from experiments.studies.suites.protocol import BESIDE_PEERS, BUDGETS, DIMENSIONS
+from pymoo_hdte._runner.result import Cell, Column, Table
 
 ANCHORS = Path(__file__).resolve().parents[5] / "shared" / "anchors" / "bbob_biobj.csv"
 BEST = "HMO-CMA-ES"

@@ -11,10 +11,10 @@ import numpy as np
 from pymoo.algorithms.moo.nsga2 import NSGA2
 from pymoo.optimize import minimize
 
-from experiments.comparing.indicators import front_among
 from experiments.runner.committed import DATA, table_with_origin
-from experiments.runner.store import write_atomically
 from experiments.studies.suites.problems import BOXES, PROBLEMS
+from pymoo_hdte._comparing.indicators import front_among
+from pymoo_hdte._runner.store import write_atomically
 from pymoo_hdte.algorithms import CompactSwarm
 
 EVALUATIONS, SEED = 20_000, 101

@@ -10,15 +10,15 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.runner.campaign import Run
 from experiments.runner.committed import committed_file, read_rows, rounded, table_with_origin
 from experiments.runner.registry import Context, require
-from experiments.runner.store import write_atomically
 from experiments.studies.suites.coco import EXTRA
 from experiments.studies.suites.jobs import MEASURES, BbobRun, SuiteRun
-from experiments.studies.suites.peers import OURS, PEERS, takes
+from experiments.studies.suites.peers import OF_OUR_SIZE, OURS, PEERS, takes
 from experiments.studies.suites.problems import PROBLEMS, SUITES, problem_of
 from experiments.studies.suites.protocol import FULL, STORED, BbobPart, SuitePart
+from pymoo_hdte._runner.campaign import Run
+from pymoo_hdte._runner.store import write_atomically
 
 NAME = "suites"
 BBOB = f"{NAME}_bbob"
@@ -110,20 +110,21 @@ class Outcome:
         return min(counts, default=0)
 
     def algorithms(self, suite: str, budget: int) -> list[str]:
-        """Return who ran on a suite at a budget, in the order of `PEERS`.
+        """Return who ran on a suite at a budget, in the order of `PEERS`, sized rivals last.
 
         One that could take a problem, but was not run on it, is left out: it would rank last there.
         """
         problems = self.problems(suite, budget)
+        names = [*PEERS, *OF_OUR_SIZE]
         ran = {
             (problem, name)
             for problem in problems
-            for name in PEERS
+            for name in names
             if self.runs(problem, name, budget, 0)
         }
         return [
             name
-            for name in PEERS
+            for name in names
             if any((problem, name) in ran for problem in problems)
             and all(
                 (problem, name) in ran or not takes(name, problem_of(problem))

@@ -8,12 +8,11 @@ from typing import NamedTuple
 import numpy as np
 
 from experiments.comparing.rivals import RivalTest, better_than_each
-from experiments.comparing.statistics import mean, rate, state_of
-from experiments.runner.result import SCORE_STATES, Cell, Column, Table, scored, significant
 from experiments.studies.suites.bbob_tables import BEST, CITED, reached, reached_shares
 from experiments.studies.suites.data import Outcome
 from experiments.studies.suites.peers import OURS
 from experiments.studies.suites.protocol import (
+    BOTH_SIZES,
     BUDGETS,
     CONSTRAINED,
     FEASIBLE_RIVALS,
@@ -32,6 +31,8 @@ from experiments.studies.suites.suite_tables import (
     signs_together,
     tests,
 )
+from pymoo_hdte._comparing.statistics import mean, rate, state_of
+from pymoo_hdte._runner.result import SCORE_STATES, Cell, Column, Table, scored, significant
 
 
 class Demand(NamedTuple):
@@ -116,7 +117,7 @@ def _first_of_all(outcome: Outcome) -> Iterable[Demand]:
         where = "all held-out suites together"
         yield _first(by_rank, beaten, evaluations, f"{where}: lowest average rank, hypervolume")
         yield _better_than_each(beaten, evaluations, where, "hypervolume")
-    for suite in HELD_OUT:
+    for suite in (*HELD_OUT, BOTH_SIZES):
         where = named(outcome, suite)
         for evaluations in BUDGETS:
             ran = evaluations in outcome.budgets(suite)

@@ -11,24 +11,22 @@ from importlib.util import find_spec
 
 import numpy as np
 
-from experiments.runner.campaign import Campaign
 from experiments.runner.committed import stored_outcome
 from experiments.runner.registry import Context
-from experiments.runner.result import NEW, Cell, Column, Finding, Picture, Result, Table
 from experiments.runner.texts import paragraphs
 from experiments.studies.suites import protocol
 from experiments.studies.suites.bbob_tables import BEST, CITED, duels_table, reached, shares_table
 from experiments.studies.suites.data import NAME, Outcome, outcome_for
 from experiments.studies.suites.demands import counted, demands_table, in_one_sentence
 from experiments.studies.suites.figures import how_to_choose, runtime_profiles
-from experiments.studies.suites.formulas import engineering, imop, lz09, zcat
+from experiments.studies.suites.formulas import df, engineering, imop, lz09, zcat
 from experiments.studies.suites.jobs import MEASURES, BbobRun, SuiteRun
 from experiments.studies.suites.limits import limits_tables
 from experiments.studies.suites.own_time import own_time_table
 from experiments.studies.suites.parts import parts_table
 from experiments.studies.suites.peers import OURS
 from experiments.studies.suites.problems import DIFFICULTY, SUITES
-from experiments.studies.suites.protocol import DIMENSIONS, HELD_OUT
+from experiments.studies.suites.protocol import BOTH_SIZES, DIMENSIONS, HELD_OUT
 from experiments.studies.suites.reduced import WHOLE
 from experiments.studies.suites.renew import kept_table
 from experiments.studies.suites.suite_tables import (
@@ -36,9 +34,11 @@ from experiments.studies.suites.suite_tables import (
     in_short,
     medians_tables,
     ranks_tables,
-    rivals_table,
+    rivals_tables,
     together_table,
 )
+from pymoo_hdte._runner.campaign import Campaign
+from pymoo_hdte._runner.result import NEW, Cell, Column, Finding, Picture, Result, Table
 
 SETTING, SETS, PEERS_NOTE = paragraphs("suites", ours=OURS, difficulty=DIFFICULTY)
 
@@ -46,7 +46,7 @@ SETTING, SETS, PEERS_NOTE = paragraphs("suites", ours=OURS, difficulty=DIFFICULT
 def run(context: Context) -> Result:
     """Show what came out on the suites."""
     outcome = outcome_for(context)
-    sources = [_source(module.__doc__) for module in (zcat, imop, engineering, lz09)]
+    sources = [_source(module.__doc__) for module in (zcat, df, imop, engineering, lz09)]
     return Result(
         title="The swarms on suites of others",
         command=context.command(NAME),
@@ -62,7 +62,7 @@ def run(context: Context) -> Result:
             own_time_table(),
             *limits_tables(),
             *ranks_tables(outcome),
-            rivals_table(outcome),
+            *rivals_tables(outcome),
             *medians_tables(outcome),
             kept_table(outcome),
             anew_table(context.campaign, outcome),
@@ -115,7 +115,11 @@ def _extent(outcome: Outcome) -> tuple[str, ...]:
         for suite in SUITES
         if outcome.budgets(suite)
     )
-    missing = [suite for suite in (*HELD_OUT, *protocol.VALIDATION) if not outcome.budgets(suite)]
+    missing = [
+        suite
+        for suite in (*HELD_OUT, BOTH_SIZES, *protocol.VALIDATION)
+        if not outcome.budgets(suite)
+    ]
     return (
         f"Of 15 seeds and four budgets asked for, this holds: {runs}; bbob-biobj one run an "
         "instance. The table of the parts says what is there and what was not run.",

@@ -5,12 +5,12 @@ from __future__ import annotations
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from experiments.comparing.figures import BLUE, GREEN, GREY, ORANGE, PINK, SKY, YELLOW, grid
 from experiments.studies.suites.bbob_tables import BEST, CITED, curves, told_most
 from experiments.studies.suites.data import Outcome
 from experiments.studies.suites.peers import OURS
 from experiments.studies.suites.protocol import BUDGETS, DIMENSIONS, HELD_OUT
 from experiments.studies.suites.suite_tables import named, ranks
+from pymoo_hdte._comparing.figures import BLUE, GREEN, GREY, ORANGE, PINK, SKY, YELLOW, grid
 
 LINES = {OURS: BLUE, "ElitistSwarm": SKY, "NSGA-II": GREEN, "COMO-CMA-ES": PINK}
 PUBLISHED = {BEST: ORANGE, "SMS-EMOA-SA": YELLOW}

@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 from pymoo.indicators.igd_plus import IGDPlus
 
 from experiments.comparing.contestants import EVALUATIONS, SPENT, ContestantRun
-from experiments.comparing.indicators import CORNER, front_among
-from experiments.runner.campaign import Run
 from experiments.studies.suites.coco import MARKS, BbobProblem, shares_of_run
 from experiments.studies.suites.peers import ON_BBOB, ON_SUITES
 from experiments.studies.suites.problems import box_of, front_of, problem_of
+from pymoo_hdte._comparing.indicators import CORNER, front_among
+from pymoo_hdte._runner.campaign import Run
 from pymoo_hdte.algorithms.hypervolume import most_hypervolume
 
 FINAL_SIZE = 100

@@ -23,9 +23,9 @@ from experiments.runner.committed import (
 )
 from experiments.runner.machine import machine_table
 from experiments.runner.own_time import seconds_of_run
-from experiments.runner.result import Cell, Column, Table
-from experiments.runner.store import write_atomically
 from experiments.studies.suites.peers import OURS
+from pymoo_hdte._runner.result import Cell, Column, Table
+from pymoo_hdte._runner.store import write_atomically
 from pymoo_hdte.algorithms import CompactSwarm
 
 NAME = "suites_own_time"

@@ -7,15 +7,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from experiments.comparing.paired import SIGNIFICANT
 from experiments.comparing.rivals import RivalTest, holm_against
-from experiments.comparing.statistics import holm
-from experiments.runner.result import Column, Table
 from experiments.studies.suites.bbob_tables import duels
 from experiments.studies.suites.data import Outcome
 from experiments.studies.suites.peers import OURS
 from experiments.studies.suites.protocol import BUDGETS, CONSTRAINED, OF_PARTS, PLAIN
 from experiments.studies.suites.reduced import ALONE, ON_CONSTRAINED, ON_PLAIN, WHOLE
+from pymoo_hdte._comparing.paired import SIGNIFICANT
+from pymoo_hdte._comparing.statistics import holm
+from pymoo_hdte._runner.result import Column, Table
 
 JUDGED_AT = BUDGETS[2]
 """Evaluations after which suites are judged, and the most on bbob-biobj."""

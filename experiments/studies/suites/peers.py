@@ -8,16 +8,28 @@ from functools import cache, partial
 import numpy as np
 from numpy.typing import NDArray
 from pymoo.algorithms.moo.ctaea import CTAEA
+from pymoo.algorithms.moo.nsga2 import NSGA2
+from pymoo.algorithms.moo.sms import SMSEMOA
 from pymoo.core.algorithm import Algorithm
+from pymoo.core.callback import Callback
 from pymoo.core.problem import Problem
 from pymoo.util.ref_dirs import get_reference_directions
 
 from experiments.comparing.contestants import CONTESTANTS, Contestant, of_jmetal
-from experiments.comparing.indicators import front_among
-from experiments.comparing.peers_pymoo import OWN, POPULATION, PYMOO, Offer, run_pymoo
+from experiments.comparing.peers_pymoo import (
+    OWN,
+    POPULATION,
+    PYMOO,
+    EndingAGEMOEA2,
+    Offer,
+    at_budgets,
+    run_pymoo,
+)
 from experiments.studies.suites.coco import StartBox
 from experiments.studies.suites.reduced import LESS
+from pymoo_hdte._comparing.indicators import front_among
 from pymoo_hdte.algorithms import CompactSwarm
+from pymoo_hdte.algorithms.compact import size_for
 
 OURS = "CompactSwarm"
 
@@ -79,6 +91,48 @@ def _started(make: Callable[[Problem], Algorithm], problem: Problem) -> Algorith
     return algorithm
 
 
+SIZED = ", sized to the budget, with an archive"
+
+
+class _Everything(Callback):
+    """Keeps the front of all that was evaluated."""
+
+    def __init__(self, n_obj: int) -> None:
+        super().__init__()
+        self.front = np.empty((0, n_obj))
+
+    def notify(self, algorithm: Algorithm) -> None:
+        """Add the new points."""
+        new = algorithm.off if algorithm.off is not None else algorithm.pop
+        self.front = front_among(np.vstack([self.front, new.get("F")]))
+
+
+def _sized(
+    make: Callable[..., Algorithm], problem: Problem, budgets: Sequence[int], seed: int
+) -> list[Offer]:
+    """Run a rival with as many individuals as ours has for the budget; offer all that it found."""
+    offers = []
+    for budget in budgets:
+        algorithm, everything = make(pop_size=size_for(budget)), _Everything(problem.n_obj)
+        algorithm.callback = everything
+        for _ in at_budgets(algorithm, problem, (budget,), seed):
+            offers.append(Offer(everything.front, algorithm.evaluator.n_eval))
+    return offers
+
+
+RIVALS: dict[str, Callable[..., Algorithm]] = {
+    "NSGA-II": NSGA2,
+    "SMS-EMOA": SMSEMOA,
+    "AGE-MOEA-II": EndingAGEMOEA2,
+}
+"""The rivals that are run in both sizes."""
+
+OF_OUR_SIZE: dict[str, Contestant] = {
+    name + SIZED: Contestant("pymoo", partial(_sized, make), starts_anew=True)
+    for name, make in RIVALS.items()
+}
+"""The same with as many individuals as ours has, and what they found in all; no constraints."""
+
 PEERS: dict[str, Contestant] = {
     OURS: Contestant("pymoo_hdte", partial(run_pymoo, MADE[OURS]), starts_anew=True),
     **CONTESTANTS,
@@ -108,7 +162,7 @@ ON_BBOB: dict[str, Contestant] = BBOB_PEERS | {
     for name, make in LESS.items()
 }
 """Peers on bbob-biobj, and our swarm with a part left out."""
-ON_SUITES: dict[str, Contestant] = PEERS | {
+ON_SUITES: dict[str, Contestant] = (PEERS | OF_OUR_SIZE) | {
     name: Contestant("pymoo_hdte", partial(run_pymoo, make), starts_anew=True)
     for name, make in LESS.items()
 }

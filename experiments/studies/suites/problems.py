@@ -11,12 +11,13 @@ from numpy.typing import NDArray
 from pymoo.core.problem import Problem
 from pymoo.problems import get_problem
 
-from experiments.comparing.indicators import CORNER
 from experiments.runner.committed import committed_file, read_rows
+from experiments.studies.suites.formulas.df import NUMBERS, TIMES, df_front, make_df
 from experiments.studies.suites.formulas.engineering import MEMBERS, make_engineering
 from experiments.studies.suites.formulas.imop import imop_front, make_imop
 from experiments.studies.suites.formulas.lz09 import lz09_front, make_lz09
 from experiments.studies.suites.formulas.zcat import make_zcat, zcat_front
+from pymoo_hdte._comparing.indicators import CORNER
 
 DIFFICULTY = 5
 """Of DAS-CMOP: the fifth triplet of pymoo's sixteen, which are those of its authors."""
@@ -44,6 +45,11 @@ def _zcat(n: int, n_obj: int) -> SuiteProblem:
     return SuiteProblem(f"ZCAT{n}_{n_obj}", "ZCAT", make, front)
 
 
+def _df(n: int, time: float) -> SuiteProblem:
+    make, front = partial(make_df, n, time), partial(df_front, n, time)
+    return SuiteProblem(f"DF{n} at {time}", "DF", make, front)
+
+
 def _dascmop(number: int) -> Problem:
     return get_problem(f"dascmop{number}", DIFFICULTY)
 
@@ -64,6 +70,7 @@ SUITES: dict[str, tuple[SuiteProblem, ...]] = {
         SuiteProblem(f"LZ09-F{n}", "LZ09", partial(make_lz09, n), partial(lz09_front, n))
         for n in range(1, 10)
     ),
+    "DF": tuple(_df(n, time) for time in TIMES for n in NUMBERS),
     "ZCAT": tuple(_zcat(n, n_obj) for n_obj in (2, 3) for n in range(1, 21)),
 }
 """Problems by suite."""

@@ -2,7 +2,8 @@
 
 These left it: `Attraction` among its moves; a level of violation that counts as
 none (T. Takahama, S. Sakai 2006), nine tenths of the swarm's median, which shrinks as the swarm
-follows; a fifth of the places for infeasible particles, the guests; `Difference`.
+follows; a fifth of the places for infeasible particles, the guests; `Difference`. What it does on
+the way to a bound while nothing is feasible came later, so that these swarms have it not.
 """
 
 from __future__ import annotations
@@ -62,6 +63,11 @@ class _Whole(CompactSwarm):
         super()._initialize_advance(infills, **kwargs)
         if SHARES in self.lacks:
             self.success = EqualShares(len(self.moves))
+
+    def _within(
+        self, X: NDArray[np.float64], aims: NDArray[np.float64], swarm: Points
+    ) -> NDArray[np.float64]:
+        return ElitistSwarm._within(self, X, aims, swarm)
 
     def _front(self, swarm: Points) -> Points:
         if np.any(swarm.violation == 0.0):

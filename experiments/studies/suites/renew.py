@@ -1,8 +1,8 @@
 """The stored outcome with some algorithms run anew, those that changed.
 
-``python -m experiments.studies.suites.renew OUT NAME,NAME`` runs these on the stored parts of the
-protocol and writes the CSV files that the repository keeps; the runs of all others stay. Finished
-runs lie in ``OUT/runs/ORIGIN``, from where a further call goes on.
+``python -m experiments.studies.suites.renew OUT "NAME;NAME"`` runs these on the stored parts of the
+protocol, with ``--suites`` on some suites only, and writes the CSV files that the repository keeps;
+all other runs stay. Finished runs lie in ``OUT/runs/ORIGIN``, from where a further call goes on.
 """
 
 from __future__ import annotations
@@ -11,20 +11,27 @@ import argparse
 from collections.abc import Collection, Iterable, Sequence
 from pathlib import Path
 
-from experiments.runner.campaign import Campaign
 from experiments.runner.committed import DATA
-from experiments.runner.result import Cell, Column, Table
 from experiments.studies.suites.data import Outcome, stored, write_outcome
 from experiments.studies.suites.jobs import BbobRun, SuiteRun
 from experiments.studies.suites.peers import ON_BBOB, ON_SUITES
-from experiments.studies.suites.protocol import STORED, BbobPart
+from experiments.studies.suites.protocol import STORED, BbobPart, SuitePart
+from pymoo_hdte._runner.campaign import Campaign
+from pymoo_hdte._runner.result import Cell, Column, Table
 from pymoo_hdte.checks import one_of
 
 COMMAND = "python -m experiments.studies.suites.renew; runs of unchanged algorithms are kept"
 
 
-def renewed(campaign: Campaign, names: Collection[str], before: Outcome) -> Outcome:
+def renewed(
+    campaign: Campaign,
+    names: Collection[str],
+    before: Outcome,
+    suites: Collection[str] | None = None,
+) -> Outcome:
     """Return new runs of some algorithms beside what another outcome has of the protocol.
+
+    On all suites and bbob-biobj, or on ``suites`` only.
 
     Raises
     ------
@@ -36,9 +43,10 @@ def renewed(campaign: Campaign, names: Collection[str], before: Outcome) -> Outc
     outcome = Outcome()
     for part in STORED:
         groups: Iterable[Sequence[SuiteRun | BbobRun]] = part.groups()
+        reached = suites is None or (isinstance(part, SuitePart) and part.suite in suites)
         for group in groups:
             algorithm = group[0].algorithm
-            if algorithm in names:
+            if reached and algorithm in names:
                 title = f"{algorithm}: {group[0].key} and {len(group) - 1} more"
                 outcome.add(group, campaign.run(group, title))
             elif all(map(before.has, group)):
@@ -81,9 +89,12 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """Run some algorithms anew and write the stored outcome."""
     parser = argparse.ArgumentParser(prog="python -m experiments.studies.suites.renew")
     parser.add_argument("out", type=Path, metavar="OUT")
-    parser.add_argument("names", metavar="NAME,NAME", help="of algorithms")
+    parser.add_argument("names", metavar="NAME;NAME", help="of algorithms, or all")
+    parser.add_argument("--suites", metavar="SUITE,SUITE", help="only these")
     options = parser.parse_args(arguments)
-    outcome = renewed(Campaign(options.out), options.names.split(","), stored())
+    names = list(ON_SUITES) if options.names == "all" else options.names.split(";")
+    suites = None if options.suites is None else options.suites.split(",")
+    outcome = renewed(Campaign(options.out), names, stored(), suites)
     write_outcome(outcome, DATA, COMMAND)
 
 

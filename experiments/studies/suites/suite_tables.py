@@ -8,12 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.comparing import indicators as measures
-from experiments.comparing.paired import SIGNIFICANT
-from experiments.comparing.ranks import average_ranks
 from experiments.comparing.rivals import RivalTest, signs_against, tests_of_medians
-from experiments.comparing.statistics import rate
-from experiments.runner.result import Cell, Column, Table
 from experiments.studies.suites.bbob_tables import BEST, CITED, reached
 from experiments.studies.suites.coco import FUNCTIONS
 from experiments.studies.suites.data import Outcome
@@ -22,12 +17,18 @@ from experiments.studies.suites.peers import BBOB_PEERS, OURS
 from experiments.studies.suites.problems import PROBLEMS, SUITES
 from experiments.studies.suites.protocol import (
     BESIDE_PEERS,
+    BOTH_SIZES,
     BUDGETS,
     CONSTRAINED,
     DIMENSIONS,
     HELD_OUT,
     VALIDATION,
 )
+from pymoo_hdte._comparing import indicators as measures
+from pymoo_hdte._comparing.paired import SIGNIFICANT
+from pymoo_hdte._comparing.ranks import average_ranks
+from pymoo_hdte._comparing.statistics import rate
+from pymoo_hdte._runner.result import Cell, Column, Table
 
 NAMES = {name: measures.NAMES[name] for name in ("hypervolume", "igd_plus")}
 SWARMS = (OURS, "ElitistSwarm")
@@ -121,9 +122,8 @@ def feasible_beside(outcome: Outcome, suite: str, budget: int, rival: str) -> Fe
 
 def ranks_tables(outcome: Outcome) -> list[Table]:
     """Return average ranks on each suite that ran, the held-out one first."""
-    return [
-        _ranks_table(outcome, suite) for suite in (*HELD_OUT, *VALIDATION) if outcome.budgets(suite)
-    ]
+    suites = (*HELD_OUT, BOTH_SIZES, *VALIDATION)
+    return [_ranks_table(outcome, suite) for suite in suites if outcome.budgets(suite)]
 
 
 def _ranks_table(outcome: Outcome, suite: str) -> Table:
@@ -142,7 +142,7 @@ def _ranks_table(outcome: Outcome, suite: str) -> Table:
         rows.append(tuple(row))
     if constrained:
         columns.append(Column("feasible runs"))
-    kind = "held out" if suite in HELD_OUT else "validation"
+    kind = "validation" if suite in VALIDATION else "held out"
     problems = outcome.problems(suite, budgets[-1])
     ran = f"{len(problems)} of its {len(SUITES[suite])} problems"
     if len(problems) < len(SUITES[suite]):
@@ -154,26 +154,30 @@ def _ranks_table(outcome: Outcome, suite: str) -> Table:
         tuple(rows),
         note=f"Ranks of medians over {outcome.seeds(suite)} seeds or more, single runs if 1; one "
         "that cannot take a problem ranks last there.",
-        folded=suite not in HELD_OUT,
+        folded=suite in VALIDATION,
     )
 
 
-def rivals_table(outcome: Outcome) -> Table:
-    """Test ours against each other on the held-out suite."""
+def rivals_tables(outcome: Outcome) -> list[Table]:
+    """Test ours against each other on the held-out suites."""
+    suites = (*HELD_OUT, BOTH_SIZES)
+    return [_rivals_table(outcome, suite) for suite in suites if outcome.budgets(suite)]
+
+
+def _rivals_table(outcome: Outcome, suite: str) -> Table:
     rows: list[tuple[Cell, ...]] = []
-    for suite in HELD_OUT:
-        for budget in outcome.budgets(suite):
-            by_measure = [tests(outcome, suite, budget, measure) for measure in NAMES]
-            for pair in zip(*by_measure, strict=True):
-                cells = [cell for test in pair for cell in (test.better, test.worse, test.p)]
-                rows.append((pair[0].rival, budget, *cells))
+    for budget in outcome.budgets(suite):
+        by_measure = [tests(outcome, suite, budget, measure) for measure in NAMES]
+        for pair in zip(*by_measure, strict=True):
+            cells = [cell for test in pair for cell in (test.better, test.worse, test.p)]
+            rows.append((pair[0].rival, budget, *cells))
     columns = [Column("rival"), Column("evaluations")]
     for name in NAMES.values():
         columns += [Column("better", group=name), Column("worse", group=name)]
         columns.append(Column("p", digits=2, group=name))
     return Table(
-        "rivals",
-        f"{' and '.join(HELD_OUT)}, held out: {OURS} against every other",
+        f"rivals_{suite.lower()}",
+        f"{suite}, held out: {OURS} against every other",
         tuple(columns),
         tuple(rows),
         note="Better and worse compare medians; on problems of which nobody found any hypervolume "

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 
-from pymoo_hdte.checks import InvalidInput, one_of, real_number
+from pymoo_hdte.checks import InvalidInput, one_of, real_number, whole_number
 from pymoo_hdte.discrepancy._records.known_values import known_values
 from pymoo_hdte.drive import DampingReference, DriveEffect, LoadInertia
 from pymoo_hdte.effects.effect import place_of
@@ -164,11 +164,14 @@ class Rig:
         Where the torque sensor of the output sits: between drive and load inertia, so that it reads
         the load's torque and what accelerates the load, or behind both, where it reads the load's
         torque alone.
+    motor_poles, motor_slots : int
+        Of the motor, at which it may cog; both zero where they are not known.
 
     Raises
     ------
     InvalidInput
-        For a value that is negative or not finite, for noise of zero, or another place.
+        For a value that is negative or not finite, for noise of zero, another place, or poles
+        without slots.
 
     Examples
     --------
@@ -189,8 +192,16 @@ class Rig:
     output_torque_gain: float = 0.005
     output_torque_zero: float = 0.1
     output_torque_at: str = "drive"
+    motor_poles: int = 0
+    motor_slots: int = 0
 
     def __post_init__(self) -> None:
+        poles, slots = (
+            whole_number(name, getattr(self, name), 0) for name in ("motor_poles", "motor_slots")
+        )
+        if (poles == 0) != (slots == 0):
+            missing = "motor_slots" if poles else "motor_poles"
+            raise InvalidInput(missing, 0, "the number of both poles and slots, or of neither")
         for attribute in fields(self):
             value = getattr(self, attribute.name)
             if attribute.name == "output_torque_at":

@@ -12,7 +12,7 @@ from pymoo_hdte._io.fields import Fields
 from pymoo_hdte._io.layout import layout_from_fields
 from pymoo_hdte._io.text_lines import Progress, byte_counter
 from pymoo_hdte._io.toml import toml_text, toml_with_lines
-from pymoo_hdte.checks import Complaints, InvalidInput, complaints_of
+from pymoo_hdte.checks import Complaints, InvalidInput, complaints_of, whole_number
 from pymoo_hdte.discrepancy._records.believed import SENSOR_PLACES, BelievedDrive, Rig
 from pymoo_hdte.discrepancy._records.believed_model import (
     believed_from_fields,
@@ -27,6 +27,7 @@ from pymoo_hdte.discrepancy._records.campaign_keys import (
     ENDING,
     GOOD_ENOUGH,
     LAYOUT,
+    MOTOR,
     RIG,
     SENSOR_PLACE,
     build,
@@ -175,14 +176,15 @@ def _table(campaign: Campaign) -> dict[str, Any]:
         "drive": campaign.drive,
         **in_units(campaign, stated),
         "believed": _believed_table(campaign.believed),
-        "rig": in_units(campaign.rig, RIG) | _sensor_place(campaign.rig),
+        "rig": in_units(campaign.rig, RIG) | _further_of_rig(campaign.rig),
         "record": [record_table(record) for record in records],
     }
 
 
-def _sensor_place(rig: Rig) -> dict[str, str]:
-    """Return the place of the output's torque sensor, where it is not the usual one."""
-    return {} if rig.output_torque_at == "drive" else {SENSOR_PLACE: rig.output_torque_at}
+def _further_of_rig(rig: Rig) -> dict[str, Any]:
+    """Return the place of the output's torque sensor unless it is the usual one, and the motor."""
+    place = {} if rig.output_torque_at == "drive" else {SENSOR_PLACE: rig.output_torque_at}
+    return place | {name: getattr(rig, name) for name in MOTOR if getattr(rig, name)}
 
 
 def _believed_table(believed: BelievedDrive) -> dict[str, Any]:
@@ -214,6 +216,9 @@ def rig_from_fields(table: Fields, place: str) -> Rig:
     known: dict[str, Any] = {}
     if table.has(SENSOR_PLACE):
         known[SENSOR_PLACE] = table.choice(SENSOR_PLACE, SENSOR_PLACES)
+    for name in MOTOR:
+        if table.has(name):
+            known[name] = whole_number(f"{place}.{name}", table.take(name, "a whole number"), 0)
     if not table.has("control"):
         return build(Rig, RIG, table, place, **known)
     sentence = table.text("control")

@@ -68,6 +68,9 @@ RIG = _named(
 SENSOR_PLACE = "output_torque_at"
 """Key of the place of the output's torque sensor, a word; absent for the usual place."""
 
+MOTOR = ("motor_poles", "motor_slots")
+"""Keys of the numbers of a motor, both or neither."""
+
 GOOD_ENOUGH = _named(
     good_enough_error="good_enough_arcsec",
     good_enough_torque="good_enough_N_m",

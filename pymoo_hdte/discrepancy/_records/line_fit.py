@@ -75,6 +75,9 @@ class OrderLines:
     fading : ndarray of complex, shape (6, 1 + m)
         Mean and phasors, dimensionless, that a fit assigns to signals that fade from one at the
         first row, with the time constants `line_basis.FADING`.
+    folded : ndarray of complex, shape (k, 2, 1 + m)
+        Mean and phasors, dimensionless, that a fit assigns to the cosine and to minus the sine of
+        orders that averaging folds down: see `order_lines`.
 
     Examples
     --------
@@ -92,10 +95,15 @@ class OrderLines:
     row_covariance: NDArray[np.float64]
     bends: NDArray[np.complex128]
     fading: NDArray[np.complex128]
+    folded: NDArray[np.complex128]
 
 
 def order_lines(
-    record: RunningRecord, rig: Rig, ratio: float, orders: ArrayLike | Sequence[float]
+    record: RunningRecord,
+    rig: Rig,
+    ratio: float,
+    orders: ArrayLike | Sequence[float],
+    folded: Sequence[float] = (),
 ) -> OrderLines:
     """Fit order lines to every channel of a record by least squares.
 
@@ -113,6 +121,10 @@ def order_lines(
         Transmission ratio N, dimensionless.
     orders : array_like, shape (m,)
         Cycles per input turn, above zero, below the Nyquist order of the record.
+    folded : sequence of float, length k
+        Orders that may lie beyond it, cycles per input turn: a mean of several samples lets through
+        a part of them, which shows at lower orders. What lies beyond the Nyquist order of the
+        samples is taken to have been filtered away before.
 
     Returns
     -------
@@ -153,6 +165,19 @@ def order_lines(
         return np.column_stack([parts[0], lines])
 
     courses = line_parts(fit.courses)
+    beyond = np.array(folded, dtype=float)
+    between = beyond / nyquist_order(record)
+    beyond = beyond[(between > 1.0) & (between < record.samples_averaged)]
+    parts_of_folded = np.zeros((len(folded), 2, 1 + m), dtype=complex)
+    if beyond.size:
+        shares = averaging_gain(beyond, record)
+
+        def waves(part: slice) -> NDArray[np.float64]:
+            turned = np.outer(record.input_angle[part], beyond)
+            return np.hstack([shares * np.cos(turned), -shares * np.sin(turned)])
+
+        of_waves = line_parts(fit.projected(waves)).reshape(2, len(beyond), 1 + m)
+        parts_of_folded[np.isin(folded, beyond)] = of_waves.swapaxes(0, 1)
     covariance = np.diag(noise)[:, None, None] * unit
     for jump in record.jumps:
         channel, share = _READ[jump.channel]
@@ -174,6 +199,7 @@ def order_lines(
         row_covariance=noise,
         bends=courses[:3],
         fading=courses[3:],
+        folded=parts_of_folded,
     )
 
 

@@ -181,7 +181,7 @@ def _delay(table: Fields) -> float | None:
     if not table.has("delay"):
         return 0.0
     stated = table.take("delay", "a number of seconds, or 'estimated'")
-    return None if stated == "estimated" else real_number(table._name("delay"), stated)
+    return None if stated == "estimated" else real_number(table.name_of("delay"), stated)
 
 
 def _tables_by_name(top: Fields, field: str, file: str) -> dict[str, Fields]:
@@ -207,7 +207,7 @@ def _believed(table: Fields, field: str, **limits: float) -> BelievedValue:
     try:
         return BelievedValue(value, **stated)
     except InvalidInput as error:
-        place = inside._name(error.field.removeprefix("believed."))
+        place = inside.name_of(error.field.removeprefix("believed."))
         raise InvalidInput(place, error.value, error.allowed) from None
 
 

@@ -251,8 +251,8 @@ def _files(
     if entry.has("files"):
         table = entry.table("files")
         for name in table.names():
-            one_of(table._name("channel"), name, tuple(layout.channels))
-            stated[name] = _path(table.text(name), table._name(name), folder)
+            one_of(table.name_of("channel"), name, tuple(layout.channels))
+            stated[name] = _path(table.text(name), table.name_of(name), folder)
     files: dict[str, Path] = {}
     for name in layout.channels:
         path = stated.get(name, main)

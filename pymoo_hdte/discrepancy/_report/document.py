@@ -11,12 +11,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pymoo_hdte.discrepancy._answers.bench_faults import BenchFault, bench_faults
 from pymoo_hdte.discrepancy._answers.next_test_drive import Proposal
 from pymoo_hdte.discrepancy._answers.where.map import Location
 from pymoo_hdte.discrepancy._answers.where.relevance import relevance
 from pymoo_hdte.discrepancy._evidence.order_lines.evidence import PARTS
 from pymoo_hdte.discrepancy._evidence.order_lines.parameters import base_unit, labels_by_order
-from pymoo_hdte.discrepancy._report.words import caveats, what_is_missing
+from pymoo_hdte.discrepancy._report.words import BENCH_FAULTS, caveats, what_is_missing
 from pymoo_hdte.discrepancy._selection.candidate import Candidate, labels_apart
 from pymoo_hdte.discrepancy._selection.fitting import Fit
 from pymoo_hdte.discrepancy._selection.hypothesis import (
@@ -225,7 +226,19 @@ def nuisances_of(finding: DriveFinding) -> list[dict[str, Any]]:
                 ),
             }
         )
-    return documents
+    return [*documents, *map(_fault_of_bench, bench_faults(finding))]
+
+
+def _fault_of_bench(fault: BenchFault) -> dict[str, Any]:
+    """Return a fault of the bench in the form of a nuisance that is an effect."""
+    told = {"value": quantity(fault.value, fault.variance, fault.unit)} if fault.unit else {}
+    return {
+        "name": fault.name,
+        "port": " ".join(fault.where),
+        "order": None,
+        "sentence": BENCH_FAULTS[fault.name](fault),
+        "parameters": told,
+    }
 
 
 def _accuracy(candidate: Candidate, verdict: Verdict) -> float:

@@ -6,12 +6,19 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from pymoo_hdte._reports.html import number
+from pymoo_hdte.discrepancy._answers.bench_faults import (
+    COARSE,
+    SATURATED,
+    SPEED_WANDERS,
+    BenchFault,
+)
 from pymoo_hdte.discrepancy._evidence.order_lines.parameters import base_unit, labels_by_order
 from pymoo_hdte.discrepancy._selection import reason as codes
 from pymoo_hdte.discrepancy._selection.candidate import Candidate
 from pymoo_hdte.discrepancy._selection.reason import Reason
 from pymoo_hdte.discrepancy._selection.verdict import Verdict
 from pymoo_hdte.effects.sentence_blanks import listed
+from pymoo_hdte.units import ARCSEC
 
 Label = Callable[[str], str]
 """From the label of a set of effects to how it is written."""
@@ -155,6 +162,32 @@ def what_is_missing(candidates: Sequence[Candidate]) -> str:
         return " ".join(candidate.sentence for candidate in candidates)
     effects = [candidate.sentence for candidate in candidates if not candidate.released]
     return " ".join([*effects, f"The {listed(released)} lie outside their tolerances."])
+
+
+BENCH_FAULTS: dict[str, Callable[[BenchFault], str]] = {
+    "loop_gain": lambda fault: (
+        f"The speed loop is {100.0 * abs(fault.value):.2g} % "
+        f"{'stronger' if fault.value > 0.0 else 'weaker'} than stated."
+    ),
+    "loop_lag": lambda fault: (
+        f"The torque of the motor comes {1e6 * abs(fault.value):.3g} us "
+        f"{'late' if fault.value > 0.0 else 'early'}."
+    ),
+    SPEED_WANDERS: lambda fault: "The set speed wanders.",
+    SATURATED: lambda fault: (
+        f"The sensor of the {_channel(fault)} reads no more than {fault.value:.4g} {fault.unit}."
+    ),
+    COARSE: lambda fault: (
+        f"The sensor of the {_channel(fault)} reads in steps of "
+        f"{fault.value / (ARCSEC if fault.unit == 'rad' else 1.0):.2g} "
+        f"{'arcsec' if fault.unit == 'rad' else fault.unit}."
+    ),
+}
+"""Sentences of faults of a bench by their names."""
+
+
+def _channel(fault: BenchFault) -> str:
+    return fault.where[0].replace("_", " ")
 
 
 def bench_in_words(nuisances: Sequence[Mapping[str, Any]]) -> str:

@@ -13,7 +13,7 @@ import numpy as np
 
 from pymoo_hdte.discrepancy._selection.candidate import Candidate
 from pymoo_hdte.discrepancy._selection.fitting import Fit, fit
-from pymoo_hdte.discrepancy._selection.hypothesis import Hypothesis
+from pymoo_hdte.discrepancy._selection.hypothesis import Hypothesis, label_of
 from pymoo_hdte.discrepancy._selection.screening import (
     Screened,
     basis_of,
@@ -23,7 +23,9 @@ from pymoo_hdte.discrepancy._selection.screening import (
 from pymoo_hdte.discrepancy._selection.search import Search
 
 
-def leading_nuisances(search: Search, beside: Hypothesis | None = None) -> Fit | None:
+def leading_nuisances(
+    search: Search, beside: Hypothesis | None = None, instead_of: Hypothesis | None = None
+) -> Fit | None:
     """Return a fit with the nuisances that explain most of what a set leaves; None without any.
 
     The first has to do better than each effect that has been fitted in its place and, beside a set,
@@ -36,15 +38,18 @@ def leading_nuisances(search: Search, beside: Hypothesis | None = None) -> Fit |
     search : Search
     beside : Hypothesis, optional
         Set beside which it is searched for; by default there are no effects.
+    instead_of : Hypothesis, optional
+        Set that contains that one, and in whose place both would stand. By default what forms of
+        laws explain is not asked of the bench; here such a form is the rival.
     """
     fitted = search.base if beside is None else beside.fit
-    ranked = _ranked(search, beside, [*search.nuisances, *search.screened])
+    ranked = _ranked(search, beside, instead_of, [*search.nuisances, *search.screened])
     nuisances = [effect for effect in ranked if effect.candidate.nuisance]
     promising = [
         effect
         for effect in nuisances[: search.data.rules.most_seconds]
         if effect.reduction >= _cost(search, effect.candidate.unknowns)
-        and _may_lead(search, effect, beside)
+        and _may_lead(search, effect, beside, instead_of)
     ]
     trials = [_with(search, fitted, effect) for effect in promising]
     if not trials:
@@ -69,12 +74,41 @@ def leading_nuisances(search: Search, beside: Hypothesis | None = None) -> Fit |
         (fitted.chi_square - rival.fit.chi_square) / misfit
         - (_unknowns(rival.fit) - _unknowns(fitted)) * logarithm
         for rival in search.hypotheses
-        if beside is None or set(rival.candidates) > set(beside.candidates)
+        if beside is None or _contains(rival, beside)
     ]
     # What the bench explains is no reason to name an effect that explains it no better.
     if lead < max(others, default=-np.inf) - search.data.rules.bic_gain:
         return None
     return _with_others(search, best)
+
+
+def nuisances_beside(search: Search, hypothesis: Hypothesis) -> Fit | None:
+    """Return a fit with nuisances that explain what a set of effects does not; None without any.
+
+    They are searched for beside the set where it leaves more than noise, and beside sets that it
+    contains, however little it leaves: what it has beyond these may stand for the bench.
+    """
+    if not search.enough(hypothesis) and (of_bench := leading_nuisances(search, hypothesis)):
+        return of_bench
+    for special in search.hypotheses:
+        if _contains(hypothesis, special) and (
+            of_bench := leading_nuisances(search, special, hypothesis)
+        ):
+            return of_bench
+    return None
+
+
+def _contains(general: Hypothesis, special: Hypothesis) -> bool:
+    """Tell whether a set has all effects of another, or laws of which they are special cases."""
+    if label_of(general.candidates) == label_of(special.candidates):
+        return False
+    return all(
+        any(
+            member is candidate or (member.port == candidate.port and member.holds(candidate))
+            for member in general.candidates
+        )
+        for candidate in special.candidates
+    )
 
 
 def leading_group(search: Search) -> Fit | None:
@@ -142,25 +176,32 @@ def _that_go_with(candidates: Sequence[Candidate], screened: Sequence[Screened])
     ]
 
 
-def _may_lead(search: Search, effect: Screened, beside: Hypothesis | None) -> bool:
-    """Tell whether a nuisance could do as well as the best single effect.
+def _may_lead(
+    search: Search, effect: Screened, beside: Hypothesis | None, instead_of: Hypothesis | None
+) -> bool:
+    """Tell whether a nuisance could do as well as the best single effect, or as a larger set.
 
     A prediction is nearly linear in most nuisances, so that half of it to first order is enough.
     """
-    if beside is not None or not search.hypotheses:
-        return True
-    share = search.data.rules.explained_part_share
-    return effect.reduction >= share * search.hypotheses[0].removed
+    removed = 0.0
+    if beside is not None and instead_of is not None:
+        removed = beside.fit.chi_square - instead_of.fit.chi_square
+    elif beside is None and search.hypotheses:
+        removed = search.hypotheses[0].removed
+    return effect.reduction >= search.data.rules.explained_part_share * removed
 
 
 def _ranked(
-    search: Search, beside: Hypothesis | None, screened: Sequence[Screened]
+    search: Search,
+    beside: Hypothesis | None,
+    instead_of: Hypothesis | None,
+    screened: Sequence[Screened],
 ) -> list[Screened]:
     """Return screened candidates by what each could remove of what a set leaves in any form."""
     if beside is None:
         effects = list(screened)
     else:
-        unexplained = search.forms.unexplained(beside.fit)
+        unexplained = None if instead_of else search.forms.unexplained(beside.fit)
         if unexplained is None:
             directions, residual = beyond_parameters(beside.fit)
         else:

@@ -33,7 +33,11 @@ from pymoo_hdte.discrepancy._selection.excess import HeldOutTest
 from pymoo_hdte.discrepancy._selection.fitted_sets import beyond_stated
 from pymoo_hdte.discrepancy._selection.fitting import Evidence, Fit, fit
 from pymoo_hdte.discrepancy._selection.hypothesis import Hypothesis, down_to_noise
-from pymoo_hdte.discrepancy._selection.nuisances import leading_group, leading_nuisances
+from pymoo_hdte.discrepancy._selection.nuisances import (
+    leading_group,
+    leading_nuisances,
+    nuisances_beside,
+)
 from pymoo_hdte.discrepancy._selection.reason import (
     HELD_OUT_ERROR_GROWS,
     NOT_VALIDATED,
@@ -250,8 +254,7 @@ def judge(
         if of_bench := leading_nuisances(search):
             return _with_nuisances(search, of_bench)
         search = _renewed_search(search)
-        leading = search.hypotheses[0]
-        if not search.enough(leading) and (of_bench := leading_nuisances(search, leading)):
+        if of_bench := nuisances_beside(search, search.hypotheses[0]):
             return _with_nuisances(search, of_bench)
     search.grow()
     search.leave_out_lacking()
@@ -263,7 +266,7 @@ def judge(
         chosen = chosen_of(search)
     if replaced(search, chosen, [candidate for candidate in candidates if candidate.instead_of]):
         chosen = chosen_of(search)
-    if not (known or search.enough(chosen)) and (of_bench := leading_nuisances(search, chosen)):
+    if not known and (of_bench := nuisances_beside(search, chosen)):
         return _with_nuisances(search, of_bench)
     verdict = _verdict(search, answer_of(search, chosen, search.screened))
     return verdict if search.data is data else replace(verdict, renewed=search.data)

@@ -20,7 +20,11 @@ from pymoo_hdte.discrepancy._evidence.order_lines.features import (
     unexpected_orders,
 )
 from pymoo_hdte.discrepancy._evidence.order_lines.prediction import coefficients_of
-from pymoo_hdte.discrepancy._evidence.order_lines.sizes import port_sizes, scales_of
+from pymoo_hdte.discrepancy._evidence.order_lines.sizes import (
+    motor_orders,
+    port_sizes,
+    scales_of,
+)
 from pymoo_hdte.discrepancy._evidence.order_lines.steady_states import PREDICTION, Lead
 from pymoo_hdte.discrepancy._records.campaign import Campaign
 from pymoo_hdte.discrepancy._records.cleaning.cleaning import cleaned_rows
@@ -28,13 +32,14 @@ from pymoo_hdte.discrepancy._records.records import RunningRecord
 from pymoo_hdte.discrepancy._selection.candidate import Candidate
 from pymoo_hdte.discrepancy._selection.fitting import Fit, fit
 from pymoo_hdte.discrepancy._selection.rules import RULES, Rules
-from pymoo_hdte.discrepancy._selection.verdict import EXPLAINED, Verdict, judge
+from pymoo_hdte.discrepancy._selection.verdict import Verdict, judge
 from pymoo_hdte.discrepancy._verdicts import rattling
 from pymoo_hdte.discrepancy._verdicts.drive_finding import DriveFinding
 from pymoo_hdte.discrepancy._verdicts.validation_drive import validate_drive
 from pymoo_hdte.drive import harmonic_balance
 from pymoo_hdte.drive._solve.free_angle import torus_of
 from pymoo_hdte.effects.effect import effect_named
+from pymoo_hdte.effects.ripple import orders_beside
 from pymoo_hdte.effects.unknowns import HARMONIC_NAMES, is_among
 
 
@@ -102,7 +107,7 @@ def examine_drive(campaign: Campaign, rules: Rules = RULES) -> DriveFinding:
         orders = sorted([*data.features.orders.tolist(), *harmonics])
         wider = replace(data, features=measure(campaign, data.features.records, orders, rules))
         judged = rattling.judged(wider, fit(wider, start=base.values), _candidates)
-    if not harmonics or judged[-1].status not in EXPLAINED:
+    if not harmonics or judged[-1].status == "unlisted":
         # Where no fit follows the harmonics, as in a record that then has no steady state, the
         # lower orders may still be explained.
         judged, harmonics = rattling.judged(data, base, _candidates), []
@@ -118,22 +123,24 @@ def examine_drive(campaign: Campaign, rules: Rules = RULES) -> DriveFinding:
 
 
 def _harmonics(data: Data, base: Fit) -> list[float]:
-    """Return the harmonics of strong lines that are strong, too, above the orders looked at.
+    """Return what strong lines bring above the orders looked at, where that is strong, too.
 
-    Those of a line belong to its effect, and what they leave out of a fit ends in other values, as
-    in the gains of sensors. Each record is asked for what its rows show.
+    The harmonics of a line belong to its effect, and what they leave out of a fit ends in other
+    values, as in the gains of sensors; lines of poles and slots belong to one motor. Each record is
+    asked for what its rows show.
     """
     campaign, features, rules = data.campaign, data.features, data.rules
     orders, lowest = features.orders.tolist(), highest_order(campaign, rules)
     most = max(shown_order(record, rules) for record in features.records)
-    multiples = {
+    strong = _strong_lines(features, base.residuals, rules)
+    brought = {
         round(multiple * order, 9)
-        for order in _strong_lines(features, base.residuals, rules)
+        for order in strong
         for multiple in range(2, len(HARMONIC_NAMES) + 1)
     }
     further = [
         order
-        for order in sorted(multiples)
+        for order in sorted(brought | orders_beside(strong, motor_orders(campaign.rig)))
         if lowest < order <= most and not is_among(orders, order)
     ]
     if not further:

@@ -14,6 +14,7 @@ from pymoo_hdte.drive._effects.encoder import ENCODER_LINE, Eccentricity
 from pymoo_hdte.drive._effects.encoder_zero import NewZero, ThermalDrift
 from pymoo_hdte.drive._effects.load_damping import LoadDamping
 from pymoo_hdte.drive._effects.load_error import LoadDependentError
+from pymoo_hdte.drive._effects.load_shaft import LoadShaft
 from pymoo_hdte.drive._effects.mesh_stiffness import MeshStiffnessVariation
 from pymoo_hdte.drive._effects.presliding import PreslidingFriction
 from pymoo_hdte.drive._effects.series_error import ChangedStaticError
@@ -43,6 +44,7 @@ __all__ = [
     "LoadDamping",
     "LoadDependentError",
     "LoadInertia",
+    "LoadShaft",
     "MeshStiffnessVariation",
     "NewInputTorqueZero",
     "NewOutputTorqueZero",

@@ -298,8 +298,8 @@ class AngleEquations:
         """
         rates, torus = [motion.output_acceleration], self.torus
         total: Values | float = 0.0
-        if self.coefficients.coupled:
-            inertia = self.coefficients.inertia_in_clutches(torus.orders * self.speed)
+        if self.coefficients.is_loose:
+            inertia = self.coefficients.loose_inertia(torus.orders * self.speed)
             total = torus.signal(torus.phasors(rates[0]) * inertia)
         for _ in range(max((k for k, _ in self.coefficients.load_rates), default=0)):
             slope = torus.signal(torus.derivative(torus.phasors(rates[-1])))
@@ -390,7 +390,7 @@ class AngleEquations:
         """Contributions of the inertia to P (before it is shared) and to C of `impedance`."""
         frequency = self.torus.orders * self.speed
         rates = self.coefficients.load_rates
-        inertia = self.output_inertia + self.coefficients.inertia_in_clutches(frequency)
+        inertia = self.output_inertia + self.coefficients.loose_inertia(frequency)
         inertia = inertia + sum(size * self.rate**k for k, size in rates)
         return inertia * frequency**2, 1j * self.torus.orders * inertia / self.coefficients.ratio
 

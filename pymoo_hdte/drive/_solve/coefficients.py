@@ -71,6 +71,9 @@ class Coefficients:
     coupled : tuple of (float, float)
         Inertias beyond the output coupling that a viscous clutch drives: each J in kg.m2 with the
         time in s after which it has come to speed, J over the damping of the clutch.
+    shaft : tuple of float, optional
+        Compliance, rad/(N.m), of a shaft behind which the ``load_inertia`` turns, with its damping
+        over its stiffness, s; by default it is rigid.
     load_errors : tuple of (float, complex)
         Lines of theta_s in proportion to the load: each an order with a phasor in rad per N.m.
         Solvers know them by `at_loads`.
@@ -107,6 +110,7 @@ class Coefficients:
     temperature: float | NDArray[np.float64] = np.nan
     load_rates: tuple[tuple[int, float], ...] = ()
     coupled: tuple[tuple[float, float], ...] = ()
+    shaft: tuple[float, float] | None = None
     load_errors: tuple[tuple[float, complex], ...] = ()
     late_errors: tuple[tuple[float, float, complex], ...] = ()
     elapsed: float | NDArray[np.float64] = np.inf
@@ -189,22 +193,41 @@ class Coefficients:
         """
         return self.load_torque + self.output_damping * self.input_speed / self.ratio
 
-    def inertia_in_clutches(self, frequency: NDArray[np.float64]) -> NDArray[np.complex128]:
-        """Return what the inertias in clutches are at frequencies.
+    @property
+    def is_loose(self) -> bool:
+        """Whether any inertia is not rigidly on the output."""
+        return bool(self.coupled) or self.shaft is not None
+
+    @property
+    def near_inertia(self) -> float | NDArray[np.float64]:
+        """Inertia on the near side of a shaft that twists, kg.m2: all of it without one."""
+        if self.shaft is None:
+            return self.output_inertia
+        return self.output_inertia - np.asarray(self.load_inertia)
+
+    def loose_inertia(self, frequency: NDArray[np.float64]) -> NDArray[np.complex128]:
+        """Return what inertias in clutches or behind a shaft add to the rigid one at frequencies.
+
+        Behind a shaft an inertia J is J / (1 + J s^2 y), with the shaft's receptance y.
 
         Parameters
         ----------
-        frequency : ndarray, shape (...)
+        frequency : ndarray, shape (n, m) or (m,)
             rad/s; negative where the drive turns backward.
 
         Returns
         -------
-        ndarray of complex, shape (...)
-            kg.m2; without clutches one 0, of shape ().
+        ndarray of complex, shape (n, m) or (m,)
+            kg.m2; one 0, of shape (), where all is rigid.
         """
         total = np.zeros((), dtype=complex)
         for inertia, time in self.coupled:
             total = total + inertia / (1.0 + 1j * frequency * time)
+        if self.shaft is not None:
+            compliance, time = self.shaft
+            load = np.reshape(self.load_inertia, (-1, 1))
+            twist = -load * frequency**2 * compliance / (1.0 + 1j * frequency * time)
+            total = total - load * twist / (1.0 + twist)
         return total
 
     @property

@@ -199,7 +199,7 @@ def _free_impedance(
     inertia = coefficients.input_inertia[:, None] * ratio_squared
     damping = coefficients.input_damping[:, None] * ratio_squared
     input_side = 1j * frequency * (damping + 1j * frequency * inertia)
-    on_output = coefficients.output_inertia + coefficients.inertia_in_clutches(frequency)
+    on_output = coefficients.output_inertia + coefficients.loose_inertia(frequency)
     output_side = 1j * frequency * (coefficients.output_damping + 1j * frequency * on_output)
     moving = np.broadcast_to(frequency != 0.0, input_side.shape)
     total = np.where(moving, input_side + output_side, 1.0)

@@ -1,4 +1,7 @@
-"""How torsion and torques follow a small motion of the input that repeats at any order."""
+"""How torsion and torques follow small motions and torques that repeat at any order.
+
+The input is led: it moves as measured, whatever torque that takes.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pymoo_hdte.drive._solve.coefficients import Coefficients
-from pymoo_hdte.drive._solve.steady_motion import Phasors
+from pymoo_hdte.drive._solve.steady_motion import Phasors, SteadyMotion
+from pymoo_hdte.effects.law import Law
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,13 +84,8 @@ def lead_response(
     LeadResponse
     """
     rate = 1j * np.multiply.outer(speed, np.asarray(orders, dtype=float))
-    stiffness, damping, output, inputs = (column[:, None] for column in slopes.T)
-    loose = coefficients.inertia_in_clutches(rate.imag)
-    loose = loose + sum(size * rate**k for k, size in coefficients.load_rates)
-    inertia = np.reshape(coefficients.output_inertia, (-1, 1)) + loose
-    beyond = np.reshape(coefficients.load_inertia, (-1, 1)) + loose
-    mesh = stiffness + damping * rate
-    resisting = inertia * rate**2 + output * rate
+    mesh, resisting, beyond = _impedances(coefficients, slopes, rate)
+    stiffness, _, output, inputs = (column[:, None] for column in slopes.T)
     torsion = resisting / (mesh + resisting) / coefficients.ratio
     own = coefficients.input_inertia[:, None] * rate**2 + inputs * rate
     # The output follows by 1/N less the torsion.
@@ -116,3 +115,87 @@ def lead_response(
         coupling_torque=beyond * rate**2 * follows,
         rate=rate,
     )
+
+
+@dataclass(frozen=True, eq=False)
+class TorqueLines:
+    """Lines of n cases by torques that are one line each, at k orders; phasors (n, k).
+
+    Attributes
+    ----------
+    orders : ndarray, shape (k,)
+        Cycles per input turn.
+    torsion : ndarray of complex
+        rad; that of the transmission error, too.
+    motor_torque, ripple : ndarray of complex
+        Torque that the input takes, and what the motor itself adds to that of its loop, N.m.
+    coupling_torque, brake_torque : ndarray of complex
+        As in `SteadyMotion`, N.m.
+    """
+
+    orders: NDArray[np.float64]
+    torsion: Phasors
+    motor_torque: Phasors
+    ripple: Phasors
+    coupling_torque: Phasors
+    brake_torque: Phasors
+
+
+def torque_lines(
+    coefficients: Coefficients,
+    laws: Sequence[tuple[str, Law]],
+    motion: SteadyMotion,
+    speed: NDArray[np.float64],
+    load: NDArray[np.float64],
+) -> TorqueLines:
+    """Return what torques do that are one line each (`Behaviour.line`), while the input is led.
+
+    At the input they add to the motor's torque and do nothing else, exactly. At the output and the
+    load other laws act with their mean slopes: what a varying stiffness makes of such a line at
+    other orders is left out, a share of its depth.
+
+    Parameters
+    ----------
+    coefficients : Coefficients
+        Coefficients of n designs.
+    laws : sequence of (str, Law)
+        Ports, each with a law.
+    motion : SteadyMotion
+        Steady state without these laws.
+    speed, load : ndarray, shape (n,)
+        Mean speed of the input, rad/s, and load, N.m.
+    """
+    at_input = np.array([port == "input" for port, _ in laws], dtype=bool)
+    at_load = np.array([port == "load" for port, _ in laws], dtype=bool)
+    drives = np.array([law.drives for _, law in laws], dtype=bool)
+    of_port = np.array([law.orders[0] for _, law in laws], dtype=float)
+    torques = np.zeros((len(load), len(laws)), dtype=complex)
+    for column, (_, law) in enumerate(laws):
+        torques[:, column] = law.line(load)
+    orders = np.where(at_input, of_port, of_port / coefficients.ratio)
+    # The output lags by its error; how this varies moves a line by as much of itself.
+    lag = motion.transmission_error[:, :1].real
+    outside = np.where(at_input, 0.0, torques * np.exp(-1j * of_port * lag))
+    rate = 1j * np.multiply.outer(speed, orders)
+    mesh, resisting, beyond = _impedances(coefficients, motion.slopes, rate)
+    torsion = outside / (mesh + resisting)
+    return TorqueLines(
+        orders,
+        torsion,
+        np.where(at_input, torques, mesh * torsion / coefficients.ratio),
+        np.where(at_input & drives, -torques, 0.0),
+        np.where(at_load, outside, 0.0) - beyond * rate**2 * torsion,
+        np.where(at_load & drives, outside, 0.0),
+    )
+
+
+def _impedances(
+    coefficients: Coefficients, slopes: NDArray[np.float64], rate: Phasors
+) -> tuple[Phasors, Phasors, Phasors]:
+    """Return mesh torque per torsion, what the output resists per angle, and inertia beyond it."""
+    stiffness, damping, output, _ = (column[:, None] for column in slopes.T)
+    loose = coefficients.loose_inertia(rate.imag)
+    loose = loose + sum(size * rate**k for k, size in coefficients.load_rates)
+    inertia = np.reshape(coefficients.output_inertia, (-1, 1)) + loose
+    beyond = np.reshape(coefficients.load_inertia, (-1, 1)) + loose
+    return stiffness + damping * rate, inertia * rate**2 + output * rate, beyond

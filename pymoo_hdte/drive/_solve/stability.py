@@ -44,11 +44,12 @@ class UnstableDrive(ArithmeticError):
 
 
 def floquet_multipliers(coefficients: Coefficients) -> NDArray[np.complex128]:
-    """Return the multipliers over one period of the stiffness, shape (n, 3 + c), of c clutches.
+    """Return the multipliers over one period of the stiffness, shape (n, 3 + c).
 
     The period is that of all orders together: half an input turn for order 2, and for a constant
-    stiffness. Other laws are left out. The state is (th_in', d', d), and by how much inertias in
-    clutches are slower than the output. The transition matrix is a product of steps with the
+    stiffness. Other laws are left out. The state is (th_in', d', d), by how much inertias in
+    clutches are slower than the output, and twist and rate of a shaft ahead of the load: c more.
+    The transition matrix is a product of steps with the
     stiffness of their midpoints, each the (2, 2) Pade approximant of the exponential: it is
     A-stable, so stiff damping costs no small steps, and of second order in the step. Steps resolve
     the torsional vibration; see `require_stable` for drives so slow that they cannot. Floquet
@@ -76,7 +77,7 @@ def floquet_multipliers(coefficients: Coefficients) -> NDArray[np.complex128]:
     least, most = _LEAST_STEPS * cycles, _MOST_STEPS * cycles
     steps = int(np.clip(np.ceil(_phase(coefficients, period)), least, most))
     step = period / coefficients.input_speed / steps
-    identity = np.eye(3 + len(coefficients.coupled))
+    identity = np.eye(_size(coefficients))
     transition = np.tile(identity, (len(coefficients.stiffness), 1, 1))
     for index in range(steps):
         angle = (index + 0.5) * period / steps
@@ -103,10 +104,14 @@ def _period(coefficients: Coefficients) -> tuple[float, int]:
 def _phase(coefficients: Coefficients, period: float) -> float:
     """Return the phase of the fastest torsional vibration in one period, in `_PHASE_PER_STEP`."""
     compliance = 1.0 / (coefficients.input_inertia * coefficients.ratio**2)
-    compliance += 1.0 / coefficients.output_inertia
+    compliance += 1.0 / np.asarray(coefficients.near_inertia)
     depth = sum(law.depth for law in coefficients.stiffness_variations)
     stiffest = coefficients.stiffness * (1.0 + depth)
-    fastest = np.sqrt(np.max(stiffest * compliance, initial=0.0))
+    square = np.max(stiffest * compliance, initial=0.0)
+    if coefficients.shaft is not None:
+        mobility = 1.0 / np.asarray(coefficients.near_inertia) + 1.0 / coefficients.load_inertia
+        square = square + np.max(mobility) / coefficients.shaft[0]
+    fastest = np.sqrt(square)
     return float(fastest * period / coefficients.input_speed / _PHASE_PER_STEP)
 
 
@@ -162,21 +167,35 @@ def state_matrix(coefficients: Coefficients, input_angle: float) -> NDArray[np.f
     stiffness = coefficients.stiffness * (1.0 + variation)
     ratio, damping = coefficients.ratio, coefficients.damping
     bearing = coefficients.output_damping
-    size = 3 + len(coefficients.coupled)
+    size, inertia_near = _size(coefficients), coefficients.near_inertia
     matrix = np.zeros((len(stiffness), size, size))
     matrix[:, 0, 0] = -coefficients.input_damping / coefficients.input_inertia
     matrix[:, 0, 1] = -damping / ratio / coefficients.input_inertia
     matrix[:, 0, 2] = -stiffness / ratio / coefficients.input_inertia
     # d'' = th_in''/N - th_out'' with th_out' = th_in'/N - d'.
     matrix[:, 1] = matrix[:, 0] / ratio
-    matrix[:, 1, 0] += bearing / ratio / coefficients.output_inertia
-    matrix[:, 1, 1] -= (damping + bearing) / coefficients.output_inertia
-    matrix[:, 1, 2] -= stiffness / coefficients.output_inertia
+    matrix[:, 1, 0] += bearing / ratio / inertia_near
+    matrix[:, 1, 1] -= (damping + bearing) / inertia_near
+    matrix[:, 1, 2] -= stiffness / inertia_near
     matrix[:, 2, 1] = 1.0
     for place, (inertia, time) in enumerate(coefficients.coupled, 3):
-        matrix[:, 1, place] = inertia / time / coefficients.output_inertia
+        matrix[:, 1, place] = inertia / time / inertia_near
+    if coefficients.shaft is not None:
+        compliance, time = coefficients.shaft
+        matrix[:, 1, -2] = 1.0 / compliance / inertia_near
+        matrix[:, 1, -1] = time / compliance / inertia_near
     output = matrix[:, 0] / ratio - matrix[:, 1]
     for place, (_, time) in enumerate(coefficients.coupled, 3):
         matrix[:, place] = output
         matrix[:, place, place] -= 1.0 / time
+    if coefficients.shaft is not None:
+        matrix[:, -2, -1] = 1.0
+        matrix[:, -1] = output
+        matrix[:, -1, -2] -= 1.0 / compliance / coefficients.load_inertia
+        matrix[:, -1, -1] -= time / compliance / coefficients.load_inertia
     return matrix
+
+
+def _size(coefficients: Coefficients) -> int:
+    """Return the number of states of `state_matrix`."""
+    return 3 + len(coefficients.coupled) + (0 if coefficients.shaft is None else 2)

@@ -2,7 +2,8 @@
 
 The state is (th_in, th_in', th_d, th_d') with th_d = th_in / N - th_out, so that the transmission
 error, a part in 10^4 of the angles, is integrated to its own precision; then the states of laws
-with memory, and by how much each inertia in a clutch is slower than the output.
+with memory, by how much each inertia in a clutch is slower than the output, and how far a shaft
+ahead of the load is twisted by accelerating it, with the rate of that.
 """
 
 from __future__ import annotations
@@ -81,6 +82,7 @@ def equations_of_motion(
     speed = coefficients.input_speed
     clutches = coefficients.coupled
     driven = inertia_out + sum(inertia for inertia, _ in clutches)
+    shaft, inertia_near = coefficients.shaft, coefficients.near_inertia
     accelerating = (inertia_in + driven / ratio**2) * speed
     holding = bearing_in * speed + coefficients.mean_mesh_torque / ratio
     lines = [
@@ -122,7 +124,7 @@ def equations_of_motion(
         mesh_torque = stiffness * varying * torsion + damping * torsion_rate
         mesh_torque += laws("mesh", torsion, torsion_rate, position, load * envelope)
         memory_states = np.split(state[:of_clutches], of_laws)[1:] if remembering else []
-        slips = state[of_clutches:].tolist()
+        slips = state[of_clutches : of_clutches + len(clutches)].tolist()
         for law, states in zip(remembering, memory_states, strict=True):
             mesh_torque += law.torque(states)
         input_torque = accelerating * envelope_rate + (holding + excess) * envelope
@@ -133,7 +135,11 @@ def equations_of_motion(
         delivered += laws("output", output_angle, output_speed, output_angle)
         delivered += laws("load", output_angle, output_speed, output_angle, load * envelope)
         dragged = sum(j / late * slip for (j, late), slip in zip(clutches, slips, strict=True))
-        output_acceleration = (mesh_torque - delivered - dragged) / inertia_out
+        passed = 0.0
+        if shaft is not None:
+            twist, twist_rate = state[-2:].tolist()
+            passed = (twist + shaft[1] * twist_rate) / shaft[0]
+        output_acceleration = (mesh_torque - delivered - dragged - passed) / inertia_near
         resisting = bearing_in * input_speed
         resisting += laws("input", position, input_speed, position, delivered / ratio)
         lever = 1.0 / ratio - reaction * envelope * slope
@@ -143,6 +149,8 @@ def equations_of_motion(
             rates += law.rates(torsion_rate, states).tolist()
         for (_, late), slip in zip(clutches, slips, strict=True):
             rates.append(output_acceleration - slip / late)
+        if shaft is not None:
+            rates += [twist_rate, output_acceleration - passed / coefficients.load_inertia]
         return rates
 
     return right_hand_side

@@ -272,6 +272,12 @@ class Around:
         width = ends[:, 1] - ends[:, 0]
         for sweep in range(_SWEEPS):
             for j in moving.tolist():
+                discrete = self._common.moments.axes[j].discrete
+                if discrete is not None:
+                    inside = (discrete.values >= ends[j, 0]) & (discrete.values <= ends[j, 1])
+                    tried = np.tile(discrete.values[inside], (len(optima), 1))
+                    optima = self._best_on_line(optima, j, tried, side)
+                    continue
                 # The first sweep looks along the whole line, later ones ever nearer.
                 steps = (line - 0.5) * 2.0 * 0.25**sweep * width[j]
                 if not sweep:

@@ -17,11 +17,12 @@ import numpy as np
 import scipy
 
 from pymoo_hdte.checks import InvalidInput, real_number
+from pymoo_hdte.problems._simulator.kinds_of_noise import Interval, Scenarios
 from pymoo_hdte.surrogate.inputs import TruncatedNormal
 
 _TESTED = 64
 """Quantiles that have to come back to the last bit."""
-_KINDS = ("chaospy", "scipy", "truncated_normal")
+_KINDS = ("chaospy", "scipy", "truncated_normal", "scenarios", "interval")
 
 
 def joint_distribution(field: str, given: Any, count: int) -> Any:
@@ -78,8 +79,8 @@ def described(field: str, given: Any) -> dict[str, Any]:
     field : str
         Name of the distribution in an error.
     given : object
-        A distribution of `chaospy`, of several variables too, a frozen one of `scipy.stats`, or a
-        `TruncatedNormal`.
+        A distribution of `chaospy`, of several variables too, a frozen one of `scipy.stats`, a
+        `TruncatedNormal`, `Scenarios` or an `Interval`.
 
     Raises
     ------
@@ -90,6 +91,10 @@ def described(field: str, given: Any) -> dict[str, Any]:
     allowed = "a distribution that its class and numbers make anew: others cannot be saved"
     try:
         description: dict[str, Any]
+        if isinstance(given, Scenarios):
+            return {"scenarios": [list(given.values), list(given.weights)]}
+        if isinstance(given, Interval):
+            return {"interval": [given.lower, given.upper]}
         given = _as_chaospy(given)
         if isinstance(given, TruncatedNormal):
             description = {"truncated_normal": [given.mean, given.std, given.cut]}
@@ -129,6 +134,10 @@ def rebuilt(field: str, described: Any) -> Any:
             return _of_scipy(name)(*map(_number, numbers), **_table(named))
         if kind == "truncated_normal":
             return TruncatedNormal(*value)
+        if kind == "scenarios":
+            return Scenarios(*value)
+        if kind == "interval":
+            return Interval(*value)
     except Exception as error:
         raise InvalidInput(field, described, f"{wanted} ({error})") from error
     raise InvalidInput(field, described, wanted)

@@ -14,7 +14,15 @@ from numpy.typing import NDArray
 
 from pymoo_hdte.checks import InvalidInput, one_of, real_number
 from pymoo_hdte.problems._simulator.distributions import joint_distribution
-from pymoo_hdte.surrogate._sparse.axes import TAIL, Axis, Scatter, noise_axis, standard_normal
+from pymoo_hdte.problems._simulator.kinds_of_noise import Interval, Scenarios, whole_numbers
+from pymoo_hdte.surrogate._sparse.axes import (
+    TAIL,
+    Axis,
+    Scatter,
+    discrete_axis,
+    noise_axis,
+    standard_normal,
+)
 from pymoo_hdte.surrogate._sparse.measures import Distribution, Measure
 
 MOST_INPUTS = 20
@@ -127,10 +135,11 @@ class Inputs:
     ----------
     designs : mapping of str to Design
     noise : mapping
-        From a name to its distribution, or from a tuple of names to a joint distribution of
-        `chaospy`. Dependent variables are functions of independent standard normal ones (inverse
-        Rosenblatt transformation), in which the surrogate is a polynomial: of degree one for
-        `chaospy.MvNormal`. Its moments are exact, and its error is part of the estimated one.
+        From a name to its distribution, to `Scenarios` or an `Interval`, or from a tuple of names
+        to a joint distribution of `chaospy` or `Scenarios`. Dependent variables are functions of
+        independent standard normal ones (inverse Rosenblatt transformation), in which the surrogate
+        is a polynomial: of degree one for `chaospy.MvNormal`. Its moments are exact, and its error
+        is part of the estimated one.
     tail : float
         Share of the probability beyond the reach of an unbounded scatter on either side.
     designed : bool
@@ -139,11 +148,13 @@ class Inputs:
     Attributes
     ----------
     designs, noise : dict
-        As given.
+        As given, discrete distributions as `Scenarios`.
     axes : list of Axis
-        The designs first, in their order.
+        The designs first, in their order. Intervals have designs too.
     names : tuple of str
         Names of the simulator's inputs, in the order of the axes.
+    axis_names : tuple of str
+        Name of each axis; scenarios of several inputs have one, with the names of all.
 
     Raises
     ------
@@ -163,7 +174,7 @@ class Inputs:
             raise InvalidInput("designs", designs, "a mapping of one or more names to a Design")
         if not isinstance(noise, Mapping):
             raise InvalidInput("noise", noise, "a mapping of names to distributions")
-        self.designs, self.noise, self.tail = dict(designs), dict(noise), tail
+        self.designs, self.noise, self.tail = dict(designs), {}, tail
         self.axes: list[Axis] = []
         names: list[str] = []
         for name, design in designs.items():
@@ -171,36 +182,56 @@ class Inputs:
                 raise InvalidInput(f"designs[{name!r}]", design, "a Design")
             names.append(name)
             self.axes.append(design.axis(name, tail))
+        # Place of the first axis, and what makes several inputs from as many axes or from one.
         self._joint: list[tuple[int, Any]] = []
+        self._tables: list[tuple[int, Array]] = []
         for key, given in noise.items():
             group = key if isinstance(key, tuple) else (key,)
-            self._add_noise(group, given, len(names))
+            if not isinstance(given, Scenarios | Interval):
+                given = whole_numbers(f"noise[{key!r}]", given) or given
+            self.noise[key] = given
+            self._add_noise(group, given)
             names += group
         words = all(isinstance(name, str) and name for name in names)
         if not words or len(set(names)) < len(names) or len(names) > MOST_INPUTS:
             allowed = f"at most {MOST_INPUTS} different words"
             raise InvalidInput("names of the inputs", tuple(names), allowed)
         self.names = tuple(names)
+        self.axis_names = tuple(axis.name for axis in self.axes)
 
     def __deepcopy__(self, memo: dict[int, Any]) -> Inputs:
         """Return itself: nothing in it changes."""
         return self
 
-    def _add_noise(self, group: Sequence[str], given: Any, start: int) -> None:
+    def _add_noise(self, group: Sequence[str], given: Any) -> None:
+        start = len(self.axes)
+        if isinstance(given, Scenarios):
+            if given.size != len(group):
+                allowed = f"scenarios of {len(group)} values, one for each name"
+                raise InvalidInput(f"noise[{group!r}]", given, allowed)
+            self.axes.append(discrete_axis(", ".join(map(str, group)), given.discrete()))
+            if given.size > 1:
+                self._tables.append((start, np.array(given.values)))
+            return
+        if isinstance(given, Interval):
+            if len(group) > 1:
+                raise InvalidInput(f"noise[{group!r}]", given, "an interval for each name alone")
+            self.axes.append(Axis(group[0], None, (given.lower, given.upper)))
+            return
         if len(group) == 1:
             self.axes.append(noise_axis(group[0], _noise(group[0], given, self.tail)))
             return
         given = joint_distribution(f"noise[{group!r}]", given, len(group))
         if not given.stochastic_dependent:
             for place, name in enumerate(group):
-                self._add_noise((name,), given[place], start + place)
+                self._add_noise((name,), given[place])
             return
         self.axes += [Axis(name, standard_normal(self.tail)) for name in group]
         self._joint.append((start, given))
 
     @property
     def designed(self) -> tuple[str, ...]:
-        """Names of the designs."""
+        """Names of the designs, and of the intervals behind them."""
         return tuple(axis.name for axis in self.axes if axis.designed)
 
     def values(self, cube: Array) -> Array:
@@ -211,6 +242,8 @@ class Inputs:
             columns[place] = list(
                 np.asarray(joint.inv(scipy.special.ndtr(np.array(columns[place]))))
             )
+        for start, table in reversed(self._tables):
+            columns[start : start + 1] = list(table[columns[start].astype(int)].T)
         return np.column_stack(columns)
 
     def cube(self, values: Array) -> Array:
@@ -219,6 +252,9 @@ class Inputs:
         Values beyond the reach are beyond -1..1, infinite or NaN.
         """
         columns = list(values.T)
+        for start, table in self._tables:
+            place = slice(start, start + table.shape[1])
+            columns[place] = [_positions(table, np.array(columns[place]).T)]
         for start, joint in self._joint:
             place = slice(start, start + len(joint))
             shares = np.asarray(joint.fwd(np.array(columns[place])))
@@ -232,10 +268,19 @@ class Inputs:
 
         For dependent noise, they are taken along the lines through its centre.
         """
-        ends = np.vstack([np.diag(np.full(len(self.axes), side)) for side in (-1.0, 1.0)])
-        extremes = self.values(ends)
+        points = [np.diag(np.full(len(self.axes), side)) for side in (-1.0, 1.0)]
+        for start, table in self._tables:
+            points.append(np.zeros((len(table), len(self.axes))))
+            points[-1][:, start] = self.axes[start].cube(np.arange(float(len(table))))
+        extremes = self.values(np.vstack(points))
         lows, highs = extremes.min(axis=0).tolist(), extremes.max(axis=0).tolist()
         return dict(zip(self.names, zip(lows, highs, strict=True), strict=True))
+
+
+def _positions(table: Array, rows: Array) -> Array:
+    """Return the positions of rows in a table, shape (n,); NaN where they are none of its."""
+    same = np.all(np.isclose(rows[:, None], table[None], rtol=1e-9, atol=0.0), axis=2)
+    return np.where(same.any(axis=1), np.argmax(same, axis=1), np.nan)
 
 
 def _noise(name: str, given: Any, tail: float) -> Scatter:

@@ -21,10 +21,10 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 _PAGE = """<!DOCTYPE html>
-<html lang="en"><head><meta charset="utf-8"><title>Robust design</title>
+<html lang="en"><head><meta charset="utf-8"><title>{{ title }}</title>
 <style>body{font-family:sans-serif;max-width:60em;margin:2em auto}td,th{padding:.2em .8em;
 text-align:right}td:first-child,th:first-child{text-align:left}img{max-width:100%}</style></head>
-<body><h1>Robust design</h1>
+<body><h1>{{ title }}</h1>
 <p>{{ n_runs }} runs of the simulator.{% if refusal %} <b>The surrogate is not trusted:
 {{ refusal }}.</b>{% endif %}</p>
 <h2>Responses</h2>
@@ -36,6 +36,9 @@ text-align:right}td:first-child,th:first-child{text-align:left}img{max-width:100
 <table><tr><th>objective</th><th>value</th><th>error</th></tr>
 {% for row in objectives %}<tr>{% for cell in row %}<td>{{ cell }}</td>{% endfor %}</tr>
 {% endfor %}</table>
+{% if constraints %}<table><tr><th>constraint</th><th>value</th><th>bound</th></tr>
+{% for row in constraints %}<tr>{% for cell in row %}<td>{{ cell }}</td>{% endfor %}</tr>
+{% endfor %}</table>{% endif %}
 <h2>Where the scatter comes from</h2>
 <table><tr><th>input</th>{% for name in responses %}<th>{{ name }}</th>{% endfor %}</tr>
 {% for row in shares %}<tr>{% for cell in row %}<td>{{ cell }}</td>{% endfor %}</tr>
@@ -80,7 +83,12 @@ def plot_scatter(
     return axes
 
 
-def page(problem: SimulatorProblem, result: Any, design: ArrayLike | None) -> str:
+def page(
+    problem: SimulatorProblem,
+    result: Any,
+    design: ArrayLike | None,
+    title: str = "Robust design",
+) -> str:
     """Return the report as HTML; parameters as in `SimulatorProblem.report`.
 
     Raises
@@ -91,7 +99,7 @@ def page(problem: SimulatorProblem, result: Any, design: ArrayLike | None) -> st
     if design is None and result is None:
         raise InvalidInput("result and design", (None, None), "one of them")
     if design is None:
-        design = _middle(result)
+        design = np.atleast_2d(result.X)[middle(np.atleast_2d(result.F))]
     point = finite_array("design", design, (problem.n_var,))
     F, band = problem.evaluate(point[None], return_values_of=["F", "F_band"])
     pictures = []
@@ -103,11 +111,12 @@ def page(problem: SimulatorProblem, result: Any, design: ArrayLike | None) -> st
     totals = [problem.sobol_indices(point, name).total for name in problem.responses]
     shares = [
         [name, *(f"{total[place]:.3f}" for total in totals)]
-        for place, name in enumerate(problem.input_names)
+        for place, name in enumerate(problem.degrees)
     ]
     objectives = zip(problem.obj_names, F[0], band[0], strict=True)
     environment = Environment(autoescape=True)
     return environment.from_string(_PAGE).render(
+        title=title,
         n_runs=problem.n_runs,
         refusal=problem.refusal,
         errors=[(name, f"{error:.2g}") for name, error in problem.response_errors.items()],
@@ -115,17 +124,36 @@ def page(problem: SimulatorProblem, result: Any, design: ArrayLike | None) -> st
             (name, f"{x:.6g}") for name, x in zip(problem.var_names, point.tolist(), strict=True)
         ],
         objectives=[(name, f"{value:.6g}", f"{half:.2g}") for name, value, half in objectives],
+        constraints=[
+            (name, f"{value:.6g}", f"{side.replace('_', ' ')} {bound:.6g}")
+            for name, value, side, bound in limits_at(problem, point)
+        ],
         responses=problem.responses,
         shares=shares,
         pictures=pictures,
     )
 
 
-def _middle(result: Any) -> Array:
-    """Return the design of a result that is nearest to the best of every objective, in ranges."""
-    X, F = np.atleast_2d(result.X), np.atleast_2d(result.F)
+def limits_at(problem: SimulatorProblem, design: Array) -> list[tuple[str, float, str, float]]:
+    """Return the constraints of a problem at a design: name, value, kind of bound and bound."""
+    if not problem.constraints:
+        return []
+    (G,) = problem.evaluate(design[None], return_values_of=["G"])
+    return [
+        (
+            limit.statistic.name,
+            float(limit.bound + limit.side * excess),
+            "at_most" if limit.side > 0.0 else "at_least",
+            float(limit.bound),
+        )
+        for limit, excess in zip(problem.constraints, G, strict=True)
+    ]
+
+
+def middle(F: Array) -> int:
+    """Return the row of a front that is nearest to the best of every objective, in ranges."""
     ranges = np.maximum(np.ptp(F, axis=0), np.finfo(float).tiny)
-    return np.asarray(X[np.argmin(np.sum(((F - F.min(axis=0)) / ranges) ** 2, axis=1))])
+    return int(np.argmin(np.sum(((F - F.min(axis=0)) / ranges) ** 2, axis=1)))
 
 
 def _new_axes() -> Axes:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,9 +18,15 @@ from pymoo_hdte.problems._simulator.crashes import CrashProbability, SuccessMome
 from pymoo_hdte.problems._simulator.data import Runs
 from pymoo_hdte.problems._simulator.inputs import Inputs
 from pymoo_hdte.problems._simulator.replicates import OwnMoments
-from pymoo_hdte.problems._simulator.requested import by_moments, place_of, requested_of
+from pymoo_hdte.problems._simulator.requested import (
+    Requested,
+    by_moments,
+    place_of,
+    requested_of,
+)
 from pymoo_hdte.problems._simulator.statistics import RobustConstraint, Statistic
 from pymoo_hdte.problems._simulator.stored import read_problem, write_problem
+from pymoo_hdte.problems._simulator.worst import WorstOver
 from pymoo_hdte.surrogate._sparse.adaptive import AdaptiveFit
 from pymoo_hdte.surrogate._sparse.draws import draw_designs
 from pymoo_hdte.surrogate.box import Box
@@ -43,7 +49,9 @@ class SimulatorProblem(Problem):
 
     An ordinary vectorised `Problem` of pymoo. Ask for ``dF`` and ``dG`` in ``return_values_of`` to
     get gradients, shape (n, n_obj, n_var), exact for the surrogate, and for ``F_band`` to get the
-    estimated half-width of the error of F, NaN for a `WorstCase`. Where runs fail, statistics are
+    estimated half-width of the error of F, NaN for a `WorstCase`. What is told of a design beyond
+    goals (`scatter`, `sobol_indices`) is at the values of an `Interval` that are worst for the
+    first objective. Where runs fail, statistics are
     those of the runs that succeed, there are no gradients, and a `CrashProbability` tells how often
     they fail.
 
@@ -113,7 +121,10 @@ class SimulatorProblem(Problem):
     ) -> None:
         self._inputs, self.refusal, self._replicates = inputs, refusal, replicates
         bounds = np.array([axis.design for axis in inputs.axes if axis.designed])
-        self.design_box = Box(inputs.designed, *bounds.T)
+        count = len(inputs.designs)
+        self._intervals = None if count == len(bounds) else WorstOver(bounds[count:])
+        bounds = bounds[:count]
+        self.design_box = Box(inputs.designed[:count], *bounds.T)
         self.objectives, self.constraints = tuple(objectives), tuple(constraints)
         self.responses, self.n_runs, self._fit = responses, n_runs, fit
         self._requested = requested_of(objectives, constraints, responses)
@@ -124,7 +135,7 @@ class SimulatorProblem(Problem):
             xl=bounds[:, 0].copy(),
             xu=bounds[:, 1].copy(),
         )
-        self.var_names, self.input_names = inputs.designed, inputs.names
+        self.var_names, self.input_names = tuple(inputs.designs), inputs.names
         self.obj_names = tuple(statistic.name for statistic in objectives)
         self._common = CommonSamples(fit.moments, seed=1)
         self._success = self._own = None
@@ -153,7 +164,7 @@ class SimulatorProblem(Problem):
     @property
     def degrees(self) -> dict[str, int]:
         """Degree of the surrogate in each input, by name."""
-        return dict(zip(self.input_names, self._fit.polynomial.degrees, strict=True))
+        return dict(zip(self._inputs.axis_names, self._fit.polynomial.degrees, strict=True))
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the problem to ``path``, replacing it in one step (``docs/file_format.md``).
@@ -206,9 +217,21 @@ class SimulatorProblem(Problem):
             If ``designs`` is no array of numbers of shape (n, n_var).
         """
         X = self.design_box.settle(designs)
-        blocks = range(0, len(X), _AT_ONCE)
-        parts = [self._band(self._around(X[start : start + _AT_ONCE])) for start in blocks]
-        return np.concatenate(parts) if parts else np.empty((0, self.n_obj))
+        if self._intervals is None:
+            return self._bands(X, self._requested[: self.n_obj])
+        # What a maximum is off by is at most the largest error that its candidates have.
+        columns = [
+            self._intervals.largest(X, partial(self._bands, requested=[request]))
+            for request in self._requested[: self.n_obj]
+        ]
+        return np.column_stack(columns)
+
+    def _bands(self, X: Array, requested: Sequence[Requested]) -> Array:
+        parts = []
+        for start in range(0, len(X), _AT_ONCE):
+            around = self._around(X[start : start + _AT_ONCE])
+            parts.append(self._band(around, requested))
+        return np.concatenate(parts) if parts else np.empty((0, len(requested)))
 
     def crash_probability(self, designs: ArrayLike) -> tuple[Array, Array]:
         """Return how likely a run around each design fails, and the half-width of its error.
@@ -231,6 +254,8 @@ class SimulatorProblem(Problem):
             If ``designs`` is no array of numbers of shape (n, n_var).
         """
         X, statistic = self.design_box.settle(designs), CrashProbability()
+        if self._intervals is not None:
+            X = self._at_worst(X, (statistic, 1.0, 0.0, 0))
         parts = []
         for start in range(0, len(X), _AT_ONCE):
             around = self._around(X[start : start + _AT_ONCE])[0]
@@ -284,7 +309,9 @@ class SimulatorProblem(Problem):
         moments = self._fit.moments
         expansion = moments.expansion(point)[0, place]
         variance, first_order, total = moments.divided_variance(expansion)
-        return SobolIndices(self.input_names, float(expansion[0]), variance, first_order, total)
+        return SobolIndices(
+            self._inputs.axis_names, float(expansion[0]), variance, first_order, total
+        )
 
     def scatter(self, design: ArrayLike, response: str | None = None) -> tuple[str, Array]:
         """Return the name of a response and its values at the common samples around a design.
@@ -313,9 +340,10 @@ class SimulatorProblem(Problem):
         return self.responses[place], self._around(point)[place].samples[0][0]
 
     def _at(self, design: ArrayLike, response: str | None) -> tuple[int, Array]:
-        """Return the position of a response, and one design, shape (1, n_var), in the box."""
+        """Return the position of a response, and one design in the box, intervals behind it."""
         place = place_of(Statistic(response=response), self.responses)
-        return place, self.design_box.settle(finite_array("design", design, (self.n_var,))[None])
+        X = self.design_box.settle(finite_array("design", design, (self.n_var,))[None])
+        return place, X if self._intervals is None else self._at_worst(X, self._requested[0])
 
     def plot_front(self, result: Any, axes: Axes | None = None) -> Axes:
         """Draw the first two objectives of a result with their error bands.
@@ -408,11 +436,9 @@ class SimulatorProblem(Problem):
             response.beside, response.n_runs = beside, self.n_runs
         return around
 
-    def _band(self, around: list[Around]) -> Array:
-        columns = []
-        for statistic, _, _, place in self._requested[: self.n_obj]:
-            response = around[place]
-            columns.append(_half_width(statistic, response))
+    @staticmethod
+    def _band(around: list[Around], requested: Sequence[Requested]) -> Array:
+        columns = [_half_width(statistic, around[place]) for statistic, _, _, place in requested]
         return np.column_stack(columns)
 
     @cached_property
@@ -420,7 +446,7 @@ class SimulatorProblem(Problem):
         """Estimated error of each objective, as the class says, shape (n_obj,)."""
         designs = draw_designs(self._inputs.axes, _JUDGED, np.random.default_rng(1))
         around = self._around(designs)
-        shares = self._band(around)
+        shares = self._band(around, self._requested[: self.n_obj])
         for column, (statistic, _, _, place) in enumerate(self._requested[: self.n_obj]):
             if statistic.relative_to_scatter:
                 least = self._fit.smallest_scatter[place]
@@ -438,35 +464,53 @@ class SimulatorProblem(Problem):
             If a gradient is requested of a statistic that has none.
         """
         x = self.design_box.settle(x)
-        slopes: list[str] = [key for key in ("dF", "dG") if key in out]
-        blocks = range(0, len(x), _AT_ONCE)
-        quick = None
-        if not slopes and self._success is None and self._own is None:
-            quick = by_moments(self._requested, self._fit.moments, x)
-        if quick is not None:
-            parts = [{"F": quick[:, : self.n_obj], "G": quick[:, self.n_obj :]}]
+        sloped = "dF" in out or "dG" in out
+        if self._intervals is None:
+            values, gradients = self._values(x, self._requested, sloped)
         else:
-            parts = [self._block(x[start : start + _AT_ONCE], slopes) for start in blocks]
-        for key in ["F", "G", *slopes]:
-            if key[-1] == "F" or self.n_ieq_constr:
-                out[key] = np.concatenate([part[key] for part in parts])
+            # Each goal at the values of the intervals that are worst for it.
+            parts = [self._values(self._at_worst(x, one), [one], sloped) for one in self._requested]
+            values = np.concatenate([part[0] for part in parts], axis=1)
+            gradients = np.concatenate([part[1] for part in parts], axis=1)
+        for key, part in (("F", slice(0, self.n_obj)), ("G", slice(self.n_obj, None))):
+            if key == "F" or self.n_ieq_constr:
+                out[key] = values[:, part]
+                if f"d{key}" in out:
+                    out[f"d{key}"] = gradients[:, part, : self.n_var]
         if "F_band" in out:
             out["F_band"] = self.band(x)
 
-    def _block(self, x: Array, slopes: list[str]) -> dict[str, Array]:
+    def _at_worst(self, x: Array, request: Requested) -> Array:
+        """Return designs with the values of all intervals that are worst for a goal."""
+        assert self._intervals is not None
+        return self._intervals(x, lambda points: self._values(points, [request], False)[0][:, 0])
+
+    def _values(
+        self, x: Array, requested: Sequence[Requested], sloped: bool
+    ) -> tuple[Array, Array]:
+        """Return what is to be small at designs and their intervals, shape (n, k), and its slopes.
+
+        The slopes have shape (n, k, m); none unless ``sloped``.
+        """
+        if not sloped and self._success is None and self._own is None:
+            quick = by_moments(requested, self._fit.moments, x)
+            if quick is not None:
+                return quick, np.empty((len(x), len(requested), 0))
+        starts = range(0, len(x), _AT_ONCE)
+        parts = [self._block(x[start : start + _AT_ONCE], requested, sloped) for start in starts]
+        values, gradients = zip(*parts, strict=True)
+        return np.concatenate(values), np.concatenate(gradients)
+
+    def _block(self, x: Array, requested: Sequence[Requested], sloped: bool) -> tuple[Array, Array]:
         around = self._around(x)
-        values, gradients = [], []
-        for statistic, sign, bound, place in self._requested:
+        values, gradients = [], [np.empty((len(x), 0))] * len(requested)
+        for row, (statistic, sign, bound, place) in enumerate(requested):
             value, slope = statistic.value(around[place])
             values.append(sign * value - bound)
-            if slopes:
-                gradients.append(sign * self._gradient(x, statistic, slope, around[place], place))
-        F, G = np.split(np.column_stack(values), [self.n_obj], axis=1)
-        outputs = {"F": F, "G": G}
-        if slopes:
-            dF, dG = np.split(np.stack(gradients, axis=1), [self.n_obj], axis=1)
-            outputs |= {"dF": dF, "dG": dG}
-        return outputs
+            if sloped:
+                gradient = self._gradient(x, statistic, slope, around[place], place)
+                gradients[row] = sign * gradient
+        return np.column_stack(values), np.stack(gradients, axis=1)
 
     def _gradient(
         self, x: Array, statistic: Statistic, slope: Array, around: Around, place: int

@@ -158,6 +158,9 @@ def failure_probability(
     4.0 4.0
     """
     inputs = Inputs({}, noise, tail=TAIL_OF_REACH, designed=False)
+    if inputs.designed:
+        allowed = "distributions: an Interval has no probability (robust_problem takes the worst)"
+        raise InvalidInput(f"noise[{inputs.designed[0]!r}]", noise[inputs.designed[0]], allowed)
     space = NormalSpace(inputs)
     if not isinstance(event, Event):
         allowed = "an event, as Response('stress') > 250e6 makes it"
@@ -200,8 +203,7 @@ def _reliability(state: LimitState, event: Event, space: NormalSpace) -> Reliabi
     factor = float(np.exp(min(error / max(probability, np.finfo(float).tiny), 700.0)))
     interval = probability / factor, max(min(probability * factor, 1.0), LEAST)
     point = _most_probable(state, event, space)
-    names = space.inputs.names
-    values = space.values(point[None])[0].tolist()
+    inputs, values = space.inputs, space.values(point[None])[0].tolist()
     length = float(np.linalg.norm(point))
     shares = (point / max(length, np.finfo(float).tiny)) ** 2
     inside = _margin(state, event, space, np.zeros((1, space.d)))[0] > 0.0
@@ -210,8 +212,8 @@ def _reliability(state: LimitState, event: Event, space: NormalSpace) -> Reliabi
         interval,
         -float(scipy.special.ndtri(probability)),
         (-length if inside else length) if length else (-np.inf if inside else np.inf),
-        dict(zip(names, values, strict=True)),
-        dict(zip(names, shares.tolist(), strict=True)),
+        dict(zip(inputs.names, values, strict=True)),
+        dict(zip(inputs.axis_names, shares.tolist(), strict=True)),
         state.n_runs,
         state.confirmed,
         space.values(state.failed) if len(state.failed) else np.empty((0, space.d)),

@@ -106,8 +106,9 @@ def robust_problem(
         Design variables with their bounds and scatter.
     noise : mapping, optional
         From a name to its distribution (of `chaospy`, or a frozen one of `scipy.stats`, with a
-        variance), or from a tuple of names to a joint one of `chaospy`. Together with the designs
-        at most 20 inputs.
+        variance, continuous or of whole numbers), to `Scenarios` or to an `Interval`; or from a
+        tuple of names to a joint one of `chaospy` or `Scenarios`. Together with the designs at most
+        20 inputs.
     objectives : sequence of Statistic
         Objectives to be minimised; ``-Mean()`` is maximised.
     constraints : sequence of RobustConstraint

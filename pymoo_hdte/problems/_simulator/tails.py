@@ -66,12 +66,20 @@ class NormalScatter:
         self.d = len(self._moving)
         shares = scipy.special.ndtr(_GRID)
         self._scatter = [axes[j].sample(shares) for j in self._moving]
+        # There is nothing between the values of a discrete one.
+        self._discrete = [axes[j].discrete for j in self._moving]
 
     def __call__(self, points: Array) -> Array:
         """Return the values of s on every axis at points of shape (n, d), shape (n, axes)."""
         values = np.zeros((len(points), self._count))
-        for j, column, table in zip(self._moving, points.T, self._scatter, strict=True):
-            values[:, j] = np.interp(column, _GRID, table)
+        for j, column, table, discrete in zip(
+            self._moving, points.T, self._scatter, self._discrete, strict=True
+        ):
+            values[:, j] = (
+                np.interp(column, _GRID, table)
+                if discrete is None
+                else discrete.quantile(scipy.special.ndtr(column))
+            )
         return values
 
 

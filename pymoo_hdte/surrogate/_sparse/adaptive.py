@@ -209,7 +209,10 @@ class _SurrogateBuild:
         points, truth = self.points[good], self.truth[good]
         count = truth.shape[1] // 2 if self.is_random else truth.shape[1]
         truth, own_truth = truth[:, :count], truth[:, count:]
-        polynomials = EvenPolynomials(int(np.clip(len(points) // 3, *DEGREES)))
+        polynomials = EvenPolynomials(
+            int(np.clip(len(points) // 3, *DEGREES)),
+            [None if axis.discrete is None else len(axis.discrete.values) for axis in self.axes],
+        )
         shares, weights_of_draws, drawn = self._successes(good, polynomials)
         features = polynomials(points)
         judged = Judged.at(self.draws[0], weights_of_draws, polynomials)

@@ -14,7 +14,7 @@ import scipy
 from numpy.typing import NDArray
 from scipy.special import ndtr, ndtri
 
-from pymoo_hdte.surrogate._sparse.measures import Distribution, Measure
+from pymoo_hdte.surrogate._sparse.measures import Discrete, Distribution, Measure
 
 TAIL = 1e-5
 """Share of the probability beyond the interval of an unbounded input on either side."""
@@ -34,7 +34,7 @@ class Scatter:
 
     Parameters
     ----------
-    distribution : Distribution
+    distribution : Distribution or Discrete
         Distribution of the variable.
     measure : Measure
         The same as weighted nodes.
@@ -53,11 +53,18 @@ class Scatter:
         The measure with all that lies beyond the interval moved to its ends.
     """
 
-    def __init__(self, distribution: Distribution, measure: Measure, tail: float = TAIL) -> None:
+    def __init__(
+        self, distribution: Distribution | Discrete, measure: Measure, tail: float = TAIL
+    ) -> None:
         self.distribution = distribution
         self.measure = measure
         self.tail = tail
         self.box = self._between(TAIL)
+        if isinstance(distribution, Discrete):
+            # There are runs at all values: nothing lies beyond them.
+            self.lower, self.upper = distribution.lower, distribution.upper
+            self.cut = self.ended = measure
+            return
         self.lower, self.upper = self._between(tail)
         self.cut, self.ended = measure.inside(self.lower, self.upper)
 
@@ -74,7 +81,9 @@ class Scatter:
 
     @property
     def is_heavy(self) -> bool:
-        """Whether a tail is longer than `LONGEST_TAIL`."""
+        """Whether a tail is longer than `LONGEST_TAIL`; never of single values."""
+        if isinstance(self.distribution, Discrete):
+            return False
         p = np.array([1e-9, 1e-3, 0.5, 1.0 - 1e-3, 1.0 - 1e-9])
         far_low, low, middle, high, far_high = self.distribution.quantile(p)
         outer_spans = max(middle - far_low, 0.0), max(far_high - middle, 0.0)
@@ -135,12 +144,19 @@ class Axis:
             measures = [Measure(np.log1p(measure.nodes), measure.weights) for measure in measures]
         self.measure, self.cut, self.ended = measures
         low, high = self._ends()
-        self.centre, self.half_width = 0.5 * (low + high), 0.5 * (high - low)
+        # Of a single value any width will do.
+        self.centre, self.half_width = 0.5 * (low + high), 0.5 * (high - low) or 1.0
 
     @property
     def designed(self) -> bool:
         """Whether the variable has a design."""
         return self.design is not None
+
+    @property
+    def discrete(self) -> Discrete | None:
+        """The distribution of noise that takes some values only; None for all others."""
+        distribution = None if self.scatter is None else self.scatter.distribution
+        return distribution if isinstance(distribution, Discrete) else None
 
     def _ends(self) -> tuple[float, float]:
         """Return the ends of the coordinate before it is brought to -1..1."""
@@ -164,6 +180,9 @@ class Axis:
     def physical(self, z: Array) -> Array:
         """Return the variable in its unit at coordinates, same shape."""
         values = self.centre + self.half_width * z
+        if self.discrete is not None:
+            # As given, not as rounding to -1..1 and back makes them.
+            return self.discrete.settled(values)
         if self._from_normal is not None:
             return self._from_normal(values)
         return np.exp(values) if self.logarithmic else values
@@ -206,6 +225,11 @@ class Axis:
         return tuple((np.log1p(ends) if self.logarithmic else ends).tolist())
 
 
+def discrete_axis(name: str, distribution: Discrete) -> Axis:
+    """Return the axis of noise that takes some values only."""
+    return Axis(name, Scatter(distribution, distribution.measure))
+
+
 def noise_axis(name: str, scatter: Scatter) -> Axis:
     """Return the axis of a noise variable, in the normal coordinate if its tail is heavy."""
     if not scatter.is_heavy:
@@ -216,7 +240,7 @@ def noise_axis(name: str, scatter: Scatter) -> Axis:
 class FromNormal:
     """The value of a variable at that of the standard normal one of the same probability."""
 
-    def __init__(self, distribution: Distribution) -> None:
+    def __init__(self, distribution: Distribution | Discrete) -> None:
         self._distribution = distribution
 
     def __call__(self, w: Array) -> Array:

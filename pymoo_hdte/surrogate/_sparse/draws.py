@@ -44,6 +44,7 @@ class SpreadPoints:
     """
 
     def __init__(self, axes: list[Axis], random_state: np.random.Generator) -> None:
+        self._axes = axes
         self._sequence = scipy.stats.qmc.Sobol(len(axes), rng=random_state)
         self._shares = [_spread_over(axis, _power(axes, axis)) for axis in axes]
 
@@ -54,7 +55,10 @@ class SpreadPoints:
             warnings.simplefilter("ignore", UserWarning)
             p = self._sequence.random(count)
         columns = [
-            np.interp(column, share, _GRID) for column, share in zip(p.T, self._shares, strict=True)
+            np.interp(column, share, _GRID)
+            if axis.discrete is None
+            else axis.cube(axis.discrete.drawn(column, _power(self._axes, axis)))
+            for axis, column, share in zip(self._axes, p.T, self._shares, strict=True)
         ]
         return np.column_stack(columns)
 
@@ -68,7 +72,9 @@ def relevance(axes: list[Axis], points: Array) -> Array:
     points : ndarray, shape (n, d)
         Points in -1..1.
     """
-    ratio = np.prod(np.maximum(1.0 - points**2, 0.0), axis=1) ** OUTWARD
+    # Single values have no neighbours that are missing at an end.
+    between = points[:, [axis.discrete is None for axis in axes]]
+    ratio = np.prod(np.maximum(1.0 - between**2, 0.0), axis=1) ** OUTWARD
     for axis, z in zip(axes, points.T, strict=True):
         density = _density(axis, z)
         if density is not None:

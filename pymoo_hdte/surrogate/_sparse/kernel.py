@@ -9,6 +9,8 @@ chapter 10). Axes of little effect, smooth ones and even or odd ones are learnt 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.polynomial.legendre import leggauss
 from numpy.typing import NDArray
@@ -36,16 +38,23 @@ class EvenPolynomials:
     ----------
     degree : int
         Highest degree k.
+    values : sequence of int or None, optional
+        Number of values that an axis takes, None for any. As many polynomials are independent
+        there; those of higher degrees are 0, and with them their coefficients.
     """
 
-    def __init__(self, degree: int) -> None:
-        self.degree = degree
+    def __init__(self, degree: int, values: Sequence[int | None] = ()) -> None:
+        self.degree, self._values = degree, tuple(values)
         nodes, weights = leggauss(degree + 4)
         self._family = OrthonormalPolynomials(Measure(nodes, 0.5 * weights), degree)
 
     def __call__(self, points: Array) -> list[Array]:
         """Return p_1 .. p_k of every axis at points of shape (n, d), each of shape (k, n)."""
-        return [self._family(z)[1:] for z in points.T]
+        features = [self._family(z)[1:] for z in points.T]
+        for feature, count in zip(features, self._values, strict=False):
+            if count is not None:
+                feature[count - 1 :] = 0.0
+        return features
 
     def to_chebyshev(self) -> Array:
         """Return the triangular matrix, shape (k + 1, k + 1), of p_j in T_0 .. T_k: column j."""

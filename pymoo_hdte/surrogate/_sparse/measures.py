@@ -116,6 +116,60 @@ class Distribution:
         return np.asarray(self._given.pdf(points), dtype=float).reshape(points.shape)
 
 
+class Discrete:
+    """Values with probabilities, under the interface of `Distribution`.
+
+    Parameters
+    ----------
+    values : ndarray, shape (k,)
+        Different values in the variable's unit.
+    weights : ndarray, shape (k,)
+        Their probabilities, above 0; they sum to 1.
+
+    Attributes
+    ----------
+    values : ndarray, shape (k,)
+        The values in order.
+    lower, upper : float
+        The first and the last of them.
+    measure : Measure
+        The same as weighted nodes.
+    """
+
+    def __init__(self, values: NDArray[np.float64], weights: NDArray[np.float64]) -> None:
+        order = np.argsort(values)
+        self.values, self._weights = values[order], weights[order]
+        self.lower, self.upper = float(self.values[0]), float(self.values[-1])
+        self.measure = Measure(self.values, self._weights)
+
+    def drawn(self, p: ArrayLike, power: float = 1.0) -> NDArray[np.float64]:
+        """Return values at shares of a probability in proportion to a power of theirs."""
+        below = np.cumsum(self._weights**power)
+        place = np.searchsorted(below / below[-1], np.asarray(p, dtype=float))
+        return self.values[np.minimum(place, len(self.values) - 1)]
+
+    def quantile(self, p: ArrayLike) -> NDArray[np.float64]:
+        """Return the least values at or below which these shares lie, same shape."""
+        return self.drawn(p)
+
+    def share_below(self, x: ArrayLike) -> NDArray[np.float64]:
+        """Return the probability of values that are not larger, same shape, dimensionless."""
+        count = np.searchsorted(self.values, np.asarray(x, dtype=float), side="right")
+        return np.append(0.0, np.cumsum(self._weights))[count]
+
+    def density(self, x: ArrayLike) -> NDArray[np.float64]:
+        """Return the probabilities of the nearest values, same shape, dimensionless."""
+        return self._weights[self._nearest(x)]
+
+    def settled(self, x: ArrayLike) -> NDArray[np.float64]:
+        """Return the nearest values, same shape."""
+        return self.values[self._nearest(x)]
+
+    def _nearest(self, x: ArrayLike) -> NDArray[np.intp]:
+        middles = 0.5 * (self.values[1:] + self.values[:-1])
+        return np.searchsorted(middles, np.asarray(x, dtype=float))
+
+
 def _truncated(normal: TruncatedNormal) -> Any:
     return scipy.stats.truncnorm(-normal.cut, normal.cut, loc=normal.mean, scale=normal.std)
 

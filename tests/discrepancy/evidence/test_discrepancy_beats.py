@@ -10,7 +10,7 @@ from experiments.studies.virtual_rig.rig import run_campaign
 from experiments.studies.virtual_rig.runs import Condition
 from pymoo_hdte.discrepancy._evidence.order_lines.features import measure
 from pymoo_hdte.discrepancy._evidence.order_lines.parameters import base_parameters
-from pymoo_hdte.discrepancy._evidence.order_lines.prediction import predict
+from pymoo_hdte.discrepancy._evidence.order_lines.prediction import Conditions, predict
 from pymoo_hdte.discrepancy._plan.imagined import imagined_campaign, possible_tests
 from pymoo_hdte.discrepancy._plan.limits import PlanLimits
 from pymoo_hdte.drive._effects import MeshStiffnessVariation
@@ -76,3 +76,33 @@ def test_a_planned_campaign_shows_a_beat_as_it_is_predicted():
     real, imaginary = features.places(0)[1]
     measured = features.values[:, real] + 1j * features.values[:, imaginary]
     assert predicted.phasors[0, :, 0, 1] == pytest.approx(measured, rel=0.05)
+
+
+@pytest.mark.parametrize("speed", [3.0, -3.0])
+def test_two_lines_of_the_input_beat_as_its_inertia_has_it(speed):
+    """At a low speed, against the motion of the input alone over its angle: T = J v dv/da + B v."""
+    lead = {6.0: 1.2e-3 * np.exp(0.4j), 18.0: 1.5e-3 * np.exp(-1.0j)}
+    orders = [1.0, 6.0, 12.0, 18.0, 24.0]
+    phasors = np.array([[lead.get(order, 0.0) for order in orders]])
+    conditions = Conditions(
+        np.array([speed]),
+        np.zeros(1),
+        np.zeros(1),
+        np.zeros((1, 3, 6), dtype=complex),
+        lead=phasors,
+    )
+    quiet = replace(BELIEVED, error_amplitudes=(0.0,) * len(BELIEVED.error_orders))
+    values = {one.name: np.array([one.start]) for one in base_parameters(quiet, QUIET, PHASES, 0.0)}
+    predicted = predict(quiet, QUIET, conditions, orders, values)
+    angle = 2.0 * np.pi * np.arange(512) / 512
+    slope = sum((1j * k * lead[k] * np.exp(1j * k * angle)).real for k in lead)
+    rate = speed / (1.0 - slope)
+    # Of the spectrum's lines that of a derivative is i k times as large.
+    order = np.fft.rfftfreq(512, 1.0 / 512)
+    gradient = np.fft.irfft(1j * order * np.fft.rfft(rate**2 / 2.0), 512)
+    torque = quiet.input_inertia * gradient + quiet.input_damping * rate
+    for beat in (12.0, 24.0):
+        expected = 2.0 / 512 * np.fft.rfft(torque)[int(beat)]
+        # The load behind the gear adds a few per cent to the inertia.
+        found = predicted.phasors[0, 0, 1, orders.index(beat)]
+        assert found == pytest.approx(expected, rel=0.05)

@@ -351,3 +351,36 @@ def test_forms_of_one_effect_are_never_together():
     assert not rigid.goes_with(coupled)
     assert coupled.is_form_of(rigid)
     assert rigid.goes_with(next(one for one in LISTED if one.name == "backlash"))
+
+
+def test_of_a_known_motor_one_line_is_enough():
+    scales = replace(SCALES, motor=(8.0, 12.0, 24.0))
+    for seen, forms in (([8.0], ["8"]), ([12.0, 5.0], ["12"]), ([9.0], [])):
+        sizes = port_sizes(BELIEVED, [1.0, *seen], seen, scales, seen, 13.5)
+        assert [one.form for one in drive_candidates(sizes) if one.name == "cogging"] == forms
+
+
+@pytest.mark.parametrize(
+    ("seen", "above", "folded", "forms"),
+    [
+        # Eight poles in twelve slots, whose common multiple lies above the band of some records.
+        ([8.0, 12.0], [24.0], (), "8+12+24"),
+        # Fourteen poles: one record's averages show the common multiple elsewhere.
+        ([12.0], [14.0], (84.0,), "12+14+84"),
+        ([12.0], [14.0], (72.0,), "12+14"),
+        # No motor has five slots or poles.
+        ([5.0], [], (), None),
+        # Of eight poles the slots would be seen: it may be any ripple.
+        ([8.0], [], (), None),
+    ],
+)
+def test_a_motor_cogs_at_poles_slots_and_their_common_multiple(seen, above, folded, forms):
+    orders = [1.0, 2.0, *seen, *above]
+    scales = replace(SCALES, folded=folded)
+    sizes = port_sizes(BELIEVED, orders, seen, scales, [*seen, *above], 13.5)
+    motors = [one for one in drive_candidates(sizes) if one.name == "cogging"]
+    assert all(one.nuisance for one in motors)
+    # Others have fewer of the lines that are seen.
+    lines = {f"{order:g}" for order in (*seen, *above)}
+    whole = [one.form for one in motors if lines <= set(one.form.split("+"))]
+    assert whole == ([] if forms is None else [forms])

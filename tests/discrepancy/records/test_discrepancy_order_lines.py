@@ -139,6 +139,28 @@ def test_averaging_of_raw_samples_is_undone(samples_averaged, order, phase):
     np.testing.assert_allclose(lines.phasors[1:3, 0], np.exp(1j * phase), rtol=1e-8)
 
 
+@pytest.mark.parametrize("order", [13.0, 21.0, 64.0])
+def test_what_averaging_folds_down_is_known_line_by_line(order):
+    """Rows show up to ten cycles a turn, and the samples that they average six times as many."""
+    offsets = (np.arange(6) + 0.5) / 6.0 - 0.5
+    raw_angle = ANGLE[:, None] + SPEED * offsets / RATE
+    orders = [1.0, 2.0, 4.0, 7.0, 1.0 / RATIO]
+    shown = [np.cos(order * raw_angle).mean(axis=1), -np.sin(order * raw_angle).mean(axis=1)]
+    plain = record(1e-5 * ANGLE, *shown, samples_averaged=6)
+    lines = order_lines(plain, RIG, RATIO, orders, (order, 30.0))
+    of_order = lines.folded[0]
+    if order > 60.0:
+        # Filtered away before the samples were taken.
+        assert not np.any(of_order)
+        return
+    np.testing.assert_allclose(of_order[:, 0].real, lines.mean[1:3], atol=1e-10)
+    np.testing.assert_allclose(of_order[:, 1:], lines.phasors[1:3], atol=1e-10)
+    # 20 - 13 and 21 - 20 are among the analysed orders.
+    size = averaging_gain([order], plain) / averaging_gain([abs(20.0 - order)], plain)
+    place = 1 + orders.index(abs(20.0 - order))
+    np.testing.assert_allclose(np.abs(of_order[:, place]), np.abs(size[0]), rtol=1e-3)
+
+
 def test_averaging_gain_tends_to_that_of_a_continuous_mean():
     many = record(ANGLE * 1e-9, ANGLE, ANGLE, samples_averaged=10_000)
     orders = np.array([0.5, 3.0, 9.0])

@@ -380,6 +380,18 @@ def test_rows_at_the_end_of_a_range_are_told_and_left_out(rng, channel):
     assert_lines_as_of(result.record, record, 4.5)
 
 
+def test_a_wave_that_is_cut_at_its_crests_comes_back(rng):
+    """Of rows near the end only those stay elsewhere that noise had taken away from it."""
+    true = run(rng)
+    result = repaired(replace(true, output_torque=np.minimum(true.output_torque, 21.0)))
+    assert result.usable
+    lines = order_lines(result.record, RIG, RATIO, ORDERS)
+    deviation = np.sqrt(np.diag(lines.covariance[2]))
+    place = ORDERS.index(2.0)
+    assert abs(lines.mean[2] - 20.0) < 4.0 * deviation[0]
+    assert abs(lines.phasors[2, place] + 1j) < 5.0 * deviation[1 + place]
+
+
 def test_a_record_that_is_saturated_most_of_the_time_is_not_usable(rng):
     result = repaired(clipped(run(rng), "input_torque", 0.4))
     assert not result.usable

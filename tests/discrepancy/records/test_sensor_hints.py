@@ -103,14 +103,20 @@ def test_foot_pounds_within_the_tolerance_of_the_load_are_told(rig):
     assert sensor_hints(replace(campaign, running=ranges)) == []
 
 
-def test_the_place_is_kept_in_files_and_beside_another_model(tmp_path):
-    write_campaign(session(AT_BRAKE), tmp_path / "first")
+def test_place_and_motor_are_kept_in_files_and_beside_another_model(tmp_path):
+    rig = replace(AT_BRAKE, motor_poles=8, motor_slots=12)
+    write_campaign(session(rig), tmp_path / "first")
     read = read_campaign(tmp_path / "first")
-    assert read.rig.output_torque_at == "brake"
+    assert read.rig == rig
     assert read.believed == BELIEVED
     toml = tmp_path / "first" / "campaign.toml"
     text = toml.read_text(encoding="utf-8")
     assert tomllib.loads(text)["rig"]["output_torque_at"] == "brake"
-    toml.write_text(text.replace('"brake"', '"motor"'), encoding="utf-8")
-    with pytest.raises(InvalidInput, match="'drive', 'brake'"):
-        read_campaign(tmp_path / "first")
+    for wrong, match in (
+        (text.replace('"brake"', '"motor"'), "'drive', 'brake'"),
+        (text.replace("motor_slots = 12", ""), "motor_slots"),
+        (text.replace("motor_poles = 8", "motor_poles = 8.5"), "rig.motor_poles"),
+    ):
+        toml.write_text(wrong, encoding="utf-8")
+        with pytest.raises(InvalidInput, match=match):
+            read_campaign(tmp_path / "first")

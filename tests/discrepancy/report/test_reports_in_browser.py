@@ -15,8 +15,8 @@ from measured_oscillator import cubic_analysis
 from places import DOCS
 from quick_campaigns import ripple_analysis_and_report, study_and_report
 
-from experiments.runner.report import write_report
-from experiments.runner.store import save
+from experiments.runner.report import report_fingerprint, write_report
+from pymoo_hdte._runner.store import save
 from pymoo_hdte.cli import command_line as cli
 from pymoo_hdte.drive import hs_20_100, preset
 from pymoo_hdte.drive.toml_text import model_toml, sheet_toml
@@ -63,7 +63,7 @@ def files_of(name):
             arguments = (f"{top}/joint.toml", "--limits", f"{top}/limits.toml", "--out", str(out))
             assert cli.main([name, *arguments, "--quiet"]) == 0
         else:
-            save(out, "table7", example())
+            save(out, "table7", example(), report_fingerprint())
             write_report(out)
         files = [path for path in out.rglob("*") if path.is_file()]
         return {path.relative_to(out): path.read_bytes() for path in files}

@@ -15,15 +15,14 @@ from pymoo.optimize import minimize
 from pymoo.problems import get_problem
 
 from experiments.command_line import main
-from experiments.comparing.named import OpenRun, algorithm_named, problem_named
-from experiments.comparing.paired import compare
-from experiments.comparing.quality import TrueFront
-from experiments.comparing.references import reference
-from experiments.comparing.runs import ALGORITHMS, OptimisationRun
-from experiments.runner.campaign import Campaign
-from experiments.runner.provenance import fingerprint
-from experiments.runner.registry import Context
-from experiments.runner.setting import Setting
+from pymoo_hdte._comparing.named import OpenRun, algorithm_named, problem_named
+from pymoo_hdte._comparing.paired import compare
+from pymoo_hdte._comparing.quality import TrueFront
+from pymoo_hdte._comparing.references import reference
+from pymoo_hdte._comparing.runs import ALGORITHMS, OptimisationRun
+from pymoo_hdte._comparing.setting import Setting
+from pymoo_hdte._runner.campaign import Campaign
+from pymoo_hdte._runner.provenance import fingerprint
 from pymoo_hdte.algorithms import CompactSwarm, ElitistSwarm
 from pymoo_hdte.algorithms.crowding import least_crowded
 from pymoo_hdte.checks import InvalidInput
@@ -224,7 +223,7 @@ def test_algorithms_get_the_population_that_was_asked_for_or_choose_it(name, kin
 @pytest.mark.nightly
 def test_three_objectives_are_compared_too(tmp_path):
     setting = Setting(("dtlz2",), ("NSGA2", "NSGA3"), 1, 20, 200)
-    (one,) = compare(Context(2, tmp_path, Campaign(tmp_path), setting=setting), (), "open")
+    (one,) = compare(setting, range(1, 3), Campaign(tmp_path), (), "open")
     assert one.is_true
     assert one.median_front("NSGA3").shape[1] == 3
     assert np.isfinite(one.values("NSGA2", "igd")).all()
@@ -238,7 +237,7 @@ def test_a_run_without_a_feasible_design_is_the_worst_there_is(stranger):
     assert run.values[0, 0] == 100
     assert np.isnan(run.values[:, 1:]).all()
     with pytest.raises(InvalidInput, match="two different optima"):
-        compare(Context(1, stranger, Campaign(stranger), setting=setting), (), "open")
+        compare(setting, range(1, 2), Campaign(stranger), (), "open")
 
 
 def test_the_standard_algorithms_are_the_same_by_name():

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from experiments.comparing.quality import TrueFront
+from pymoo_hdte._comparing.quality import TrueFront
 from pymoo_hdte.checks import InvalidInput
 
 LINE = np.column_stack([np.linspace(0, 1, 1001), np.linspace(1, 0, 1001)])

@@ -12,8 +12,9 @@ from hypothesis.extra.numpy import arrays
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from scipy.stats import friedmanchisquare
 
-from experiments.comparing.figures import critical_difference_plot, rank_heatmap
-from experiments.comparing.ranks import (
+from experiments.comparing.rivals import holm_against, outcomes, signs_against, win_tie_loss
+from pymoo_hdte._comparing.figures import critical_difference_plot, rank_heatmap
+from pymoo_hdte._comparing.ranks import (
     average_ranks,
     cliques,
     friedman,
@@ -22,7 +23,6 @@ from experiments.comparing.ranks import (
     problem_ranks,
     rank_intervals,
 )
-from experiments.comparing.rivals import holm_against, outcomes, signs_against, win_tie_loss
 from pymoo_hdte.checks import InvalidInput
 
 # Areas under the curve, J. Mach. Learn. Res. 7 (2006), Table 6. The last row but one is printed as

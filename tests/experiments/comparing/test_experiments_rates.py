@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from experiments.comparing.statistics import Estimate, mean, median, rate
-from experiments.runner.result import MISSED, NOT_SHOWN, SHOWN, Finding, scored
+from pymoo_hdte._comparing.statistics import Estimate, mean, median, rate
+from pymoo_hdte._runner.result import MISSED, NOT_SHOWN, SHOWN, Finding, scored
 
 
 @pytest.mark.parametrize("n", [5, 20, 200])

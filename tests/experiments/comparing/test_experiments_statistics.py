@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from experiments.comparing.statistics import effect_size, holm, summary, wilcoxon_p
+from pymoo_hdte._comparing.statistics import effect_size, holm, summary, wilcoxon_p
 
 
 def test_summary_of_one_to_five():

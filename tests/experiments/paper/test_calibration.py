@@ -51,9 +51,9 @@ from experiments.paper.calibrating.rigid import (
 )
 from experiments.paper.scatter import dte_samples
 from experiments.published_values import TABLE_9
-from experiments.runner.campaign import Campaign
 from experiments.runner.committed import committed_file
 from experiments.runner.registry import Context
+from pymoo_hdte._runner.campaign import Campaign
 from pymoo_hdte.drive import PARAMETERS, PRESETS, preset, transfer_function
 from pymoo_hdte.problems import RobustDTE
 from pymoo_hdte.surrogate import TruncatedNormal

@@ -5,7 +5,6 @@ import pytest
 from night import others_at_night
 from scipy import stats
 
-from experiments.comparing.statistics import at_least
 from experiments.paper import later_prototypes, table2, table3
 from experiments.paper.bench.campaign import draw_campaign, slope_error_per_noise, summaries
 from experiments.paper.static_error import statistics as static_error_statistics
@@ -28,8 +27,9 @@ from experiments.paper.static_error.tables import (
     shapiro_p,
 )
 from experiments.published_values import TABLE_2, TABLE_3, TABLE_6
-from experiments.runner.campaign import Campaign
 from experiments.runner.registry import Context
+from pymoo_hdte._comparing.statistics import at_least
+from pymoo_hdte._runner.campaign import Campaign
 from pymoo_hdte.drive import hs_20_100
 from pymoo_hdte.identification import detectable_correlation
 from pymoo_hdte.units import ARCSEC

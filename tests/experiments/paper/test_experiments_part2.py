@@ -8,7 +8,6 @@ from night import others_at_night
 from numpy.polynomial.legendre import leggauss
 from scipy.signal import butter, sosfreqz
 
-from experiments.comparing.runs import robust_problem
 from experiments.paper import fig12, published, table8
 from experiments.paper.choices import (
     BAND,
@@ -19,7 +18,6 @@ from experiments.paper.choices import (
     scatter_indices,
     study_designs,
 )
-from experiments.paper.models import FITTED
 from experiments.paper.prototypes.consistency import Prediction, best_case_table, consistency_table
 from experiments.paper.prototypes.printed_validation import (
     HIGHEST,
@@ -39,9 +37,8 @@ from experiments.paper.scatter import exact_moments
 from experiments.paper.table6 import record
 from experiments.paper.table8 import _idle_sweep, deviation_table
 from experiments.published_values import TABLE_6, Moments
-from experiments.runner.campaign import Campaign
 from experiments.runner.registry import Context
-from experiments.runner.store import load, png_bytes, save
+from experiments.runner.report import report_fingerprint
 from experiments.studies import dte_map, sensitivity
 from experiments.studies.crosscheck import (
     FAMILIES,
@@ -54,6 +51,10 @@ from experiments.studies.crosscheck import (
     needed_table,
     rivals,
 )
+from pymoo_hdte._comparing.models import FITTED
+from pymoo_hdte._comparing.runs import robust_problem
+from pymoo_hdte._runner.campaign import Campaign
+from pymoo_hdte._runner.store import load, png_bytes, save
 from pymoo_hdte.decision import deviation_degree
 from pymoo_hdte.drive import (
     PARAMETERS,
@@ -231,7 +232,7 @@ class TestShares:
 def test_quick_experiments_can_be_stored_and_read_again(experiment, tmp_path):
     result = experiment.run(context(tmp_path))
     name = experiment.__name__.rpartition(".")[2]
-    save(tmp_path, name, result)
+    save(tmp_path, name, result, report_fingerprint())
     stored = load(tmp_path, name)
     assert stored.tables == result.tables
     assert result.command == f"python -m experiments {name}"

@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 
 from experiments.command_line import main
-from experiments.comparing import paired
-from experiments.comparing.runs import ALGORITHMS, OptimisationRun, robust_problem
 from experiments.paper.scatter import dte_samples, exact_moments
 from experiments.published_values import TABLE_6, TABLE_9
-from experiments.runner.campaign import Campaign
+from pymoo_hdte._comparing import paired
+from pymoo_hdte._comparing.runs import ALGORITHMS, OptimisationRun, robust_problem
+from pymoo_hdte._runner.campaign import Campaign
 from pymoo_hdte.decision import deviation_degree
 
 SMALL = {"population": 20, "generations": 5, "final_size": 8}
@@ -26,7 +26,7 @@ SMALL_RUNS = f"""
 import sys
 from functools import partial
 from experiments.command_line import main
-from experiments.comparing import paired
+from pymoo_hdte._comparing import paired
 paired.OptimisationRun = partial(paired.OptimisationRun, **{SMALL})
 sys.exit(main())
 """
@@ -102,7 +102,7 @@ def test_repetition_does_not_change_a_byte(tmp_path, monkeypatch):
         assert main(arguments) == 0
     one, two = (steady_files(tmp_path / out) for out in ("one", "two"))
     assert one == two
-    assert {"table7/quality.csv", "table7/fronts.png", "table7/result.json"} <= set(one)
+    assert {"table7/quality.csv", "table7/fronts_calibrated.png", "table7/result.json"} <= set(one)
 
 
 @pytest.mark.nightly
@@ -115,7 +115,7 @@ def test_workers_and_repetition_do_not_change_a_byte(extent, seeds, tmp_path):
         assert run_experiments(*extent, *arguments).returncode == 0
     one, two = (steady_files(tmp_path / out) for out in ("one", "two"))
     assert one == two
-    assert {"table7/quality.csv", "table7/fronts.png", "table7/result.json"} <= set(one)
+    assert {"table7/quality.csv", "table7/fronts_calibrated.png", "table7/result.json"} <= set(one)
 
 
 @pytest.mark.nightly

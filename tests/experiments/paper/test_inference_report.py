@@ -36,10 +36,10 @@ from experiments.paper.inference.verdicts import (
     with_noise,
     without_noise,
 )
-from experiments.runner.campaign import Campaign
 from experiments.runner.committed import committed_file
 from experiments.runner.registry import Context
-from experiments.runner.result import OF_MODELS, significant
+from pymoo_hdte._runner.campaign import Campaign
+from pymoo_hdte._runner.result import OF_MODELS, significant
 
 
 @pytest.fixture(scope="module")

@@ -7,7 +7,6 @@ import pytest
 from numpy.polynomial.legendre import leggauss
 from scipy.interpolate import lagrange
 
-from experiments.comparing.runs import robust_problem
 from experiments.paper import node_faults, table5
 from experiments.paper.node_faults import (
     AS_PRINTED,
@@ -22,9 +21,10 @@ from experiments.paper.node_faults import (
     noise_share,
 )
 from experiments.published_values import TABLE_5
-from experiments.runner.campaign import Campaign
 from experiments.runner.registry import Context
-from experiments.runner.result import WITHIN_PAPER
+from pymoo_hdte._comparing.runs import robust_problem
+from pymoo_hdte._runner.campaign import Campaign
+from pymoo_hdte._runner.result import WITHIN_PAPER
 from pymoo_hdte.surrogate import Box, ChebyshevSurrogate, latin_hypercube
 from pymoo_hdte.surrogate.tensor import chebyshev_nodes
 from pymoo_hdte.units import ARCSEC

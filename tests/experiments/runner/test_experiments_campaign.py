@@ -17,8 +17,8 @@ import pytest
 from threadpoolctl import threadpool_info, threadpool_limits
 
 from experiments.command_line import main
-from experiments.runner.campaign import Campaign, Run, execute, origin
-from experiments.runner.workers import WrongWorker, arithmetic, make_executor
+from pymoo_hdte._runner.campaign import Campaign, Run, execute, origin
+from pymoo_hdte._runner.workers import WrongWorker, arithmetic, make_executor
 from pymoo_hdte.checks import InvalidInput
 
 
@@ -199,7 +199,7 @@ def test_another_origin_does_not_reuse_the_runs(tmp_path, monkeypatch, part):
     another = {"numpy": "another"} if part == "environment" else "another"
     here = origin(Path(__file__).parent)
     Campaign(tmp_path).run(WALKS[:1], "walks")
-    monkeypatch.setattr(f"experiments.runner.campaign.{part}", lambda *sources: another)
+    monkeypatch.setattr(f"pymoo_hdte._runner.campaign.{part}", lambda *sources: another)
     origin.cache_clear()
     Campaign(tmp_path).run(WALKS[:1], "walks")
     elsewhere = origin(Path(__file__).parent)
@@ -270,7 +270,7 @@ def test_another_processor_has_another_arithmetic(variable, one, other):
     features = " ".join(re.findall(r"X86_V[34]|AVX[0-9A-Z_]*[0-9A-Z]|FMA3", arithmetic()))
     names = set()
     for value in (one, other.format(features=features)):
-        command = "from experiments.runner.workers import arithmetic; print(arithmetic())"
+        command = "from pymoo_hdte._runner.workers import arithmetic; print(arithmetic())"
         done = subprocess.run(
             [sys.executable, "-c", command],
             env=os.environ | {variable: value}, capture_output=True, text=True, check=True,

@@ -19,9 +19,9 @@ import walk_jobs
 from places import ROOT
 from walk_jobs import DeadlyWalk, EndlesslyDeadlyWalk, Walk
 
-from experiments.comparing.runs import OptimisationRun
-from experiments.runner.campaign import Campaign
-from experiments.runner.workers import WorkerLost, WrongWorker, make_executor
+from pymoo_hdte._comparing.runs import OptimisationRun
+from pymoo_hdte._runner.campaign import Campaign
+from pymoo_hdte._runner.workers import WorkerLost, WrongWorker, make_executor
 from pymoo_hdte.checks import InvalidInput
 
 pytest.importorskip("distributed", reason="needs the extra dask")
@@ -275,7 +275,7 @@ def test_a_scheduler_can_end_the_wait_for_workers(tmp_path):
 
 
 def test_a_silent_service_at_the_dask_address_is_refused(monkeypatch):
-    monkeypatch.setattr("experiments.runner.workers.CONNECT_SECONDS", 0.2)
+    monkeypatch.setattr("pymoo_hdte._runner.workers.CONNECT_SECONDS", 0.2)
     with (
         socket.create_server(("127.0.0.1", 0)) as service,
         pytest.raises(InvalidInput, match="the address of a running Dask scheduler"),

@@ -2,8 +2,8 @@
 
 import pytest
 
-from experiments.runner import provenance
 from experiments.runner.committed import committed_file, read_origin
+from pymoo_hdte._runner import provenance
 
 OF_THE_PAPER = ("anytime.csv", "inference.csv", "calibration.csv")
 

@@ -7,11 +7,11 @@ from experiments.published_values import (
     BATCH_SURROGATE_SECONDS,
     SPEED_UPS,
 )
-from experiments.runner.campaign import Campaign
 from experiments.runner.registry import Context
-from experiments.runner.result import OF_MODELS
 from experiments.studies import cost
 from experiments.studies.cost import LITTLE, Seconds
+from pymoo_hdte._runner.campaign import Campaign
+from pymoo_hdte._runner.result import OF_MODELS
 from pymoo_hdte.drive import preset, simulate_drive
 
 

@@ -12,7 +12,6 @@ from pymoo_hdte.surrogate._sparse.kernel import EvenPolynomials
 from pymoo_hdte.surrogate._sparse.regression import Regression, surprises
 from pymoo_hdte.surrogate._sparse.second import Linked, Process, better, links_for
 
-
 SHARES = (0.8, 0.5)
 """Deviations of the logarithms of the two factors of the product."""
 

@@ -16,8 +16,8 @@ import numpy as np
 from moocore import is_nondominated
 from numpy.typing import NDArray
 
-from experiments.comparing.quality import N_POINTS, even_curve
 from experiments.studies.suites.formulas.plain_problem import PlainProblem
+from pymoo_hdte._comparing.quality import N_POINTS, even_curve
 
 Array = NDArray[np.float64]
 

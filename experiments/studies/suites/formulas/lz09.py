@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pymoo.util.ref_dirs import get_reference_directions
 
-from experiments.comparing.quality import N_POINTS, even_curve
 from experiments.studies.suites.formulas.plain_problem import PlainProblem
+from pymoo_hdte._comparing.quality import N_POINTS, even_curve
 
 Array = NDArray[np.float64]
 

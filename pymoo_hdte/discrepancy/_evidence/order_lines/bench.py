@@ -6,8 +6,9 @@ finds their values anew, and its evidence is summed over them: hypotheses never 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +22,24 @@ from pymoo_hdte.drive import DriveEffect
 from pymoo_hdte.effects.unknowns import Parameter
 
 Values = NDArray[np.float64]
-Group = tuple[NDArray[np.int_], tuple[DriveEffect, ...]]
+
+
+class Group(NamedTuple):
+    """Vectors that share the effects by which they move.
+
+    Attributes
+    ----------
+    rows : ndarray of int, shape (k,)
+        Their indices.
+    moving : tuple of DriveEffect
+        Believed effects and those of the bench that change the motion.
+    parts : list of tuple
+        Places among the rows that share all others, with these.
+    """
+
+    rows: NDArray[np.int_]
+    moving: tuple[DriveEffect, ...]
+    parts: list[tuple[NDArray[np.int_], tuple[DriveEffect, ...]]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,8 +97,13 @@ class Bench:
             for effect in nuisance.build([float(values[name]) for name in names_of(nuisance)])
         )
 
-    def groups(self, known: Sequence[DriveEffect], values: Mapping[str, Values]) -> list[Group]:
-        """Return groups of vectors that share all numbers of effects, with the effects of each.
+    def groups(
+        self,
+        known: Sequence[DriveEffect],
+        values: Mapping[str, Values],
+        moves: Callable[[DriveEffect], bool],
+    ) -> list[Group]:
+        """Return groups of vectors that share all numbers of effects that change the motion.
 
         Parameters
         ----------
@@ -88,24 +111,42 @@ class Bench:
             Believed effects, whose numbers may be among the values.
         values : mapping of str to ndarray, shape (v,)
             Parameters of v vectors by name.
-
-        Returns
-        -------
-        list of tuple
-            Indices of the vectors of a group; its believed effects, then those of the bench.
+        moves : callable
+            Tells whether an effect changes the motion; others only add to readings.
         """
+        moving, further = Bench(), Bench()
+        for nuisance, begin in zip(self.nuisances, self.begins, strict=True):
+            if any(moves(effect) for effect in nuisance.build(begin)):
+                moving = moving.with_nuisance(nuisance, begin)
+            else:
+                further = further.with_nuisance(nuisance, begin)
+        groups = []
+        for rows, effects in of_equal_numbers(known, values):
+            believed = tuple(effect for effect in effects if moves(effect))
+            rest = tuple(effect for effect in effects if not moves(effect))
+            for places, own in moving._of_equal_numbers(values, rows):
+                some = rows[places]
+                parts = further._of_equal_numbers(values, some)
+                parts = [(part, (*rest, *lines)) for part, lines in parts]
+                groups.append(Group(some, (*believed, *own), parts))
+        return groups
+
+    def _of_equal_numbers(
+        self, values: Mapping[str, Values], rows: NDArray[np.int_]
+    ) -> list[tuple[NDArray[np.int_], tuple[DriveEffect, ...]]]:
+        """Return places among rows that share all values of the bench, with its effects there."""
         names = self.unknowns
-        groups = of_equal_numbers(known, values)
         if not names:
-            return groups
-        table = np.column_stack([values[name] for name in names])
-        parted = []
-        for rows, effects in groups:
-            numbers, places = np.unique(table[rows], axis=0, return_inverse=True)
-            for place, row in enumerate(numbers):
-                own = self.effects(dict(zip(names, row.tolist(), strict=True)))
-                parted.append((rows[places.ravel() == place], (*effects, *own)))
-        return parted
+            return [(np.arange(len(rows)), ())]
+        table = np.column_stack([values[name][rows] for name in names])
+        numbers, group = np.unique(table, axis=0, return_inverse=True)
+        return [
+            (
+                np.flatnonzero(group.ravel() == place),
+                self.effects(dict(zip(names, row.tolist(), strict=True))),
+            )
+            for place, row in enumerate(numbers)
+        ]
 
 
 IDEAL = Bench()

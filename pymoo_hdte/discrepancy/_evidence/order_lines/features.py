@@ -29,6 +29,7 @@ from pymoo_hdte.discrepancy._records.line_fit import (
 from pymoo_hdte.discrepancy._records.records import RunningRecord
 from pymoo_hdte.discrepancy._records.residual_spectrum import residual_spectrum
 from pymoo_hdte.discrepancy._selection.rules import RULES, Rules
+from pymoo_hdte.effects.ripple import COGGING_ORDERS
 
 _NEIGHBOURS = 4
 """Multiples of 1/N on either side of a line that tell the noise there: a mean of sixteen squares,
@@ -124,7 +125,7 @@ def measure(
     all_orders = np.array(orders)
     shown = np.array([all_orders <= shown_order(record, rules) for record in records])
     measured = [
-        order_lines(record, rig, ratio, all_orders[of_record])
+        order_lines(record, rig, ratio, all_orders[of_record], COGGING_ORDERS)
         for record, of_record in zip(records, shown, strict=True)
     ]
     lines = [
@@ -139,6 +140,7 @@ def measure(
         temperature=np.array([record.temperature for record in records], dtype=float),
         input_angle=np.array([line.mean[3] for line in lines]),
         fading=np.array([line.fading for line in lines]),
+        folded=np.array([line.folded for line in lines]),
         travel=np.array(
             [abs(record.input_angle[-1] - record.input_angle[0]) for record in records]
         ),
@@ -228,13 +230,12 @@ def _at_all_orders(
     covariance[:, places[:, None], places] = lines.covariance
     phasors = np.zeros((len(CHANNELS), m), dtype=complex)
     phasors[:, shown] = lines.phasors
-    bends, fading = (
-        np.zeros((len(courses), 1 + m), dtype=complex) for courses in (lines.bends, lines.fading)
-    )
-    bends[:, known], fading[:, known] = lines.bends, lines.fading
-    return replace(
-        lines, orders=orders, phasors=phasors, covariance=covariance, bends=bends, fading=fading
-    )
+    courses = {}
+    for name in ("bends", "fading", "folded"):
+        of_known = getattr(lines, name)
+        courses[name] = np.zeros((*of_known.shape[:-1], 1 + m), dtype=complex)
+        courses[name][..., known] = of_known
+    return replace(lines, orders=orders, phasors=phasors, covariance=covariance, **courses)
 
 
 def shown_order(record: RunningRecord, rules: Rules) -> float:

@@ -8,13 +8,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pymoo_hdte.discrepancy._evidence.order_lines.bench import IDEAL, Bench
+from pymoo_hdte.discrepancy._evidence.order_lines.folded_lines import beyond_orders, folded_down
+from pymoo_hdte.discrepancy._evidence.order_lines.parameters import READING
 from pymoo_hdte.discrepancy._evidence.order_lines.steady_states import (
     PREDICTION,
     Effort,
@@ -27,12 +29,14 @@ from pymoo_hdte.discrepancy._records.line_fit import CHANNELS
 from pymoo_hdte.drive import (
     Coefficients,
     DriveEffect,
+    SpeedLoop,
     SteadyMotion,
 )
 from pymoo_hdte.drive._effects import Session
-from pymoo_hdte.drive._solve.lead_response import LeadResponse, lead_response
+from pymoo_hdte.drive._solve.lead_response import LeadResponse, lead_response, torque_lines
 from pymoo_hdte.drive._solve.order_spectrum import sine_phasor
-from pymoo_hdte.effects.law import Values
+from pymoo_hdte.effects.effect import effect_named
+from pymoo_hdte.effects.law import Law, Values
 
 LOOP = ("loop_gain", "loop_lag")
 """Unknowns of the speed loop: the share by which it is stronger than stated, and its lag in s."""
@@ -73,6 +77,9 @@ class Conditions:
     unsteady : complex ndarray, shape (r, 2, m), optional
         Lines of the input's speed and acceleration beyond those of a steady motion, rad/s and
         rad/s2: see `unsteady_lines`; by default none.
+    folded : complex ndarray, shape (r, k, 2, 1 + m), optional
+        Contribution of what a motor does at `COGGING_ORDERS` beyond those that the rows of a record
+        show, see `OrderLines`; by default none.
     """
 
     input_speed: NDArray[np.float64]
@@ -86,6 +93,7 @@ class Conditions:
     lead: NDArray[np.complex128] | None = None
     lead_share: NDArray[np.float64] | None = None
     unsteady: NDArray[np.complex128] | None = None
+    folded: NDArray[np.complex128] | None = None
 
     def rows(self, rows: NDArray[np.int_]) -> Conditions:
         """Return the conditions of some of the records."""
@@ -145,17 +153,47 @@ def predict(
     bench : Bench
         Nuisances, whose unknowns are among the values.
     """
-    parts = []
-    groups = bench.groups(believed.effects, values)
-    for rows, known in groups:
-        group = {name: column[rows] for name, column in values.items()}
-        present = (*known, *effects)
-        parts.append(
-            _predict_group(believed, rig, conditions, orders, group, present, start, effort)
+    moves = partial(_moves, conditions)
+    moving = tuple(effect for effect in effects if moves(effect))
+    further = tuple(effect for effect in effects if not moves(effect))
+    groups = bench.groups(believed.effects, values, moves)
+    parts = [
+        _predict_group(
+            believed,
+            rig,
+            conditions,
+            orders,
+            {name: column[rows] for name, column in values.items()},
+            (*present, *moving),
+            [(places, (*own, *further)) for places, own in parts],
+            start,
+            effort,
         )
+        for rows, present, parts in groups
+    ]
     if len(parts) == 1:
         return parts[0]
-    return _in_order(parts, [rows for rows, _ in groups], len(conditions))
+    return _in_order(parts, [group.rows for group in groups], len(conditions))
+
+
+def _moves(conditions: Conditions, effect: DriveEffect) -> bool:
+    """Tell whether an effect is a part of the equations of motion as they are solved."""
+    if type(effect).apply is DriveEffect.apply:
+        return False
+    return conditions.lead is None or not _is_line_of_bench(effect)
+
+
+def _is_line_of_bench(effect: DriveEffect) -> bool:
+    """Tell whether an effect is a torque of the bench that is one line whatever the motion.
+
+    Such lines are small, so that the motion is linear in them or nearly so. A ripple of the drive
+    that is looked for may be strong: one of .02 N.m moves the speed of an input by a fifth at 30
+    r/min, which makes errors of its order and others.
+    """
+    port_and_law = effect.at_port()
+    if port_and_law is None or port_and_law[0] not in effect_named(effect.name).nuisance_at:
+        return False
+    return port_and_law[1].line(np.zeros(1)) is not None
 
 
 def _predict_group(
@@ -164,47 +202,65 @@ def _predict_group(
     conditions: Conditions,
     orders: Sequence[float],
     values: dict[str, NDArray[np.float64]],
-    present: Sequence[DriveEffect],
+    moving: Sequence[DriveEffect],
+    parts: Sequence[tuple[NDArray[np.int_], tuple[DriveEffect, ...]]],
     start: SteadyMotion | None,
     effort: Effort,
 ) -> Prediction:
-    """Return the prediction of vectors that share all effects ``present``."""
+    """Return the prediction of vectors that share all effects ``moving``.
+
+    Those of each of the ``parts`` share the effects that only add to readings, too.
+    """
     count, records = len(values["offset"]), len(conditions)
     gain = 1.0 + values["output_torque_gain"][:, None]
-    of_torques = _torque_readings(present, conditions)
-    load = conditions.output_torque - of_torques[1] - values["output_torque_zero"][:, None]
-    load = load / gain
-    coefficients = coefficients_of(believed, values, present, records)
+    of_torques = np.empty((count, 2, records))
+    for places, further in parts:
+        of_torques[places] = _torque_readings((*moving, *further), conditions)
+    load = conditions.output_torque - of_torques[:, 1] - values["output_torque_zero"][:, None]
+    load = (load / gain).ravel()
+    coefficients = coefficients_of(believed, values, moving, records)
     coefficients = replace(coefficients, elapsed=np.tile(conditions.elapsed, count))
     if conditions.temperature is not None:
         coefficients = replace(coefficients, temperature=np.tile(conditions.temperature, count))
-    nearby = None if start is None else start.rows(np.tile(np.arange(records), count))
     speed = np.tile(conditions.input_speed, count)
     lead = None
     if conditions.lead is not None:
         lead = Lead(np.array(orders, dtype=float), np.tile(conditions.lead, (count, 1)))
-    balance = steady_motions(coefficients, speed, load.ravel(), rig, nearby, effort, lead)
+    solved, again = _different_motions(values, load.reshape(count, records))
+    cases = _cases(solved, records)
+    balance = steady_motions(
+        coefficients.rows(cases),
+        speed[cases],
+        load[cases],
+        rig,
+        None if start is None else start.rows(np.tile(np.arange(records), len(solved))),
+        effort,
+        None if lead is None else lead.rows(cases),
+    ).rows(_cases(again, records))
     at_brake = rig.output_torque_at == "brake"
-    output_torque = balance.brake_torque if at_brake else balance.coupling_torque
-    error = balance.transmission_error
-    for effect in present:
-        turned = effect.turned_back(balance.torus.orders * speed[:, None])
-        error = error if turned is None else error + turned * balance.coupling_torque
-    channels = [
-        error,
-        balance.motor_torque,
-        output_torque,
-        balance.lead,
-        _motor_ripple(balance, coefficients) + np.zeros_like(balance.lead),
-        balance.slower,
-    ]
-    lines = _lines(balance, channels, orders, believed.ratio, conditions)
+    channels = np.stack(
+        [
+            balance.transmission_error,
+            balance.motor_torque,
+            balance.brake_torque if at_brake else balance.coupling_torque,
+            balance.lead,
+            _motor_ripple(balance, coefficients, load),
+            balance.slower,
+            balance.coupling_torque,
+        ],
+        axis=1,
+    )
+    predicted, channels = _with_further(
+        balance, channels, [(_cases(places, records), further) for places, further in parts],
+        coefficients, speed, load, at_brake,
+    )  # fmt: skip
+    lines = _lines(predicted, channels, orders, believed.ratio, conditions)
     response = None
     if lead is not None:
-        response = lead_response(coefficients.at_loads(load.ravel()), balance.slopes, speed, orders)
+        response = lead_response(coefficients.at_loads(load), balance.slopes, speed, orders)
         if rig.output_torque_at == "brake":
             response = response.without_load()
-        _follow_lead(lines, response, lead, balance)
+        _follow_lead(lines, response, lead, balance, coefficients.input_inertia)
         if conditions.unsteady is not None:
             unsteady = np.tile(conditions.unsteady, (count, 1, 1))
             lines[:, :3] += np.einsum("nck,nkm->ncm", response.slow, unsteady)
@@ -215,22 +271,91 @@ def _predict_group(
             lines[:, :3] += response.channels * (rest * (lines[:, 3] - lead.phasors))[:, None]
     lines[:, 1] += lines[:, 4]
     lines = lines[:, : len(CHANNELS)]
-    means = np.array([channel[:, 0].real for channel in channels[: len(CHANNELS)]])
+    means = channels[:, : len(CHANNELS), 0].real
     phasors = lines.reshape(count, records, len(CHANNELS), len(orders))
-    mean = means.T.reshape(count, records, len(CHANNELS))
-    mean[..., 1:3] += of_torques.T
-    _add_sensor_errors(believed.ratio, conditions, orders, values, present, mean, phasors)
+    mean = means.reshape(count, records, len(CHANNELS)).copy()
+    mean[..., 1:3] += of_torques.swapaxes(1, 2)
+    for places, further in parts:
+        some = {name: values[name][places] for name in READING}
+        readings = mean[places], phasors[places]
+        if conditions.folded is not None and (beyond := beyond_orders(further, orders)):
+            rows = _cases(places, records)
+            held_by = SpeedLoop(rig.proportional, rig.integral)
+            folded = folded_down(
+                coefficients.at_loads(load).rows(rows), balance.rows(rows), speed[rows], held_by,
+                beyond, conditions.folded, at_brake,
+            )  # fmt: skip
+            for reading, added in zip(readings, folded, strict=True):
+                reading += added.reshape(reading.shape)
+        _add_sensor_errors(believed.ratio, conditions, orders, some, (*moving, *further), *readings)
+        mean[places], phasors[places] = readings
     return Prediction(mean, phasors, balance, response)
 
 
 def _follow_lead(
-    lines: NDArray[np.complex128], response: LeadResponse, lead: Lead, balance: SteadyMotion
+    lines: NDArray[np.complex128],
+    response: LeadResponse,
+    lead: Lead,
+    balance: SteadyMotion,
+    inertia: NDArray[np.float64],
 ) -> None:
-    """Add to lines (n, 6, m) what follows the lead at orders that the torus does not hold."""
-    beyond = [balance.torus.find(order) is None for order in lead.orders.tolist()]
-    phasors = np.where(beyond, lead.phasors, 0.0)
+    """Add to lines (n, 6, m) what follows the lead at orders that the torus does not hold.
+
+    Over the angle of the input its speed is Omega / (1 - l') for a lead l of slope l' = dl/dangle,
+    and its acceleration half the slope of the square of that. So two lines of the lead, as of a
+    strong ripple at a low speed, beat to the second order: speed is Omega (1 + l' + l'^2), and its
+    square Omega^2 (1 + 2 l' + 3 l'^2). What ``inertia`` (n,) takes of that at the input, N.m.
+    """
+    held = tuple(balance.torus.find(order) is not None for order in lead.orders.tolist())
+    rates = response.rate * lead.phasors
+    phasors = np.where(held, 0.0, lead.phasors)
     lines[:, :3] += response.channels * phasors[:, None]
-    lines[:, 5] -= response.rate * phasors
+    lines[:, 5] -= np.where(held, 0.0, rates)
+    beats = _beats(tuple(lead.orders.tolist()), held)
+    if beats.places.any():
+        speed = (response.rate[:, :1] / (1j * lead.orders[0])).real
+        second = rates[:, beats.second]
+        np.conjugate(second, out=second, where=beats.conjugate)
+        beating = (rates[:, beats.first] * second) @ beats.places / speed
+        losses = balance.slopes[:, 3:] + 1.5 * inertia[:, None] * response.rate
+        lines[:, 1] += losses * beating
+        lines[:, 5] -= beating
+
+
+class _Beats(NamedTuple):
+    """Pairs of lines whose product is at an analysed order, with a second that may be conjugate.
+
+    ``places`` (k, m) are the shares of a pair in a square at each order.
+    """
+
+    first: NDArray[np.int_]
+    second: NDArray[np.int_]
+    conjugate: NDArray[np.bool_]
+    places: NDArray[np.float64]
+
+
+@lru_cache(maxsize=64)
+def _beats(orders: tuple[float, ...], held: tuple[bool, ...]) -> _Beats:
+    """Return the pairs of lines that beat at one of the orders; without those of a torus alone."""
+    pairs = list[tuple[int, int, bool, int, float]]()
+    for k, order in enumerate(orders):
+        for j, lower in enumerate(orders[: k + 1]):
+            beats = (False, order + lower, 0.5 if k == j else 1.0), (True, order - lower, 1.0)
+            for of_difference, beat, share in beats:
+                at = np.flatnonzero(np.abs(np.subtract(orders, beat)) < _SAME)
+                pairs += [
+                    (k, j, of_difference, place, share)
+                    for place in at.tolist()
+                    if not (held[k] and held[j] and held[place])
+                ]
+    places = np.zeros((len(pairs), len(orders)))
+    for row, (_, _, _, place, share) in enumerate(pairs):
+        places[row, place] = share
+    first, second = np.array([pair[:2] for pair in pairs], dtype=int).reshape(-1, 2).T
+    conjugate = np.array([pair[2] for pair in pairs], dtype=bool)
+    for array in (first, second, conjugate, places):
+        array.flags.writeable = False
+    return _Beats(first, second, conjugate, places)
 
 
 def _loop_lead(
@@ -299,9 +424,68 @@ def coefficients_of(
     return coefficients
 
 
-def _lines(
+def _cases(vectors: NDArray[np.int_], records: int) -> NDArray[np.int_]:
+    """Return the rows of all records of vectors, vectors outermost."""
+    return np.add.outer(records * vectors, np.arange(records)).ravel()
+
+
+def _different_motions(
+    values: dict[str, NDArray[np.float64]], load: NDArray[np.float64]
+) -> tuple[NDArray[np.int_], NDArray[np.int_]]:
+    """Return vectors of which no two move alike, and for each of all which of them it moves as.
+
+    ``load`` (v, r) is that of all records; what else are readings moves nothing.
+    """
+    moving = [values[name] for name in values if name in MECHANICAL or name.startswith("error_")]
+    table = np.column_stack([*moving, load])
+    _, first, again = np.unique(table, axis=0, return_index=True, return_inverse=True)
+    # In the order of the vectors, whose first one is where the others come from.
+    order = np.argsort(first)
+    return first[order], np.argsort(order)[again.ravel()]
+
+
+def _with_further(
     balance: SteadyMotion,
-    channels: Sequence[NDArray[np.complex128]],
+    channels: NDArray[np.complex128],
+    parts: Sequence[tuple[NDArray[np.int_], tuple[DriveEffect, ...]]],
+    coefficients: Coefficients,
+    speed: NDArray[np.float64],
+    load: NDArray[np.float64],
+    at_brake: bool,
+) -> tuple[NDArray[np.float64], NDArray[np.complex128]]:
+    """Return orders, and k channels at them, with what effects add that do not change the motion.
+
+    The last channel is the torque of the output, which turns what holds the sensor of its angle.
+    """
+    # All parts have the same effects, with numbers of their own.
+    most = len(_torque_lines_of(parts[0][1]))
+    of_lines, lines = np.empty(0), np.zeros((*channels.shape[:2], most), dtype=complex)
+    for rows, further in parts if most else ():
+        laws = _torque_lines_of(further)
+        added = torque_lines(
+            coefficients.rows(rows), laws, balance.rows(rows), speed[rows], load[rows]
+        )
+        of_lines, still = added.orders, np.zeros_like(added.torsion)
+        of_output = added.brake_torque if at_brake else added.coupling_torque
+        of_motor = added.motor_torque, of_output, still, added.ripple, still
+        lines[rows] = np.stack([added.torsion, *of_motor, added.coupling_torque], axis=1)
+    orders = np.append(balance.torus.orders, of_lines)
+    channels = np.concatenate([channels, lines], axis=2)
+    for rows, further in parts:
+        for effect in further:
+            turned = effect.turned_back(orders * speed[rows, None])
+            if turned is not None:
+                channels[rows, 0] += turned * channels[rows, -1]
+    return orders, channels
+
+
+def _torque_lines_of(effects: Sequence[DriveEffect]) -> list[tuple[str, Law]]:
+    return [placed for effect in effects if (placed := effect.at_port()) is not None]
+
+
+def _lines(
+    predicted_orders: NDArray[np.float64],
+    channels: NDArray[np.complex128],
     orders: Sequence[float],
     ratio: float,
     conditions: Conditions,
@@ -310,13 +494,12 @@ def _lines(
 
     A case that has diverged is NaN in all its harmonics, and so at all orders.
     """
-    predicted_orders = tuple(balance.torus.orders.tolist())
     angle, travel = (
         np.zeros(len(conditions)) if column is None else column
         for column in (conditions.input_angle, conditions.travel)
     )
-    read = _readings(predicted_orders, tuple(orders), ratio)
-    lines = np.stack([channel[:, read.columns] for channel in channels], axis=1)
+    read = _readings(tuple(predicted_orders.tolist()), tuple(orders), ratio)
+    lines = channels[:, :, read.columns]
     np.conjugate(lines, out=lines, where=read.conjugate)
     if read.beyond.any():
         turned, passed = (np.outer(angles, read.beyond) for angles in (angle, travel))
@@ -359,13 +542,15 @@ def _readings(predicted: tuple[float, ...], orders: tuple[float, ...], ratio: fl
     return readings
 
 
-def _motor_ripple(balance: SteadyMotion, coefficients: Coefficients) -> NDArray[np.complex128]:
-    """Return the harmonics of a motor's ripple as its torque sensor reads it, (1, n_harmonics)."""
-    total = np.zeros((1, len(balance.torus.orders)), dtype=complex)
+def _motor_ripple(
+    balance: SteadyMotion, coefficients: Coefficients, load: NDArray[np.float64]
+) -> NDArray[np.complex128]:
+    """Return the harmonics of a motor's ripple as its torque sensor reads it, (n, n_harmonics)."""
+    total = np.zeros_like(balance.lead)
     for port, law in coefficients.laws:
-        for order in law.orders if port == "input" and law.drives else ():
-            column, conjugate = balance.torus.place(order)
-            total[:, column] += law.driving.conjugate() if conjugate else law.driving
+        if port == "input" and law.drives and (opposing := law.line(load)) is not None:
+            column, conjugate = balance.torus.place(law.orders[0])
+            total[:, column] -= opposing.conj() if conjugate else opposing
     return total
 
 

@@ -15,10 +15,12 @@ from numpy.typing import NDArray
 
 from pymoo_hdte.discrepancy._evidence.order_lines.evidence import Data
 from pymoo_hdte.discrepancy._evidence.order_lines.features import MEANS, Features
-from pymoo_hdte.discrepancy._records.believed import BelievedDrive
+from pymoo_hdte.discrepancy._evidence.order_lines.folded_lines import folded_orders
+from pymoo_hdte.discrepancy._records.believed import BelievedDrive, Rig
 from pymoo_hdte.discrepancy._records.cleaning.session_zero import places_of_change
 from pymoo_hdte.discrepancy._selection.fitting import Fit
 from pymoo_hdte.drive._effects import DriveSizes
+from pymoo_hdte.effects.ripple import cogging_of
 
 LARGEST = 5.0
 """Largest missing line of the transmission error, in units of the residual of the base: the base
@@ -58,6 +60,10 @@ class Scales:
         Mean of the records, K, if all have a temperature and these spread enough; else 0.
     loads_differ : bool
         Whether the records are taken under different loads.
+    motor : tuple of float
+        Orders at which the motor of the bench cogs, if its poles and slots are stated.
+    folded : tuple of float
+        Orders above those that records analyse at which a motor may show in them all the same.
     """
 
     speed: float
@@ -73,6 +79,8 @@ class Scales:
     series: tuple[float, ...] = ()
     swept: bool = False
     loads_differ: bool = False
+    motor: tuple[float, ...] = ()
+    folded: tuple[float, ...] = ()
 
 
 def scales_of(data: Data, base: Fit) -> Scales:
@@ -109,7 +117,14 @@ def scales_of(data: Data, base: Fit) -> Scales:
         series=_series(features),
         swept=bool(data.torsion),
         loads_differ=bool(np.ptp(when.output_torque) > least),
+        motor=motor_orders(data.campaign.rig),
+        folded=folded_orders(when.folded, noise[:, features.places(1)].min(axis=2) / input_torque),
     )
+
+
+def motor_orders(rig: Rig) -> tuple[float, ...]:
+    """Return the orders at which the motor of a bench cogs; none where it is not known."""
+    return cogging_of(rig.motor_slots, rig.motor_poles) if rig.motor_slots else ()
 
 
 def _temperature(data: Data) -> float:
@@ -223,6 +238,8 @@ def port_sizes(
         changes=scales.changes,
         series=scales.series,
         loads_differ=scales.loads_differ,
+        motor=scales.motor,
+        folded=scales.folded,
         readings=(scales.input_torque, scales.output_torque),
         largest_readings=(LARGEST * scales.input_torque, LARGEST * scales.output_torque),
     )

@@ -120,6 +120,10 @@ class Lead:
     orders: NDArray[np.float64]
     phasors: NDArray[np.complex128]
 
+    def rows(self, rows: NDArray[np.int_]) -> Lead:
+        """Return the motion of some of the rows."""
+        return Lead(self.orders, self.phasors[rows])
+
     def on(self, torus: Torus) -> NDArray[np.complex128]:
         """Return the harmonics (n, n_harmonics) of a torus; those that it has not are left out."""
         harmonics = np.zeros((len(self.phasors), len(torus.orders)), dtype=complex)

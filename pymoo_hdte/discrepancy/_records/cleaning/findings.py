@@ -80,6 +80,8 @@ class NoiseFinding:
         `Rules.noise_mismatch`, otherwise ``stated``.
     reason : str
         How it was found, or why it was not.
+    step : float
+        Step in which a channel is read, rad or N.m, where it hides the stated noise; else 0.
     """
 
     name: str
@@ -87,6 +89,7 @@ class NoiseFinding:
     found: float | None
     used: float
     reason: str
+    step: float = 0.0
 
     @property
     def replaced(self) -> bool:

@@ -144,7 +144,8 @@ def coarse_readings(
                 size = f"{np.median(steps) / ARCSEC:.3g} arcsec"
             used = float(max(used, noise[name].used))
             reason = f"{channel.replace('_', ' ')} is read in steps of {size}"
-            noise[name] = replace(noise[name], found=used, used=used, reason=reason)
+            step = float(np.median(steps))
+            noise[name] = replace(noise[name], found=used, used=used, reason=reason, step=step)
     return read, list(noise.values())
 
 

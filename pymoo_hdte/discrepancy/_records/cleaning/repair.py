@@ -236,6 +236,8 @@ def repaired_run(
         return RepairedRun(record, tuple(search.faults), None, False)
     search.note_gaps()
     try:
+        if not search.take_near_ends(orders):
+            return RepairedRun(record, tuple(search.faults), None, False)
         residual = search.run(orders)
     except InvalidInput:
         # A record that cannot tell these lines apart is refused where its lines are measured,
@@ -300,6 +302,36 @@ class _RunSearch(RowSearch[RunningRecord]):
             self.record, self.rows, self.faults = rough
         self._take_settling(self.fitted(orders), ())
         return self.fitted(orders).whole_residual
+
+    def take_near_ends(self, orders: Sequence[float]) -> bool:
+        """Leave out rows whose lines come near the end of a saturated range; return if enough stay.
+
+        Rows at the end are left out already, but of those that come near it only rows stay whose
+        noise took them away from it. Their mean is off by noise times the density of a normal
+        distribution at the distance: less than that of all rows is known to beyond where the
+        density is one over the root of their number.
+        """
+        ends = [fault for fault in self.faults if fault.kind == "saturated"]
+        torques = [fault for fault in ends if fault.channel in RUNNING[2:]]
+        if not torques:
+            return True
+        fit, near = self.fitted(orders), np.zeros(len(self.rows), dtype=bool)
+        residual = fit.whole_residual
+        lines = np.vstack([fit.values(part) for part in fit.parts]) - residual
+        count = len(self.rows) + sum(fault.rows for fault in ends)
+        distance = float(np.sqrt(max(np.log(count / (2.0 * np.pi)), 0.0)))
+        for fault in torques:
+            place = RUNNING.index(fault.channel) - 1
+            side = np.sign(fault.size - np.median(lines[:, place]))
+            free = side * (fault.size - lines[:, place]) > distance * np.std(residual[:, place])
+            further = int(np.count_nonzero(~(free | near)))
+            self.faults[self.faults.index(fault)] = replace(fault, rows=fault.rows + further)
+            near |= ~free
+        kept = int(np.count_nonzero(~near))
+        if kept < max(FEWEST_SAMPLES, (1.0 - self.rules.saturated_share) * count):
+            return False
+        self._keep_rows(~near)
+        return spans_a_turn(self.record, self.ratio)
 
     def fitted(self, orders: Sequence[float]) -> LineFit:
         """Return the lines of the remaining rows, fitted once for the same rows."""

@@ -239,6 +239,7 @@ def _text(logs: LogFolder, roles: Roles, refusal: str) -> str:
         *remark(f"{EDIT}: of the transmission error from record to record, not known."),
         "repeatability_arcsec = 0.3",
         '# output_torque_at = "brake"  # if its sensor sits behind the load; by default "drive"',
+        "# motor_poles = 8  # with motor_slots = 12, where both are known: lines at these cog",
         "",
         *_table(logs, roles, signs),
         *_records(logs, roles, tests),

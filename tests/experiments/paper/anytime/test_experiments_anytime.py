@@ -5,13 +5,6 @@ from itertools import product
 import numpy as np
 import pytest
 
-from experiments.comparing.runs import (
-    AS_PRINTED,
-    FIRST_STEP,
-    OptimisationRun,
-    robust_problem,
-)
-from experiments.comparing.statistics import a12_intervals, effect_size, mean_intervals
 from experiments.paper.anytime.data import (
     EVERYONE,
     FULL,
@@ -40,8 +33,15 @@ from experiments.paper.anytime.moments import (
     problem_with,
 )
 from experiments.paper.anytime.readings import PRINTED, Reading, factors, readings
-from experiments.runner.campaign import Campaign, Run
 from experiments.runner.registry import Context
+from pymoo_hdte._comparing.runs import (
+    AS_PRINTED,
+    FIRST_STEP,
+    OptimisationRun,
+    robust_problem,
+)
+from pymoo_hdte._comparing.statistics import a12_intervals, effect_size, mean_intervals
+from pymoo_hdte._runner.campaign import Campaign, Run
 from pymoo_hdte.problems import RobustDTE
 
 ON = Contested("calibrated", EXACT, AS_PRINTED)

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from experiments.runner.campaign import Run
 from experiments.runner.committed import DATA, read_rows
 from experiments.studies.blind.campaigns import campaign_of, hiding
 from experiments.studies.blind.cases import Case, all_cases
 from experiments.studies.blind.data import outcome, read_outcomes
 from experiments.studies.blind.experiment import OUTCOMES, SECONDS
 from experiments.studies.blind.scoring import COLUMNS, verdict_scores
+from pymoo_hdte._runner.campaign import Run
 from pymoo_hdte.discrepancy._verdicts.drive import examine_drive
 
 DOZEN = 12

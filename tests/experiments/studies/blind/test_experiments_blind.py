@@ -16,9 +16,7 @@ from planted_features import analysed, known_data, listed, measured
 
 from experiments.command_line import FAILED, main
 from experiments.runner import committed
-from experiments.runner.campaign import Campaign, Run
 from experiments.runner.registry import Context
-from experiments.runner.result import MISSED, NOT_SHOWN, SHOWN
 from experiments.studies.blind import campaigns
 from experiments.studies.blind import experiment as blind
 from experiments.studies.blind import scoring as blind_scoring
@@ -51,6 +49,8 @@ from experiments.studies.blind.targets import (
     reliability,
 )
 from experiments.studies.blind.truth import NAMES, PORTS, STATUSES, code_of_set, words_of_set
+from pymoo_hdte._runner.campaign import Campaign, Run
+from pymoo_hdte._runner.result import MISSED, NOT_SHOWN, SHOWN
 from pymoo_hdte.discrepancy._evidence.order_lines.evidence import Data, start_parameters
 from pymoo_hdte.discrepancy._evidence.order_lines.features import measure
 from pymoo_hdte.discrepancy._selection.candidate import Layout, out_of_tolerance

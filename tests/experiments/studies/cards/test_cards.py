@@ -1,5 +1,7 @@
 """Cards of the problems: hardness, merged campaigns, separation, pages."""
 
+import re
+
 import numpy as np
 import pytest
 from pymoo.core.problem import Problem
@@ -166,3 +168,16 @@ def test_every_card_is_reached_from_the_index(numbers):
 def test_tables_keep_their_shape_in_markdown(numbers):
     rows = pages.table_text(separation_table(Numbers(*numbers))).splitlines()
     assert len({row.count("|") for row in rows}) == 1
+
+
+@pytest.mark.parametrize("library", ["pymoo", "pygmo"])
+def test_the_index_shows_how_to_reproduce_numbers_of_its_cards(library, numbers, capsys):
+    pytest.importorskip(library)
+    shown = re.findall(
+        r"IGD ([\d.]+):\n\n```python\n(.*?)```", pages.index_page(numbers), re.DOTALL
+    )
+    ((igd, lines),) = [one for one in shown if one[1].split()[1].partition(".")[0] == library]
+    assert len([*filter(None, lines.splitlines())]) == 5
+    exec(lines, {})
+    (found,) = re.findall(r"igd=([\d.]+)", capsys.readouterr().out)
+    assert float(found) == pytest.approx(float(igd), rel=5e-3)

@@ -9,8 +9,6 @@ from pymoo.optimize import minimize
 from scipy.stats import mannwhitneyu
 
 from experiments.comparing.contestants import CONTESTANTS
-from experiments.comparing.indicators import CORNER, IndicatorsAgainst
-from experiments.runner.campaign import Campaign
 from experiments.runner.registry import Context
 from experiments.studies.contest import peers, swarm_parts
 from experiments.studies.contest.peers_data import (
@@ -34,6 +32,8 @@ from experiments.studies.contest.peers_tables import (
 )
 from experiments.studies.contest.problems import BENCHMARKS, problem_of
 from experiments.studies.contest.reduced_swarms import SWARM_VARIANTS
+from pymoo_hdte._comparing.indicators import CORNER, IndicatorsAgainst
+from pymoo_hdte._runner.campaign import Campaign
 from pymoo_hdte.algorithms import AMPMOPSO
 from pymoo_hdte.checks import InvalidInput
 

@@ -6,7 +6,6 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from experiments.runner.campaign import Campaign
 from experiments.runner.committed import committed_file, read_rows
 from experiments.runner.registry import Context
 from experiments.studies.measured import mujoco_study, other_tools, real
@@ -24,6 +23,7 @@ from experiments.studies.measured.known_answers import (
     judged,
 )
 from experiments.studies.measured.rigs import RIGS, SHARED
+from pymoo_hdte._runner.campaign import Campaign
 from pymoo_hdte.effects.friction import CoulombFriction
 from pymoo_hdte.mechanism import BelievedValue, Input, LawAt, Mechanism, Port, Record
 from pymoo_hdte.mechanism.simulation import simulate_mechanism

@@ -2,10 +2,10 @@
 
 import pytest
 
-from experiments.runner.campaign import Campaign
 from experiments.runner.committed import committed_file, read_rows
 from experiments.runner.registry import Context
 from experiments.studies.measured.sealed_rigs import COLUMNS, NAME, RIGS, SECONDS, run, verdict_row
+from pymoo_hdte._runner.campaign import Campaign
 from pymoo_hdte.discrepancy import analyse, read_campaign
 
 

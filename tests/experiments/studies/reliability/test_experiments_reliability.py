@@ -16,9 +16,7 @@ from places import ROOT
 
 from experiments.command_line import main
 from experiments.runner import committed
-from experiments.runner.campaign import Campaign, Run
 from experiments.runner.registry import Context
-from experiments.runner.result import Result
 from experiments.studies.reliability import data
 from experiments.studies.reliability import experiment as reliability
 from experiments.studies.reliability import kill as reliability_kill
@@ -47,6 +45,8 @@ from experiments.studies.reliability.fuzz import (
 from experiments.studies.reliability.inputs import KINDS, THROUGH_COMMANDS, Wrong
 from experiments.studies.reliability.mutations import Link, mutated, put
 from experiments.studies.reliability.text import BYTES, TEXTS
+from pymoo_hdte._runner.campaign import Campaign, Run
+from pymoo_hdte._runner.result import Result
 
 LOADERS = [name for name in KINDS if name not in THROUGH_COMMANDS]
 
@@ -209,7 +209,7 @@ def test_torn_and_differing_files_are_counted(tmp_path, monkeypatch):
 def test_a_kill_in_the_midst_of_writing_leaves_whole_files_only(step, names, sizes, tmp_path):
     script = (
         "from pathlib import Path; from experiments.studies.reliability.kill import _die_at; "
-        "from experiments.runner.store import write_atomically; _die_at({step}); "
+        "from pymoo_hdte._runner.store import write_atomically; _die_at({step}); "
         "[write_atomically(Path(r'{out}') / name, b'0123456789') for name in 'ab']"
     )
     command = [sys.executable, "-c", script.format(step=step, out=tmp_path)]
@@ -220,7 +220,7 @@ def test_a_kill_in_the_midst_of_writing_leaves_whole_files_only(step, names, siz
 
 def test_workers_end_with_a_command_that_is_killed():
     script = (
-        "import time; from experiments.runner.workers import make_executor\n"
+        "import time; from pymoo_hdte._runner.workers import make_executor\n"
         "executor = make_executor(2)\n"
         "list(executor.map(abs, range(8))); print('ready', flush=True); time.sleep(60)"
     )
@@ -237,7 +237,7 @@ def test_a_disk_that_fills_up_keeps_the_former_file_and_no_part(tmp_path, size):
     path.write_bytes(b"former")
     script = (
         "import resource; from pathlib import Path\n"
-        "from experiments.runner.store import write_atomically\n"
+        "from pymoo_hdte._runner.store import write_atomically\n"
         f"resource.setrlimit(resource.RLIMIT_FSIZE, ({size}, {size}))\n"
         f"write_atomically(Path({str(path)!r}), b'x' * 5000)"
     )

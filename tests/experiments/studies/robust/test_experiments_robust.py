@@ -3,9 +3,7 @@
 import numpy as np
 import pytest
 
-from experiments.runner.campaign import Campaign
 from experiments.runner.registry import Context
-from experiments.runner.result import MISSED, NOT_SHOWN, SHOWN
 from experiments.studies.robust.data import (
     METHODS,
     OURS,
@@ -33,6 +31,8 @@ from experiments.studies.robust.rivals import (
     until_it_stays,
 )
 from experiments.studies.robust.task import Task
+from pymoo_hdte._runner.campaign import Campaign
+from pymoo_hdte._runner.result import MISSED, NOT_SHOWN, SHOWN
 from pymoo_hdte.problems import robust_problem
 
 

@@ -5,9 +5,7 @@ from itertools import product
 import numpy as np
 import pytest
 
-from experiments.runner.campaign import Campaign
 from experiments.runner.registry import Context
-from experiments.runner.result import MISSED, NOT_SHOWN, SHOWN
 from experiments.studies.suites import experiment
 from experiments.studies.suites.bbob_tables import BEST, CITED, curves, duels, reached
 from experiments.studies.suites.coco import MARKS
@@ -33,6 +31,8 @@ from experiments.studies.suites.suite_tables import (
     ranks_together,
     signs_together,
 )
+from pymoo_hdte._runner.campaign import Campaign
+from pymoo_hdte._runner.result import MISSED, NOT_SHOWN, SHOWN
 
 RIVALS = ("NSGA-II", "SMS-EMOA", "C-TAEA")
 

@@ -4,6 +4,7 @@ import time
 
 import numpy as np
 import pytest
+from moocore import is_nondominated
 from pymoo.problems.multi.zdt import ZDT1
 
 from experiments.runner import registry
@@ -11,8 +12,9 @@ from experiments.runner.registry import ExtraMissing
 from experiments.studies.suites import coco, own_time
 from experiments.studies.suites.coco import MARKS, TARGETS, shares
 from experiments.studies.suites.jobs import BbobRun, SuiteRun, measured
-from experiments.studies.suites.peers import BBOB_PEERS, OURS, PEERS, takes
+from experiments.studies.suites.peers import BBOB_PEERS, OF_OUR_SIZE, OURS, PEERS, takes
 from experiments.studies.suites.problems import front_of, problem_of
+from pymoo_hdte.algorithms.compact import size_for
 from pymoo_hdte.checks import InvalidInput
 
 
@@ -37,6 +39,23 @@ def test_the_budget_is_spent_and_the_seed_decides(peer):
     assert 250 < first.spent <= 300
     np.testing.assert_array_equal(first.F, again.F)
     assert first.F.shape != other.F.shape or not np.array_equal(first.F, other.F)
+
+
+@pytest.mark.parametrize("name", OF_OUR_SIZE)
+def test_rivals_of_our_size_offer_the_front_of_all_that_they_evaluated(name):
+    evaluated = []
+
+    class Watched(ZDT1):
+        def _evaluate(self, x, out, *args, **kwargs):
+            super()._evaluate(x, out, *args, **kwargs)
+            evaluated.append(out["F"])
+
+    (offer,) = OF_OUR_SIZE[name].run(Watched(), (400,), 1)
+    everything = np.vstack(evaluated)
+    assert {len(F) for F in evaluated} == {size_for(400)}
+    assert offer.spent == len(everything) <= 400
+    front = everything[is_nondominated(everything)]
+    np.testing.assert_array_equal(np.sort(offer.F, axis=0), np.sort(front, axis=0))
 
 
 def test_who_takes_what():

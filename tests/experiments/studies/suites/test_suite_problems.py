@@ -7,6 +7,7 @@ from pymoo.problems import get_problem
 
 from experiments.runner.committed import DATA, read_rows
 from experiments.studies.suites.formulas import lz09
+from experiments.studies.suites.formulas.df import NUMBERS, TIMES, df_designs, df_front, make_df
 from experiments.studies.suites.formulas.engineering import MEMBERS, make_engineering
 from experiments.studies.suites.formulas.imop import N_PLACES, imop_front, make_imop
 from experiments.studies.suites.formulas.lz09 import lz09_front, make_lz09
@@ -57,6 +58,22 @@ def test_the_curves_of_lz09_lead_to_its_front(number):
     F = problem.evaluate(X)
     assert max(float(np.abs(front - row).max(axis=1).min()) for row in F) < 0.02
     assert np.all(worse >= F - 1e-12)
+
+
+@pytest.mark.parametrize("time", TIMES)
+@pytest.mark.parametrize("number", NUMBERS)
+def test_no_design_of_df_lies_below_its_front(number, time):
+    problem, front = make_df(number, time), df_front(number, time)
+    rng = np.random.default_rng(number)
+    X = rng.permutation(df_designs(number, time))[:1000]
+    assert np.all((problem.xl <= X) & (problem.xu >= X))
+    near = X + 0.02 * rng.standard_normal(X.shape) * (rng.random(X.shape) < 0.3)
+    anywhere = rng.uniform(problem.xl, problem.xu, X.shape)
+    F = problem.evaluate(np.vstack([np.clip(near, problem.xl, problem.xu), anywhere]))
+    # Some designs are optimal themselves: a rounding below the front is none.
+    assert is_nondominated(np.vstack([F + 1e-9, front]))[len(F) :].all()
+    # What one design costs does not depend on the others.
+    np.testing.assert_array_equal(problem.evaluate(X[:1])[0], problem.evaluate(X[:9])[0])
 
 
 def test_engineering_problems_have_the_published_corners():

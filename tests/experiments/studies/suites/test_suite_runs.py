@@ -2,11 +2,11 @@
 
 import pytest
 
-from experiments.runner.campaign import Campaign
 from experiments.studies.suites import renew
 from experiments.studies.suites.data import Outcome
 from experiments.studies.suites.peers import OURS
 from experiments.studies.suites.protocol import BbobPart, SuitePart
+from pymoo_hdte._runner.campaign import Campaign
 from pymoo_hdte.checks import InvalidInput
 
 PART = SuitePart("IMOP", (OURS, "random search", "NSGA-II"), (100, 200), seeds=2)

@@ -1,0 +1,1 @@
+"""Many independent jobs on workers, kept on disk; results as tables and figures, and their page."""

@@ -1,0 +1,101 @@
+"""Lines of a motor above all analysed orders, which averaged rows show at lower ones.
+
+A row that is the mean of several samples lets through a part of what lies above the Nyquist order
+of the rows. It shows at an order that differs from record to record, so that no law of the drive
+has it, and an effect would be named for it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pymoo_hdte.drive import Coefficients, DriveEffect, LawAtPort, SpeedLoop, SteadyMotion
+from pymoo_hdte.drive._solve.lead_response import lead_response
+from pymoo_hdte.effects.ripple import COGGING_ORDERS, PeriodicTorque
+from pymoo_hdte.effects.unknowns import is_among
+
+Lines = NDArray[np.complex128]
+
+
+def beyond_orders(effects: Sequence[DriveEffect], orders: Sequence[float]) -> list[PeriodicTorque]:
+    """Return the lines of a motor above all analysed orders that averaging may fold down.
+
+    Parameters
+    ----------
+    effects : sequence of DriveEffect
+    orders : sequence of float
+        Analysed orders, cycles per input turn.
+    """
+    highest = max(orders, default=np.inf)
+    laws = [
+        effect.law for effect in effects if isinstance(effect, LawAtPort) and effect.port == "input"
+    ]
+    return [
+        law
+        for law in laws
+        if isinstance(law, PeriodicTorque) and law.drives and law.order > highest
+        if is_among(COGGING_ORDERS, law.order)
+    ]
+
+
+def folded_down(
+    coefficients: Coefficients,
+    balance: SteadyMotion,
+    speed: NDArray[np.float64],
+    loop: SpeedLoop,
+    torques: Sequence[PeriodicTorque],
+    folded: Lines,
+    at_brake: bool = False,
+) -> tuple[NDArray[np.float64], Lines]:
+    """Return the means (n, 4) and phasors (n, 4, m) that torques of a motor add to readings.
+
+    The input moves so far that its inertia, the drive and the loop together take each torque. Other
+    laws act with their mean slopes.
+
+    Parameters
+    ----------
+    coefficients : Coefficients
+        Coefficients of n cases, r records innermost.
+    balance : SteadyMotion
+        Their steady states without these torques.
+    speed : ndarray, shape (n,)
+        Mean speed of the input, rad/s.
+    loop : SpeedLoop
+    torques : sequence of PeriodicTorque
+    folded : ndarray of complex, shape (r, n_orders, 2, 1 + m)
+        As of `Conditions`.
+    at_brake : bool
+        Whether the sensor of the output's torque stands behind the load's inertia.
+    """
+    orders = [law.order for law in torques]
+    response = lead_response(coefficients, balance.slopes, speed, orders)
+    if at_brake:
+        response = response.without_load()
+    held = response.motor_torque + loop.proportional * response.rate + loop.integral
+    lead = np.array([law.amplitude * np.exp(1j * law.phase) for law in torques]) / held
+    lines = np.concatenate([response.channels * lead[:, None], lead[:, None]], axis=1)
+    places = [int(np.argmin(np.abs(np.subtract(COGGING_ORDERS, order)))) for order in orders]
+    shares = np.tile(folded[:, places], (len(lines) // len(folded), 1, 1, 1))
+    parts = np.stack([lines.real, lines.imag], axis=-1)
+    added = np.einsum("nckp,nkpm->ncm", parts, shares)
+    return added[..., 0].real, added[..., 1:]
+
+
+def folded_orders(folded: Lines | None, least: NDArray[np.float64]) -> tuple[float, ...]:
+    """Return the orders that show in any record more than noise does.
+
+    Parameters
+    ----------
+    folded : ndarray of complex, shape (r, n_orders, 2, 1 + m), or None
+        As of `Conditions`.
+    least : ndarray, shape (r, m)
+        Noise of each line over the size that a line may have there.
+    """
+    if folded is None:
+        return ()
+    seen = np.abs(folded[..., 1:]).max(axis=2) > least[:, None]
+    shown = seen.any(axis=(0, 2))
+    return tuple(order for order, is_shown in zip(COGGING_ORDERS, shown, strict=True) if is_shown)
