@@ -1,23 +1,30 @@
-"""Curves and stops of all functions: computed, and as the two CSV files that the repo keeps."""
+"""Curves, stops and small probabilities: computed, and as the three CSV files that are kept."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from experiments.runner.committed import committed_file, read_rows, table_with_origin
 from experiments.runner.registry import Context, require
 from experiments.studies.robust.functions import FUNCTIONS
+from experiments.studies.robust.limit_states import LIMIT_STATES
 from experiments.studies.robust.ours import Growth
+from experiments.studies.robust.rare import COLUMNS as RARE_COLUMNS
+from experiments.studies.robust.rare import METHODS as RARE_METHODS
+from experiments.studies.robust.rare import RareJob
 from experiments.studies.robust.rivals import (
     CHAOSPY_WAYS,
     Step,
     chaospy_traces,
+    kriging_trace,
     openturns_trace,
+    process_trace,
     runs_needed,
     until_it_stays,
 )
@@ -28,9 +35,12 @@ from pymoo_hdte._runner.store import write_atomically
 OURS = "pymoo_hdte"
 OPENTURNS = "OpenTURNS"
 CHAOSPY = "chaospy"
-METHODS = (OURS, CHAOSPY, OPENTURNS)
+KRIGING = "OpenTURNS Kriging"
+PROCESS = "Matern process"
+METHODS = (OURS, CHAOSPY, OPENTURNS, KRIGING, PROCESS)
+TRACES = {OPENTURNS: openturns_trace, KRIGING: kriging_trace, PROCESS: process_trace}
 ACCURACY = 0.01
-BUDGET = 1000
+BUDGET = 500
 STEP = ("runs", "error_at_designs", "error_overall")
 CURVE = ("way", *STEP)
 
@@ -80,10 +90,10 @@ class Curve:
     def execute(self) -> Run:
         """Return the columns of `CURVE`, ways counted from 0."""
         task, started = Task(self.function), time.perf_counter()
-        if self.method == OPENTURNS:
-            ways = {OPENTURNS: openturns_trace(task, self.budget)}
-        else:
+        if self.method == CHAOSPY:
             ways = chaospy_traces(task, self.budget)
+        else:
+            ways = {self.method: TRACES[self.method](task, self.budget)}
         rows = [
             (way, *step)
             for way, steps in enumerate(ways.values())
@@ -95,13 +105,18 @@ class Curve:
 
 NAME = "robust"
 STOPS = f"{NAME}_stops"
-SEEDS = (1, 2, 3)
-FURTHER = 3
-"""Others are tried up to so many times the runs that ours needs, and at most `BUDGET`."""
+RARE = f"{NAME}_rare"
+RARE_SEEDS = tuple(range(1, 21))
+RARE_AT_ONCE = 5
+"""Seeds of one job."""
+RARE_PROBABILITIES = (1e-3, 1e-4, 1e-6)
+QUICK_STATES = ("short column",)
+SEEDS = (1, 2, 3, 4, 5)
 QUICK_BUDGET = 60
 QUICK_FUNCTIONS = ("Ishigami", "kink")
 CURVE_COLUMNS = ("function", "method", "way", "runs", "error_at_designs", "error_overall")
 STOP_NUMBERS = (
+    "needed",
     "runs",
     "spent",
     "covered_mean",
@@ -113,6 +128,10 @@ STOP_NUMBERS = (
 )
 
 
+RareCase = tuple[str, float, str]
+"""Limit state, probability and method."""
+
+
 @dataclass(frozen=True)
 class Outcome:
     """What was found.
@@ -122,11 +141,22 @@ class Outcome:
     curves : dict of list of tuple
         By function, method and way: runs and both errors.
     stops : dict of dict
-        By function and seed: the numbers of `STOP_NUMBERS`.
+        By function and seed: the numbers of `STOP_NUMBERS`; ``needed`` is infinite where the error
+        did not stay below the bound within the budget, and NaN where it was not looked at.
+    rare : dict of ndarray
+        By limit state, probability and method: rows of the columns of a `RareJob`, one for each
+        seed.
     """
 
     curves: dict[tuple[str, str, str], list[Step]]
     stops: dict[tuple[str, int], dict[str, float]]
+    rare: dict[RareCase, NDArray[np.float64]] = field(default_factory=dict)
+
+    def rare_cases(self) -> list[tuple[str, float]]:
+        """Limit states and probabilities that were run, in the order of `LIMIT_STATES`."""
+        order = {state.name: place for place, state in enumerate(LIMIT_STATES)}
+        cases = {(state, probability) for state, probability, _ in self.rare}
+        return sorted(cases, key=lambda case: (order[case[0]], -case[1]))
 
     def functions(self) -> list[str]:
         """Names of the functions, in the order of `FUNCTIONS`."""
@@ -134,7 +164,16 @@ class Outcome:
         return [function.name for function in FUNCTIONS if function.name in names]
 
     def needed(self, function: str, method: str, column: int = 1) -> int | None:
-        """Return the least runs that a method needs by its best way, None if above the budget."""
+        """Return the least runs that a method needs by its best way, None if above the budget.
+
+        Ours is the median of its seeds, as far as they were run.
+        """
+        if method == OURS and column == 1:
+            seeds = [stop["needed"] for (name, _), stop in self.stops.items() if name == function]
+            looked_at = [count for count in seeds if not np.isnan(count)]
+            if looked_at:
+                median = float(np.median(looked_at))
+                return int(np.ceil(median)) if np.isfinite(median) else None
         counts = [
             runs_needed(steps, ACCURACY, column)
             for (name, who, _), steps in self.curves.items()
@@ -156,50 +195,77 @@ class Outcome:
 def outcome_for(context: Context) -> Outcome:
     """Return the committed outcome, or that of a full or quick run, which leaves its files."""
     if not (context.full or context.quick):
-        return read_outcome(*(committed_file(f"{name}.csv", NAME) for name in (NAME, STOPS)))
+        return read_outcome(*(committed_file(f"{name}.csv", NAME) for name in (NAME, STOPS, RARE)))
     require("openturns", "uq")
     require("sklearn", "uq")
     names = [function.name for function in FUNCTIONS] if context.full else QUICK_FUNCTIONS
     budget, seeds = (BUDGET, SEEDS) if context.full else (QUICK_BUDGET, SEEDS[:1])
-    # The curve is that of the first seed.
-    ours = [Grown(name, seed, seed == seeds[0], budget) for name in names for seed in seeds]
+    ours = [Grown(name, seed, True, budget) for name in names for seed in seeds]
     grown = dict(zip(ours, context.campaign.run(ours, "ours"), strict=True))
     needed = gathered(grown, {}).needed
+    # Whether another needs no more runs shows when it is given as many.
     rivals = [
-        Curve(name, method, min(budget, FURTHER * (needed(name, OURS) or budget)))
+        Curve(name, method, runs)
         for name in names
+        if (runs := needed(name, OURS)) is not None
         for method in METHODS
         if method != OURS
     ]
+    states = [state.name for state in LIMIT_STATES] if context.full else QUICK_STATES
+    groups = [
+        RARE_SEEDS[start : start + RARE_AT_ONCE]
+        for start in range(0, len(RARE_SEEDS), RARE_AT_ONCE)
+    ]
+    rare = [
+        RareJob(state, probability, method, group)
+        for group in (groups if context.full else [RARE_SEEDS[:1]])
+        for state in states
+        for probability in (RARE_PROBABILITIES if context.full else RARE_PROBABILITIES[:1])
+        for method in RARE_METHODS
+    ]
     outcome = gathered(
-        grown, dict(zip(rivals, context.campaign.run(rivals, "rivals"), strict=True))
+        grown,
+        dict(zip(rivals, context.campaign.run(rivals, "rivals"), strict=True)),
+        dict(zip(rare, context.campaign.run(rare, "small probabilities"), strict=True)),
     )
-    for name, text in ((NAME, curves_text(outcome)), (STOPS, stops_text(outcome))):
+    for name, text in (
+        (NAME, curves_text(outcome)),
+        (STOPS, stops_text(outcome)),
+        (RARE, rare_text(outcome)),
+    ):
         write_atomically(context.out / NAME / f"{name}.csv", text.encode())
     return outcome
 
 
-def gathered(grown: dict[Grown, Run], rivals: dict[Curve, Run]) -> Outcome:
-    """Return the outcome of finished jobs."""
+def gathered(
+    grown: dict[Grown, Run], rivals: dict[Curve, Run], rare: dict[RareJob, Run] | None = None
+) -> Outcome:
+    """Return the outcome of finished jobs; the curve of ours is that of the first seed."""
     curves: dict[tuple[str, str, str], list[Step]] = {}
     stops = {}
     for growth, run in grown.items():
+        needed = np.nan
         if growth.whole_curve:
-            steps = run.values[:, : len(STEP)].tolist()
-            curves[growth.function, OURS, OURS] = [(int(n), step, all_) for n, step, all_ in steps]
-        numbers = run.values[0, len(STEP) :].tolist()
+            rows = run.values[:, : len(STEP)].tolist()
+            steps = [(int(runs), step, overall) for runs, step, overall in rows]
+            needed = runs_needed(steps, ACCURACY) or np.inf
+            curves.setdefault((growth.function, OURS, OURS), steps)
+        numbers = [needed, *run.values[0, len(STEP) :].tolist()]
         stops[growth.function, growth.seed] = dict(zip(STOP_NUMBERS, numbers, strict=True))
     for job, run in rivals.items():
         names = ways_of(job.method)
         for way, runs, *errors in run.values.tolist():
             key = job.function, job.method, names[int(way)]
             curves.setdefault(key, []).append((int(runs), errors[0], errors[1]))
-    return Outcome(curves, stops)
+    seeds: dict[RareCase, list[NDArray[np.float64]]] = {}
+    for small, run in (rare or {}).items():
+        seeds.setdefault((small.state, small.probability, small.method), []).append(run.values)
+    return Outcome(curves, stops, {case: np.concatenate(rows) for case, rows in seeds.items()})
 
 
 def ways_of(method: str) -> Sequence[str]:
     """Return the names of a method's ways."""
-    return CHAOSPY_WAYS if method == "chaospy" else (method,)
+    return CHAOSPY_WAYS if method == CHAOSPY else (method,)
 
 
 def curves_text(outcome: Outcome) -> str:
@@ -221,8 +287,18 @@ def stops_text(outcome: Outcome) -> str:
     return table_with_origin(["function", "seed", *STOP_NUMBERS], rows)
 
 
-def read_outcome(curves: Path, stops: Path) -> Outcome:
-    """Read what `curves_text` and `stops_text` wrote."""
+def rare_text(outcome: Outcome) -> str:
+    """Return the CSV text of the small probabilities; seeds count from 1."""
+    rows = (
+        [state, probability, method, seed, *(f"{number:.5g}" for number in row)]
+        for (state, probability, method), seeds in outcome.rare.items()
+        for seed, row in enumerate(seeds.tolist(), 1)
+    )
+    return table_with_origin(["state", "truth", "method", "seed", *RARE_COLUMNS], rows)
+
+
+def read_outcome(curves: Path, stops: Path, rare: Path) -> Outcome:
+    """Read what `curves_text`, `stops_text` and `rare_text` wrote."""
     by_way: dict[tuple[str, str, str], list[Step]] = {}
     for row in read_rows(curves):
         step = int(row["runs"]), float(row["error_at_designs"]), float(row["error_overall"])
@@ -231,15 +307,21 @@ def read_outcome(curves: Path, stops: Path) -> Outcome:
         (row["function"], int(row["seed"])): {name: float(row[name]) for name in STOP_NUMBERS}
         for row in read_rows(stops)
     }
-    return Outcome(by_way, numbers)
+    seeds: dict[RareCase, list[list[float]]] = {}
+    for row in read_rows(rare):
+        case = row["state"], float(row["truth"]), row["method"]
+        seeds.setdefault(case, []).append([float(row[name]) for name in RARE_COLUMNS])
+    return Outcome(by_way, numbers, {case: np.array(rows) for case, rows in seeds.items()})
 
 
 def ahead(outcome: Outcome, function: str) -> bool:
-    """Whether ours needs fewer runs than every rival, and than those it was tried with in vain."""
+    """Whether ours needs fewer runs than every rival, each of which was tried with as many."""
     ours = outcome.needed(function, OURS)
-    rivals = [
-        outcome.needed(function, method) or outcome.tried(function, method)
-        for method in METHODS
-        if method != OURS
-    ]
-    return ours is not None and all(ours < runs_of for runs_of in rivals)
+    if ours is None:
+        return False
+    for method in METHODS:
+        if method != OURS:
+            needed = outcome.needed(function, method)
+            if not (outcome.tried(function, method) >= ours if needed is None else ours < needed):
+                return False
+    return True

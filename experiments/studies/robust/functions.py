@@ -1,7 +1,9 @@
-"""Ten functions of the literature of uncertainty quantification, with two designed inputs each.
+"""Twenty functions of the literature of uncertainty quantification, with two designed inputs each.
 
 Formulas and ranges are those of the sources, collected by Surjanovic and Bingham (Virtual Library
 of Simulation Experiments, Simon Fraser University). Which two inputs are designed is chosen here.
+The last ten are one of each kind that simulators of others are: peaks, waves, jumps, kinks, failing
+regions, noise of a mesh, counts, systems, many inputs, and a field of values.
 """
 
 from __future__ import annotations
@@ -39,7 +41,7 @@ class Function:
     ----------
     name, source : str
     call : callable
-        Maps d arrays of shape (n,) to one.
+        Maps d arrays of shape (n,) to one, or to one of shape (n, r); NaN where it fails.
     laws : dict of Uniform or Normal
         By input, in the order of the arguments; those of ``designed`` are uniform.
     designed : tuple of str
@@ -144,9 +146,75 @@ def resonance(stiffness: Array, damping: Array, mass: Array, frequency: Array) -
     return 1.0 / np.hypot(apart, damping * frequency)
 
 
+def corner_peak(**x: Array) -> Array:
+    """Return (1 + 5 (x_1 + .. + x_d))^-(d + 1)."""
+    return (1.0 + 5.0 * sum(x.values())) ** -(len(x) + 1.0)
+
+
+def oscillatory(**x: Array) -> Array:
+    """Return cos(pi + 5 (x_1 + .. + x_d))."""
+    return np.cos(np.pi + 5.0 * sum(x.values()))
+
+
+def jump(x1: Array, x2: Array, x3: Array) -> Array:
+    """Return exp(5 (x1 + x2 + x3)) where x1 and x2 are below a half, else 0."""
+    return np.where((x1 <= 0.5) & (x2 <= 0.5), np.exp(5.0 * (x1 + x2 + x3)), 0.0)
+
+
+def two_kinks(x1: Array, x2: Array, x3: Array) -> Array:
+    """Return abs(x1 - x2) + x1 abs(x3 - 0.4)."""
+    return np.abs(x1 - x2) + x1 * np.abs(x3 - 0.4)
+
+
+def failing(x1: Array, x2: Array, x3: Array) -> Array:
+    """Return sqrt(x1 + x2 - 0.6) + x3, NaN where the root is none."""
+    under = x1 + x2 - 0.6
+    return np.where(under < 0.0, np.nan, np.sqrt(np.maximum(under, 0.0))) + x3
+
+
+def mesh_noise(x1: Array, x2: Array, x3: Array) -> Array:
+    """Return x1^2 x2 + exp(x3) and a noise of amplitude 0.01."""
+    return x1**2 * x2 + np.exp(x3) + 0.01 * np.sin(1e5 * x1 + 7e4 * x2 + 3e4 * x3)
+
+
+def spring(D: Array, d: Array, F: Array, n: Array) -> Array:
+    """Return the deflection in m of a helical spring of steel with a whole number of coils."""
+    return 8.0 * F * D**3 * np.round(n) / (79e9 * d**4)
+
+
+def four_branches(x1: Array, x2: Array, u: Array, v: Array) -> Array:
+    """Return the least of four margins, raised by x1, two of them bent by x2."""
+    bowl, turn = 3.0 + (0.05 + 0.1 * x2) * (u - v) ** 2, (u + v) / 2.0**0.5
+    lines = u - v + 7.0 / 2.0**0.5, v - u + 7.0 / 2.0**0.5
+    return np.minimum.reduce([bowl - turn, bowl + turn, *lines]) + x1
+
+
+def twenty_inputs(**x: Array) -> Array:
+    """Return the function of Welch et al. of 20 inputs, two of which are without effect."""
+    linear = {5: 1.0, 19: -5.0, 2: 0.05, 3: 0.08, 6: -0.03, 7: 0.03, 9: -0.09, 10: -0.01}
+    linear |= {11: -0.07, 14: -0.04, 15: 0.06, 17: -0.01, 18: -0.03}
+    curved = 5.0 * (x["x4"] - x["x20"]) ** 2 + 40.0 * x["x19"] ** 3 + 0.25 * x["x13"] ** 2
+    return (
+        5.0 * x["x12"] / (1.0 + x["x1"])
+        + curved
+        + sum(weight * x[f"x{k}"] for k, weight in linear.items())
+    )
+
+
+def decay(stiffness: Array, damping: Array, mass: Array, start: Array) -> Array:
+    """Return where a damped oscillator is at 60 times after its start."""
+    times = np.linspace(0.2, 12.0, 60)
+    own = np.sqrt(stiffness / mass)[:, None]
+    share = damping[:, None] / (2.0 * mass[:, None] * own)
+    turn = own * np.sqrt(1.0 - share**2) * times
+    late = np.exp(-share * own * times)
+    return start[:, None] * late * (np.cos(turn) + share / np.sqrt(1.0 - share**2) * np.sin(turn))
+
+
 _ANGLE = Uniform(0.0, 2.0 * np.pi)
 _SHARE = Uniform(0.0, 1.0)
 _WAVE = Uniform(-np.pi, np.pi)
+_THREE = ("x1", "x2", "x3")
 
 FUNCTIONS = (
     Function(
@@ -273,6 +341,74 @@ FUNCTIONS = (
             "damping": Uniform(0.1, 0.3),
             "mass": Uniform(0.95, 1.05),
             "frequency": Uniform(0.9, 1.1),
+        },
+        ("stiffness", "damping"),
+    ),
+    Function(
+        "corner peak",
+        "Genz, Tools, Methods and Languages for Scientific Computation, 1984",
+        corner_peak,
+        {f"x{k}": _SHARE for k in range(1, 4)},
+        ("x1", "x2"),
+    ),
+    Function(
+        "oscillatory",
+        "Genz 1984",
+        oscillatory,
+        {f"x{k}": _SHARE for k in range(1, 5)},
+        ("x1", "x2"),
+    ),
+    Function("jump", "Genz 1984, discontinuous", jump, dict.fromkeys(_THREE, _SHARE), ("x1", "x2")),
+    Function("two kinks", "chosen here", two_kinks, dict.fromkeys(_THREE, _SHARE), ("x1", "x2")),
+    Function(
+        "failing region",
+        "chosen here",
+        failing,
+        {"x1": Uniform(0.2, 1.0), "x2": Uniform(0.1, 1.0), "x3": Uniform(0.0, 0.3)},
+        ("x1", "x2"),
+    ),
+    Function(
+        "mesh noise",
+        "chosen here",
+        mesh_noise,
+        {"x1": Uniform(0.9, 2.1), "x2": _SHARE, "x3": Normal(0.0, 0.3)},
+        ("x1", "x2"),
+    ),
+    Function(
+        "spring",
+        "the formula of textbooks of machine elements, ranges chosen here",
+        spring,
+        {
+            "D": Uniform(0.03, 0.05),
+            "d": Uniform(0.004, 0.006),
+            "F": Normal(200.0, 20.0),
+            "n": Uniform(7.5, 11.5),
+        },
+        ("D", "d"),
+    ),
+    Function(
+        "four branches",
+        "Waarts, Structural Reliability Using Finite Element Methods, 2000; x1 and x2 added",
+        four_branches,
+        {"x1": _SHARE, "x2": _SHARE, "u": Normal(0.0, 1.0), "v": Normal(0.0, 1.0)},
+        ("x1", "x2"),
+    ),
+    Function(
+        "twenty inputs",
+        "Welch, Buck, Sacks, Wynn, Mitchell and Morris, Technometrics 34, 1992",
+        twenty_inputs,
+        {f"x{k}": Uniform(-0.5, 0.5) for k in (12, 1, *range(2, 12), *range(13, 21))},
+        ("x12", "x1"),
+    ),
+    Function(
+        "decay",
+        "a damped oscillator after its start, 60 values, ranges chosen here",
+        decay,
+        {
+            "stiffness": Uniform(0.6, 1.4),
+            "damping": Uniform(0.1, 0.3),
+            "mass": Uniform(0.95, 1.05),
+            "start": Normal(1.0, 0.1),
         },
         ("stiffness", "damping"),
     ),

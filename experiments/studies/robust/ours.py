@@ -46,6 +46,8 @@ class Growth:
         Of the runs.
     whole_curve : bool
         Whether the errors of every fit are wanted.
+    process : bool
+        Whether a normal process is tried, too.
 
     Attributes
     ----------
@@ -58,7 +60,13 @@ class Growth:
     """
 
     def __init__(
-        self, task: Task, accuracy: float, budget: int, seed: int = 1, whole_curve: bool = True
+        self,
+        task: Task,
+        accuracy: float,
+        budget: int,
+        seed: int = 1,
+        whole_curve: bool = True,
+        process: bool = False,
     ) -> None:
         self._task, self._accuracy, self._budget = task, accuracy, budget
         self._whole_curve, self._points = whole_curve, _cube(task)
@@ -66,12 +74,14 @@ class Growth:
         self.stopped, self._passed = False, 0
 
         def function(cube: Array) -> Array:
-            return task(task.inputs.values(cube))[:, None]
+            return task(task.inputs.values(cube))
 
         rng = np.random.default_rng(seed)
         # An infinite accuracy has every fit shown, and `_watch` accepts none.
         with suppress(_Enough):
-            fit_adaptively(task.inputs.axes, function, np.inf, budget, rng, self._watch)
+            fit_adaptively(
+                task.inputs.axes, function, np.inf, budget, rng, self._watch, process=process
+            )
 
     def _watch(self, fit: AdaptiveFit) -> bool:
         if not self.stopped:
@@ -81,7 +91,7 @@ class Growth:
             enough = fit.n_runs >= least_runs(len(self._task.names))
             self.stopped = enough and self._passed >= IN_A_ROW
         if self._whole_curve:
-            values = fit.polynomial(self._points)[:, 0].reshape(self._task.judged[1].shape)
+            values = fit.polynomial(self._points).reshape(self._task.judged[1].shape)
             self.steps.append((fit.n_runs, *self._task.errors(values)))
         if self.stopped and (not self._whole_curve or self._stays(fit.n_runs)):
             raise _Enough
@@ -98,10 +108,17 @@ class Growth:
         ``runs`` is NaN where the budget ends first: `robust_problem` refuses such a surrogate.
         """
         task, fit = self._task, self.stop
-        problem = SimulatorProblem(task.inputs, fit, ("y",), (Mean(), Std()), (), fit.n_runs)
-        moments = problem.evaluate(task.X)
-        true = np.column_stack(task.true_moments)
-        error, band = np.abs(moments - true), problem.band(task.X)
+        responses = tuple(f"y{k}" for k in range(fit.truth.shape[1]))
+        objectives = [kind(response=name) for kind in (Mean, Std) for name in responses]
+        problem = SimulatorProblem(task.inputs, fit, responses, objectives, (), fit.n_runs)
+        moments, bands = problem.evaluate(task.X, return_values_of=["F", "F_band"])
+        # Mean and deviation of all values of a field together: shape (n, 2).
+        mean, std = task.true_moments
+        true = np.column_stack([mean.ravel(), std.ravel()])
+        error, band = (
+            np.column_stack([part.ravel() for part in np.hsplit(values, 2)])
+            for values in (np.abs(moments - np.hstack([mean, std])), bands)
+        )
         # The true moments are sampled.
         own_error = 5e-4 * true[:, 1:]
         covered = np.mean(error <= band + own_error, axis=0)

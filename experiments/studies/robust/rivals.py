@@ -1,4 +1,4 @@
-"""Expansions of chaospy and OpenTURNS on a task, at rising numbers of runs.
+"""Surrogates of chaospy, OpenTURNS and scikit-learn on a task, at rising numbers of runs.
 
 Each is used as its manual shows, and where that leaves a choice the better one counts:
 
@@ -8,12 +8,16 @@ Each is used as its manual shows, and where that leaves a choice the better one 
 - chaospy: pseudo-spectral projection on sparse grids of two kinds; point collocation with twice as
   many runs as terms in sets of two norms; least angle regression of scikit-learn, cross-validated,
   on Sobol points, of the order with the least error of that. Every one of these is a curve.
+- Kriging of OpenTURNS (Matern 5/2, a constant trend) and a plain process of scikit-learn (Matern
+  3/2, a noise), each with a length for every input, on the same Sobol points.
+- Runs that fail are left out; sparse grids cannot do without one, so that they end there. Of a
+  field, each of a few values has its own surrogate, and the largest error counts.
 """
 
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import partial
 from typing import Any
 
@@ -32,7 +36,7 @@ Array = NDArray[np.float64]
 Step = tuple[int, float, float]
 
 FIRST_BUDGET = 10
-STEP = 1.2
+STEP = 1.3
 """Ratio of one number of runs to the one before; what is needed is told too large by less."""
 MOST_TERMS = 600
 """Terms among which OpenTURNS may choose; at most ten for each run.
@@ -68,22 +72,40 @@ CHAOSPY_WAYS = (
 
 
 def budgets(most: int) -> list[int]:
-    """Return the numbers of runs that are tried."""
-    found = [FIRST_BUDGET]
-    while (after := max(found[-1] + 1, round(found[-1] * STEP))) <= most:
-        found.append(after)
-    return found
+    """Return the numbers of runs that are tried, the last of which is ``most``."""
+    counts = [min(FIRST_BUDGET, most)]
+    while counts[-1] < most:
+        counts.append(min(max(counts[-1] + 1, round(counts[-1] * STEP)), most))
+    return counts
 
 
 def sample(task: Task, most: int) -> tuple[Array, Array]:
-    """Return Sobol points of the germ, shape (most, d), and the function there, shape (most,)."""
+    """Return Sobol points of the germ, shape (most, d), and the values there, shape (most, r)."""
     rng = np.random.default_rng(3)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)
         p = scipy.stats.qmc.Sobol(len(task.names), rng=rng).random(most)
     columns = [_quantile(law, share) for law, share in zip(task.germ, p.T, strict=True)]
     points = np.column_stack(columns)
-    return points, task(points)
+    return points, task(points)[:, task.tried]
+
+
+Fit = Callable[[Array, Array], Callable[[Array], Array] | None]
+"""Maps points (n, d) and values (n,) to a surrogate, which maps (m, d) to (m,), or to None."""
+
+
+def _traced(task: Task, most: int, fit: Fit) -> Iterator[Step]:
+    """Yield runs and both errors of a surrogate of every value, fitted to runs that succeed."""
+    points, values = sample(task, most)
+    judged, true = task.judged
+    flat = judged.reshape(-1, judged.shape[-1])
+    for runs in budgets(most):
+        good = np.isfinite(values[:runs]).all(axis=1)
+        fits = [fit(points[:runs][good], column[:runs][good]) for column in values.T]
+        if any(surrogate is None for surrogate in fits):
+            continue
+        estimates = [surrogate(flat) for surrogate in fits if surrogate is not None]
+        yield runs, *task.errors(np.stack(estimates, axis=-1).reshape(*true.shape[:2], -1))
 
 
 def _quantile(law: Uniform | Normal, p: Array) -> Array:
@@ -98,7 +120,6 @@ def openturns_trace(task: Task, most: int) -> Iterator[Step]:
 
     # The same sets and errors as with its default, singular values, in half the time.
     ot.ResourceMap.SetAsString("LeastSquaresMetaModelSelection-DecompositionMethod", "Cholesky")
-    points, values = sample(task, most)
     laws = [
         ot.Normal(law.mean, law.std)
         if isinstance(law, Normal)
@@ -108,7 +129,9 @@ def openturns_trace(task: Task, most: int) -> Iterator[Step]:
     law = ot.JointDistribution(laws)
     families = [ot.StandardDistributionPolynomialFactory(law) for law in laws]
     select = ot.LeastSquaresMetaModelSelectionFactory(ot.LARS(), ot.CorrectedLeaveOneOut())
-    for runs in budgets(most):
+
+    def fit(points: Array, values: Array) -> Callable[[Array], Array] | None:
+        runs = len(points)
         factor = 2.0 if runs < LONG_PATHS else ERROR_FACTOR
         ot.ResourceMap.SetAsScalar("LeastSquaresMetaModelSelection-MaximumErrorFactor", factor)
         best, least = None, np.inf
@@ -120,8 +143,8 @@ def openturns_trace(task: Task, most: int) -> Iterator[Step]:
                 if size is None:
                     break
                 chaos = ot.FunctionalChaosAlgorithm(
-                    points[:runs],
-                    values[:runs, None],
+                    points,
+                    values[:, None],
                     law,
                     ot.FixedStrategy(basis, size),
                     ot.LeastSquaresStrategy(select),
@@ -131,10 +154,52 @@ def openturns_trace(task: Task, most: int) -> Iterator[Step]:
                 error = float(np.min(np.array(result.getErrorHistory())))
                 if error < least:
                     best, least = result.getMetaModel(), error
-        if best is None:
-            continue
-        judged = task.judged[0].reshape(-1, len(laws))
-        yield runs, *task.errors(np.array(best(judged)).reshape(task.judged[1].shape))
+        return None if best is None else lambda at: np.array(best(at)).ravel()
+
+    return _traced(task, most, fit)
+
+
+def kriging_trace(task: Task, most: int) -> Iterator[Step]:
+    """Yield runs and both errors of OpenTURNS's Kriging."""
+    import openturns as ot
+
+    def fit(points: Array, values: Array) -> Callable[[Array], Array]:
+        centre, unit = points.mean(axis=0), points.std(axis=0)
+        level, size = values.mean(), values.std() or 1.0
+        d = points.shape[1]
+        fitter = ot.GaussianProcessFitter(
+            (points - centre) / unit,
+            (values[:, None] - level) / size,
+            ot.MaternModel([1.0] * d, [1.0], 2.5),
+            ot.ConstantBasisFactory(d).build(),
+        )
+        fitter.setOptimizationBounds(ot.Interval([0.05] * d, [50.0] * d))
+        fitter.run()
+        process = ot.GaussianProcessRegression(fitter.getResult())
+        process.run()
+        metamodel = process.getResult().getMetaModel()
+        return lambda at: level + size * np.array(metamodel((at - centre) / unit)).ravel()
+
+    return _traced(task, most, fit)
+
+
+def process_trace(task: Task, most: int) -> Iterator[Step]:
+    """Yield runs and both errors of a plain process of scikit-learn."""
+    from sklearn.gaussian_process import GaussianProcessRegressor, kernels
+
+    def fit(points: Array, values: Array) -> Callable[[Array], Array]:
+        centre, unit = points.mean(axis=0), points.std(axis=0)
+        lengths = np.ones(points.shape[1])
+        kernel = kernels.ConstantKernel() * kernels.Matern(lengths, (0.05, 100.0), nu=1.5)
+        kernel = kernel + kernels.WhiteKernel(1e-6, (1e-10, 1.0))
+        model = GaussianProcessRegressor(kernel, alpha=0.0, normalize_y=True)
+        with warnings.catch_warnings():
+            # A length at its bound says that an input has no influence.
+            warnings.simplefilter("ignore")
+            model.fit((points - centre) / unit, values)
+        return lambda at: np.asarray(model.predict((at - centre) / unit))
+
+    return _traced(task, most, fit)
 
 
 def terms_up_to(degree: int, norm: float, inputs: int, most: int) -> int | None:
@@ -171,10 +236,15 @@ def _law(task: Task) -> Any:
     )
 
 
-def _errors(task: Task, expansion: Any) -> tuple[float, float]:
+def _evaluated(expansion: Any, points: Array) -> Array:
+    return np.broadcast_to(expansion(*points.T), (len(points),))
+
+
+def _errors(task: Task, expansions: list[Any]) -> tuple[float, float]:
     points, true = task.judged
-    values = expansion(*points.reshape(-1, len(task.names)).T)
-    return task.errors(np.broadcast_to(values, (true.size,)).reshape(true.shape))
+    flat = points.reshape(-1, len(task.names))
+    values = [_evaluated(expansion, flat) for expansion in expansions]
+    return task.errors(np.stack(values, axis=-1).reshape(*true.shape[:2], -1))
 
 
 def _projected(
@@ -189,8 +259,11 @@ def _projected(
         if nodes.shape[1] > most:
             return
         basis = chaospy.generate_expansion(order, law, normed=True)
-        fitted = chaospy.fit_quadrature(basis, nodes, weights, task(nodes.T))
-        yield nodes.shape[1], *_errors(task, fitted)
+        values = task(nodes.T)[:, task.tried]
+        if not np.isfinite(values).all():
+            return
+        fits = [chaospy.fit_quadrature(basis, nodes, weights, column) for column in values.T]
+        yield nodes.shape[1], *_errors(task, fits)
 
 
 def _collocated(task: Task, most: int, norm: float) -> Iterator[Step]:
@@ -200,14 +273,18 @@ def _collocated(task: Task, most: int, norm: float) -> Iterator[Step]:
         runs = 2 * len(basis)
         if runs > most:
             return
-        fitted = chaospy.fit_regression(basis, points[:runs].T, values[:runs])
-        yield runs, *_errors(task, fitted)
+        good = np.isfinite(values[:runs]).all(axis=1)
+        fits = [
+            chaospy.fit_regression(basis, points[:runs][good].T, column[:runs][good])
+            for column in values.T
+        ]
+        yield runs, *_errors(task, fits)
 
 
 def _selected(task: Task, most: int) -> Iterator[Step]:
     from sklearn.linear_model import LarsCV
 
-    law, (points, values) = _law(task), sample(task, most)
+    law = _law(task)
     make = partial(chaospy.generate_expansion, dist=law, normed=True)
     bases = []
     for order in range(1, HIGHEST_DEGREE + 1):
@@ -215,7 +292,9 @@ def _selected(task: Task, most: int) -> Iterator[Step]:
         if len(basis) > min(MOST_CROSS_VALIDATED, 5 * most):
             break
         bases.append(basis)
-    for runs in budgets(most):
+
+    def fit(points: Array, values: Array) -> Callable[[Array], Array] | None:
+        runs = len(points)
         best, least = None, np.inf
         for basis in bases:
             if len(basis) > 5 * runs:
@@ -223,12 +302,13 @@ def _selected(task: Task, most: int) -> Iterator[Step]:
             model = LarsCV(fit_intercept=False, cv=5, max_iter=min(len(basis), runs // 2))
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")
-                fitted = chaospy.fit_regression(basis, points[:runs].T, values[:runs], model=model)
+                fitted = chaospy.fit_regression(basis, points.T, values, model=model)
             error = float(model.mse_path_.mean(axis=-1).min())
             if error < least:
                 best, least = fitted, error
-        if best is not None:
-            yield runs, *_errors(task, best)
+        return None if best is None else partial(_evaluated, best)
+
+    yield from _traced(task, most, fit)
 
 
 def until_it_stays(steps: Iterator[Step], accuracy: float) -> list[Step]:

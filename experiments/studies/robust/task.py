@@ -20,6 +20,8 @@ Array = NDArray[np.float64]
 DESIGNS = 200
 JUDGED = 256
 """Draws of the scatter at every design at which surrogates are compared with the function."""
+OF_FIELD = 4
+"""Values of a field that others are tried on, each by itself; ours is on all of them."""
 TRUE_DRAWS = 2**14
 """Draws at every design for the true mean and deviation; these are off by some 0.01 %."""
 MIDDLE = 0.25
@@ -45,8 +47,9 @@ class Task:
         self.X = rng.uniform(lower, upper, (DESIGNS, len(bounds)))
 
     def __call__(self, values: Array) -> Array:
-        """Return the function, shape (n,), at inputs of shape (n, d) in their units."""
-        return self.function.call(**dict(zip(self.names, values.T, strict=True)))
+        """Return the function, shape (n, r), at inputs of shape (n, d) in their units."""
+        values = self.function.call(**dict(zip(self.names, values.T, strict=True)))
+        return values.reshape(len(values), -1)
 
     @cached_property
     def designs(self) -> dict[str, Design]:
@@ -107,27 +110,39 @@ class Task:
     def judged(self) -> tuple[Array, Array]:
         """Inputs of shape (200, 256, d) at which surrogates are compared, and the function there.
 
+        The latter is of shape (200, 256, r), NaN where it fails.
         Those of an unbounded scatter are moved to the ends of the reach: no method has runs beyond.
         """
         points = self.drawn(JUDGED, 11)
         low, high = np.array(list(self.inputs.reach().values())).T
         points = np.clip(points, low, high)
         values = self(points.reshape(-1, len(self.names)))
-        return points, values.reshape(DESIGNS, JUDGED)
+        return points, values.reshape(DESIGNS, JUDGED, -1)
 
     @cached_property
     def true_moments(self) -> tuple[Array, Array]:
-        """Mean and standard deviation at the designs, shape (200,) each."""
+        """Mean and standard deviation at the designs where it does not fail, (200, r) each."""
         points = self.drawn(TRUE_DRAWS, 13)
-        values = np.array([self(block) for block in points])
-        return values.mean(axis=1), values.std(axis=1)
+        values = [self(block) for block in points]
+        return (
+            np.array([np.nanmean(block, axis=0) for block in values]),
+            np.array([np.nanstd(block, axis=0) for block in values]),
+        )
+
+    @cached_property
+    def tried(self) -> list[int]:
+        """Which of the values others are tried on: all, or a few over a field."""
+        count = self.judged[1].shape[2]
+        return np.unique(np.linspace(0, count - 1, OF_FIELD).round().astype(int)).tolist()
 
     def errors(self, estimates: Array) -> tuple[float, float]:
         """Return the errors of the standard deviation of a surrogate as shares of the true one.
 
+        Of several values the larger ones, and only where the function does not fail.
+
         Parameters
         ----------
-        found : ndarray, shape (200, 256)
+        estimates : ndarray, shape (200, 256, r) or (200, 256, len(tried))
             The surrogate at the judged points.
 
         Returns
@@ -138,8 +153,12 @@ class Task:
             Of the deviation over designs and scatter together.
         """
         _, true = self.judged
-        ratios = np.abs(estimates.std(axis=1) / true.std(axis=1) - 1.0)
-        return float(np.quantile(ratios, 0.95)), float(abs(estimates.std() / true.std() - 1.0))
+        if estimates.shape[2] < true.shape[2]:
+            true = true[..., self.tried]
+        estimates = np.where(np.isfinite(true), estimates, np.nan)
+        ratios = np.abs(np.nanstd(estimates, axis=1) / np.nanstd(true, axis=1) - 1.0)
+        together = np.nanstd(estimates, axis=(0, 1)) / np.nanstd(true, axis=(0, 1)) - 1.0
+        return float(np.quantile(ratios, 0.95, axis=0).max()), float(np.abs(together).max())
 
     def _ends(self, name: str) -> tuple[float, float]:
         law = self.function.laws[name]

@@ -160,10 +160,10 @@ def robust_problem(
         as a normal deviation, of quantiles and probabilities; a `WorstCase` is that of the mean.
         A point at which one of its runs fails has failed.
     surrogate : {"polynomial", "auto"}
-        With ``"auto"``, a polynomial of the response's logarithm or logit, or a normal process
-        (needs scikit-learn, extra ``process``), is taken where it predicts runs left out better. It
-        takes fewer runs for responses over decades, and for kinks, and seconds more of computing;
-        its stated errors have been held against true ones less often.
+        A polynomial of the response, or of its logarithm or logit where that predicts runs left out
+        better: it takes fewer runs for responses over decades. With ``"auto"``, a normal process
+        (needs scikit-learn, extra ``process``) is tried, too: it takes fewer runs for kinks, and
+        seconds more of computing; its stated errors have been held against true ones less often.
 
     Returns
     -------

@@ -44,7 +44,7 @@ class Posterior:
         self._regression = Regression(self._features, values, np.ones(len(values)), start)
         self.parameters = self._regression.parameters
         # Runs that are predicted worse than expected make the deviation larger, never smaller.
-        surprise = max(self._regression.surprise, 1.0)
+        surprise = max(self._regression.surprises[0], 1.0)
         self._size = self._regression.unit * np.sqrt(self._regression.size) * surprise
 
     def moments(self, points: Array) -> tuple[Array, Array]:

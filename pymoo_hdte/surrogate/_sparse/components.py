@@ -61,7 +61,7 @@ def fitted_together(
         fitted(features, column, relevance, judged, lost, start, *others)
         for column, start in zip(values.T, found, strict=True)
     ]
-    parameters = [fit.regression.parameters for fit in fits]
+    parameters = [fit.parameters for fit in fits]
     if components is None:
         return fits, parameters
     field = _Field(components, fits)
@@ -155,8 +155,9 @@ class _Field:
             if fit.alone:
                 share = np.full(len(functionals), np.sqrt(np.mean(fit.left_out**2)))
             else:
-                surprise = max(fit.regression.surprise, LEAST_SURPRISE)
-                share = COVERAGE * surprise * fit.regression.spread(features, functionals)
+                of_mean, of_std = np.maximum(fit.regression.surprises, LEAST_SURPRISE)
+                share = COVERAGE * fit.regression.spread(features, functionals)
+                share *= np.append(of_mean, np.full(len(share) - 1, of_std))
                 off[:, k] = fit.regression.predict(features) - kept[:, k]
             squares += (np.array([np.full(len(pattern), share[0]), share[1:]]) * pattern) ** 2
         cut = off @ patterns

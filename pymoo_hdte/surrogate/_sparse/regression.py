@@ -49,13 +49,15 @@ class Regression:
     values : ndarray, shape (n,)
         The response there, in its unit.
     relevance : ndarray, shape (n,)
-        How much every run counts in ``surprise``.
+        How much every run counts in ``surprises``.
     parameters : ndarray, shape (d, 3), optional
         Where to start learning them.
     shares : ndarray, shape (n,), optional
         Variance of every run's own scatter over that of one run; 1 by default.
     noisy : bool
         Whether runs may scatter by themselves.
+    of : ndarray, shape (n,), optional
+        The response whose deviation `surprises` counts; ``values`` by default.
 
     Attributes
     ----------
@@ -64,8 +66,9 @@ class Regression:
         Prior variances by axis and degree.
     left_out : ndarray, shape (n,)
         Every run minus what the others predict there, in the response's unit.
-    surprise : float
-        Root mean square of that over the standard deviation of the prediction.
+    surprises : ndarray, shape (2,)
+        Root mean square of that over the standard deviation of the prediction, as it matters for
+        the response's mean and for its standard deviation.
     noise : float
         Variance by which runs scatter by themselves (mesh, tolerance of a solver), as a share of
         the prior's unit; 0 unless the runs tell of it.
@@ -85,6 +88,7 @@ class Regression:
         parameters: Array | None = None,
         shares: Array | None = None,
         noisy: bool = True,
+        of: Array | None = None,
     ) -> None:
         self.centre = float(values.mean())
         self.unit = float(values.std()) or 1.0
@@ -95,7 +99,7 @@ class Regression:
         self.parameters, self.noise = _learnt(features, standard, start, shares, noisy)
         self.variance, _ = variances(self.parameters, len(features[0]))
         self._noises = self.noise * shares
-        matrix = _with_nugget(covariance(features, features, self.variance), self._noises)
+        matrix = with_nugget(covariance(features, features, self.variance), self._noises)
         self._lower = cholesky(matrix, lower=True)
         self._inverse = cho_solve((self._lower, True), np.eye(len(values)))
         self.weights = self._inverse @ standard
@@ -106,7 +110,7 @@ class Regression:
         expected = np.sqrt(max(self.size, np.finfo(float).tiny) / diagonal)
         self.left_out = self.unit * left_out
         squares = (left_out / expected) ** 2
-        self.surprise = float(np.sqrt(np.average(squares, weights=relevance)))
+        self.surprises = surprises(squares, relevance, values if of is None else of)
 
     def predict(self, features: list[Array]) -> Array:
         """Return the mean, shape (m,), at points of these features, in the response's unit."""
@@ -147,7 +151,30 @@ class Regression:
         return self.unit * np.sqrt(self.size * variance)
 
 
-def _with_nugget(matrix: Array, noise: Array | float = 0.0) -> Array:
+def surprises(squares: Array, relevance: Array, values: Array) -> Array:
+    """Return how far runs are from what others predict, for mean and standard deviation, (2,).
+
+    An error counts in the mean as often as its place occurs, in the deviation times the distance
+    from the mean besides: of a response with a heavy tail, what the tail tells.
+
+    Parameters
+    ----------
+    squares : ndarray, shape (n,)
+        Squares of the runs left out over their expectations.
+    relevance : ndarray, shape (n,)
+        How often places like that of a run occur.
+    values : ndarray, shape (n,)
+        The response.
+    """
+    apart = values - np.average(values, weights=relevance)
+    weights = np.array([relevance, relevance * apart**2])
+    if not weights[1].any():
+        weights[1] = relevance
+    return np.sqrt(weights @ squares / weights.sum(axis=1))
+
+
+def with_nugget(matrix: Array, noise: Array | float = 0.0) -> Array:
+    """Return a symmetric matrix whose diagonal is raised in place, by `NUGGET` and by noise."""
     matrix[np.diag_indices(len(matrix))] += NUGGET * np.trace(matrix) / len(matrix) + noise
     return matrix
 
@@ -202,7 +229,7 @@ def _misfit(
     of_axes = factors(features, features, variance)
     product = np.prod(of_axes, axis=0) if len(of_axes) < 3 else _product(of_axes)
     try:
-        lower = cholesky(_with_nugget(product.copy(), noise.sum() * shares), lower=True)
+        lower = cholesky(with_nugget(product.copy(), noise.sum() * shares), lower=True)
     except np.linalg.LinAlgError:
         return 1e10, np.zeros(flat.size + noise.size)
     inverse = cho_solve((lower, True), np.eye(len(standard)))

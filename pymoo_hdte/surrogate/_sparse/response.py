@@ -6,10 +6,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+
+# Its linear algebra loads when it is first used.
+import scipy
 from numpy.typing import NDArray
 
 from pymoo_hdte.surrogate._sparse.kernel import EvenPolynomials
-from pymoo_hdte.surrogate._sparse.regression import Regression
+from pymoo_hdte.surrogate._sparse.regression import Regression, with_nugget
 from pymoo_hdte.surrogate._sparse.second import Linked, Process, Surrogate, better
 from pymoo_hdte.surrogate._sparse.terms import closed, largest, likely_terms, products
 
@@ -28,6 +31,8 @@ COVERAGE_OF_DRAWS = 2.0
 
 Noise of a mesh is none: its errors belong to one function, too.
 """
+COVERAGE_OF_CUT = 1.96
+"""The same of what terms left out change, which is known: normal over the designs."""
 LEAST_SURPRISE = 0.3
 """Runs that are predicted better than expected make errors smaller by no more than this factor."""
 LOST = 0.05
@@ -43,8 +48,16 @@ LEAST_JUDGED = 1e-2
 
 As a share of the response's deviation over all runs.
 """
-MOST_CONVERTED = 3000
+LOST_CONVERTED, OF_ITS_ERROR = 4.0, 0.1
+"""What terms left out of such a polynomial may lose: so many times `LOST`, or this of its error.
+
+Moments lose a fifth of it, which is part of the stated error; a product of eight inputs has 1500
+terms otherwise where 120 do.
+"""
+MOST_CONVERTED = 1500
 """Terms that are looked at where another surrogate is made a polynomial."""
+LEARNT_FROM = 1000
+"""Points from which these terms are learnt; all points tell their coefficients."""
 MOST_FITTED = 0.4
 """Largest number of such terms as a share of the runs."""
 
@@ -79,6 +92,9 @@ class ResponseFit:
     Attributes
     ----------
     regression : Regression, Linked or Process
+        With which errors are estimated.
+    parameters : ndarray, shape (d, 3)
+        Of the regression of the response itself, from which that of more runs starts.
     indices : ndarray of int, shape (p, d)
         Degrees of the terms, a downward-closed set.
     coefficients : ndarray, shape (p,)
@@ -90,6 +106,7 @@ class ResponseFit:
     """
 
     regression: Surrogate
+    parameters: Array
     indices: Indices
     coefficients: Array
     left_out: Array
@@ -126,12 +143,13 @@ class ResponseFit:
             by_noise = self.regression.spread_by_noise(features, functionals)
             expected = COVERAGE * np.sqrt(np.maximum(expected**2 - by_noise**2, 0.0))
             expected = np.hypot(expected, (COVERAGE_OF_DRAWS if counted else COVERAGE) * by_noise)
-            expected = expected * max(self.regression.surprise, LEAST_SURPRISE)
+            expected = expected * np.maximum(self.regression.surprises, LEAST_SURPRISE)
             cut = np.array([abs(float(weights @ off)), _std(off, weights)])
+            expected = expected + COVERAGE_OF_CUT * cut
             # What runs scatter by themselves may as well be a part of the response.
             if not counted:
-                cut[1] += np.hypot(scatter, self.regression.noise_std) - scatter
-            errors.append(tuple((expected + cut) / scatter))
+                expected[1] += np.hypot(scatter, self.regression.noise_std) - scatter
+            errors.append(tuple(expected / scatter))
         mean, std = np.array(errors).T
         return mean, std
 
@@ -172,10 +190,10 @@ def fitted(
     left_out = float(np.sqrt(np.mean(regression.left_out**2)))
     if plain.alone or dense is None or left_out <= lost * float(np.std(values)):
         return plain
-    other = better(features, values, relevance, regression, start, process)
+    other = better(features, values, relevance, regression, process)
     if other is None:
         return plain
-    converted = _converted(other, dense(), judged, lost)
+    converted = _converted(other, regression.parameters, dense(), judged, lost)
     # A polynomial may follow it less well than it follows the response.
     least = LEAST_JUDGED * float(np.std(values))
 
@@ -206,6 +224,7 @@ def _plain(
     indices = closed(looked_at[essential])
     return ResponseFit(
         regression,
+        regression.parameters,
         indices,
         _posterior(regression, features, indices),
         regression.left_out,
@@ -214,21 +233,31 @@ def _plain(
 
 
 def _converted(
-    surrogate: Linked | Process, dense: list[Array], judged: Judged, lost: float
+    surrogate: Linked | Process,
+    parameters: Array,
+    dense: list[Array],
+    judged: Judged,
+    lost: float,
 ) -> ResponseFit:
     """Return a polynomial of another surrogate."""
     values = surrogate.predict(dense)
-    regression = Regression(dense, values, np.ones(len(values)), noisy=False)
+    some = [feature[:, :LEARNT_FROM] for feature in dense]
+    regression = Regression(some, values[:LEARNT_FROM], np.ones(LEARNT_FROM), noisy=False)
     scatters = [
         _std(surrogate.predict(features), weights)
         for features, weights in zip(judged.features, judged.weights, strict=True)
     ]
     looked_at = likely_terms(regression.variance, MOST_CONVERTED)
-    coefficients = _posterior(regression, dense, looked_at)
-    essential = largest(coefficients, lost * float(np.quantile(scatters, 0.1)))
-    indices = closed(looked_at[essential])
-    own = _posterior(regression, dense, indices)
-    return ResponseFit(surrogate, indices, own, surrogate.left_out, alone=False)
+    coefficients = _posterior(regression, some, looked_at)
+    own_error = float(np.sqrt(np.mean(surrogate.left_out**2)))
+    lost = max(LOST_CONVERTED * lost * float(np.quantile(scatters, 0.1)), OF_ITS_ERROR * own_error)
+    indices = closed(looked_at[largest(coefficients, lost)])
+    # The regression tells which terms there are. Its own coefficients are differences of very
+    # large numbers, for the points are many more than the terms.
+    terms = products(dense, indices)
+    normal = with_nugget(terms.T @ terms)
+    own = scipy.linalg.solve(normal, terms.T @ values, assume_a="pos")
+    return ResponseFit(surrogate, parameters, indices, own, surrogate.left_out, alone=False)
 
 
 def _std(values: Array, weights: Array) -> float:
@@ -268,5 +297,8 @@ def _alone(
         leverage = np.minimum(np.sum(q**2, axis=1), 1.0 - 1e-12)
         left_out = (values - q @ (q.T @ values)) / (1.0 - leverage)
         if (error := float(np.sqrt(np.mean(left_out**2)))) < rms:
-            best, rms = ResponseFit(regression, chosen, solution, left_out, alone=True), error
+            fit = ResponseFit(
+                *(regression, regression.parameters, chosen, solution, left_out), alone=True
+            )
+            best, rms = fit, error
     return best

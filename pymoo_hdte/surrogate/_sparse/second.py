@@ -21,7 +21,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from pymoo_hdte.surrogate._sparse.regression import Regression
+from pymoo_hdte.surrogate._sparse.regression import Regression, surprises
 
 Array = NDArray[np.float64]
 
@@ -29,9 +29,8 @@ Array = NDArray[np.float64]
 class Surrogate(Protocol):
     """What stands behind a fit: `Regression`, or one of this module."""
 
-    parameters: Array
     left_out: Array
-    surprise: float
+    surprises: Array
     noise_std: float
 
     def predict(self, features: list[Array]) -> Array:
@@ -90,23 +89,13 @@ class Linked:
     relevance : ndarray, shape (n,)
         As in `Regression`.
     link : Link
-    start : ndarray, shape (d, 3), or None
-        Parameters to start from.
     """
 
-    def __init__(
-        self,
-        features: list[Array],
-        values: Array,
-        relevance: Array,
-        link: Link,
-        start: Array | None,
-    ) -> None:
+    def __init__(self, features: list[Array], values: Array, relevance: Array, link: Link) -> None:
         self._link = link
         h = link.forth(values)
-        self._regression = Regression(features, h, relevance, start)
-        self.parameters = self._regression.parameters
-        self.surprise = self._regression.surprise
+        self._regression = Regression(features, h, relevance, of=values)
+        self.surprises = self._regression.surprises
         self.left_out: Array = values - link.back(h - self._regression.left_out)
         slope = float(np.sqrt(np.mean(link.slope(h) ** 2)))
         self.noise_std = self._regression.noise_std * slope
@@ -137,15 +126,10 @@ class Process:
         If scikit-learn is not installed (extra ``process``).
     """
 
-    def __init__(
-        self, features: list[Array], values: Array, relevance: Array, start: Array | None
-    ) -> None:
+    def __init__(self, features: list[Array], values: Array, relevance: Array) -> None:
         from sklearn.exceptions import ConvergenceWarning
         from sklearn.gaussian_process import GaussianProcessRegressor, kernels
 
-        self.parameters = np.tile((np.log(0.1), 0.0, 0.0), (len(features), 1))
-        if start is not None:
-            self.parameters = start
         points = _points(features)
         self._centre, self._unit = float(values.mean()), float(values.std()) or 1.0
         d = points.shape[1]
@@ -165,7 +149,7 @@ class Process:
         diagonal = np.diag(inverse)
         self.left_out: Array = self._unit * self._model.alpha_ / diagonal
         squares = (self._model.alpha_ / diagonal) ** 2 * diagonal
-        self.surprise = float(np.sqrt(np.average(squares, weights=relevance)))
+        self.surprises = surprises(squares, relevance, values)
         self._runs, self._inverse, self._noise = points, inverse, noise
 
     @cached_property
@@ -202,7 +186,6 @@ def better(
     values: Array,
     relevance: Array,
     plain: Regression,
-    start: Array | None,
     process: bool,
 ) -> Linked | Process | None:
     """Return another surrogate if it predicts the runs left out better by more than chance.
@@ -212,7 +195,7 @@ def better(
 
     Parameters
     ----------
-    features, values, relevance, start
+    features, values, relevance
         As in `Linked`.
     plain : Regression
         That of the response itself.
@@ -225,10 +208,10 @@ def better(
         return float(np.log(max(size, np.finfo(float).tiny)))
 
     others: list[Linked | Process] = [
-        Linked(features, values, relevance, link, None) for link in links_for(values)
+        Linked(features, values, relevance, link) for link in links_for(values)
     ]
     if process and _has_scikit_learn():
-        others.append(Process(features, values, relevance, start))
+        others.append(Process(features, values, relevance))
     best = min(others, key=off, default=None)
     if best is None or off(best) > off(plain) - 2.0 * np.sqrt(2.0 / len(values)):
         return None

@@ -5,49 +5,56 @@ import sys
 import numpy as np
 import pytest
 from numpy.polynomial.legendre import leggauss
-from scipy.stats import uniform
+from scipy.stats import norm
 
 from pymoo_hdte.problems import Design, Mean, Std, robust_problem
 from pymoo_hdte.surrogate._sparse.kernel import EvenPolynomials
-from pymoo_hdte.surrogate._sparse.regression import Regression
+from pymoo_hdte.surrogate._sparse.regression import Regression, surprises
 from pymoo_hdte.surrogate._sparse.second import Linked, Process, better, links_for
 
+SHARES = (0.8, 0.5)
+"""Deviations of the logarithms of the two factors of the product."""
 
-def power_law(x, a, b):
-    return np.exp(3.0 * a) * (1.0 + b) / x**2
+
+def product(x, u, v):
+    return np.exp(SHARES[0] * u + SHARES[1] * v) / x**2
 
 
-def uniform_moments(x):
-    """Return mean and deviation of the power law in closed form; x deviates by 0.1."""
+def moments_of_product(x):
+    """Return mean and deviation of the product in closed form; x deviates by 0.1."""
     low, high = x - 0.1, x + 0.1
-    first = (1.0 / low - 1.0 / high) / 0.2
-    second = (low**-3 - high**-3) / 0.6
-    mean = first * (np.exp(3.0) - 1.0) / 3.0 * 1.5
-    square = second * (np.exp(6.0) - 1.0) / 6.0 * (7.0 / 3.0)
+    first, second = (1.0 / low - 1.0 / high) / 0.2, (low**-3 - high**-3) / 0.6
+    variance = SHARES[0] ** 2 + SHARES[1] ** 2
+    mean, square = first * np.exp(0.5 * variance), second * np.exp(2.0 * variance)
     return np.column_stack([mean, np.sqrt(square - mean**2)])
 
 
-def built(surrogate):
-    return robust_problem(
-        power_law,
+def test_a_product_over_decades_takes_few_runs_by_its_logarithm():
+    """A polynomial of the product itself took 400 runs."""
+    problem = robust_problem(
+        product,
         {"x": Design(0.3, 0.9, deviation=0.1)},
-        {"a": uniform(), "b": uniform()},
+        {"u": norm(), "v": norm()},
         [Mean(), Std()],
         vectorised=True,
-        surrogate=surrogate,
         progress=False,
     )
-
-
-@pytest.mark.nightly
-def test_a_power_law_takes_fewer_runs_by_its_logarithm_and_has_its_moments():
-    by_logarithm, plain = built("auto"), built("polynomial")
-    assert by_logarithm.n_runs < 0.7 * plain.n_runs
+    assert problem.n_runs < 60
     X = np.linspace(0.3, 0.9, 25)[:, None]
-    truth = uniform_moments(X[:, 0])
-    F, band = by_logarithm.evaluate(X, return_values_of=["F", "F_band"])
+    truth = moments_of_product(X[:, 0])
+    F, band = problem.evaluate(X, return_values_of=["F", "F_band"])
     assert np.all(np.abs(F - truth) <= 0.01 * truth[:, 1:])
     assert np.all(np.mean(np.abs(F - truth) <= band, axis=0) >= 0.95)
+
+
+def test_a_surprise_far_from_the_mean_counts_in_the_deviation():
+    values = np.append(np.linspace(-1.0, 1.0, 21), 10.0)
+    even, far = np.ones(22), np.append(np.ones(21), 9.0)
+    assert surprises(even, np.ones(22), values) == pytest.approx([1.0, 1.0])
+    of_mean, of_std = surprises(far, np.ones(22), values)
+    assert of_mean**2 == pytest.approx(30.0 / 22.0)
+    assert of_std > 2.5
+    assert surprises(far, np.ones(22), np.ones(22)) == pytest.approx([of_mean, of_mean])
 
 
 POINTS = np.random.default_rng(0).uniform(-1.0, 1.0, (60, 2))
@@ -56,7 +63,7 @@ ONES = np.ones(60)
 
 
 def chosen(values):
-    return better(FEATURES, values, ONES, Regression(FEATURES, values, ONES), None, process=True)
+    return better(FEATURES, values, ONES, Regression(FEATURES, values, ONES), process=True)
 
 
 def test_each_kind_is_taken_where_it_predicts_better():
@@ -95,12 +102,12 @@ def test_runs_left_out_are_predicted_as_if_they_had_not_been_made(kind):
     values = np.exp(np.sin(3.0 * x) + y) + 0.1
     if kind == "linked":
         (link,) = links_for(values)
-        whole = Linked(FEATURES, values, ONES, link, None)
+        whole = Linked(FEATURES, values, ONES, link)
         h = link.forth(values)
         expected = values - link.back(h - whole._regression.left_out)
         assert whole.left_out == pytest.approx(expected)
         return
-    whole = Process(FEATURES, values, ONES, None)
+    whole = Process(FEATURES, values, ONES)
     kernel, others = whole._model.kernel_, np.arange(60) != 7
     weights = np.linalg.solve(
         kernel(POINTS[others]), (values[others] - whole._centre) / whole._unit
@@ -113,7 +120,7 @@ def test_runs_left_out_are_predicted_as_if_they_had_not_been_made(kind):
 def test_the_spread_of_a_sum_is_that_of_the_posterior():
     x, y = POINTS.T
     values = np.abs(x) + y
-    process = Process(FEATURES, values, ONES, None)
+    process = Process(FEATURES, values, ONES)
     nodes, weights = leggauss(12)
     line = np.column_stack([nodes, 0.3 * np.ones(12)])
     features = EvenPolynomials(20)(line)
