@@ -200,7 +200,10 @@ class Coefficients:
 
     @property
     def near_inertia(self) -> float | NDArray[np.float64]:
-        """Inertia on the near side of a shaft that twists, kg.m2: all of it without one."""
+        """Inertia on the near side of a shaft that twists, kg.m2: all of it without one.
+
+        A float, or of shape (n,) where one of the inertias is.
+        """
         if self.shaft is None:
             return self.output_inertia
         return self.output_inertia - np.asarray(self.load_inertia)
