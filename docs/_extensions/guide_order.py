@@ -7,6 +7,7 @@ ORDER = (
     "robust_failures.py",
     "robust_study.py",
     "drive_data_sheet.py",
+    "catalogue_to_decision.py",
     "own_problem.py",
     "extend.py",
     "exact_moments.py",

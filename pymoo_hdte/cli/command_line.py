@@ -12,7 +12,9 @@ from pymoo_hdte import __version__
 from pymoo_hdte._interrupts import INTERRUPTED
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.cli.command import MISTAKE, OneLineParser
+from pymoo_hdte.cli.decide import DECIDE
 from pymoo_hdte.cli.discrepancy import DISCREPANCY
+from pymoo_hdte.cli.example import EXAMPLE
 from pymoo_hdte.cli.export import EXPORT
 from pymoo_hdte.cli.identify import IDENTIFY
 from pymoo_hdte.cli.init import INIT
@@ -22,7 +24,10 @@ from pymoo_hdte.cli.robust import ROBUST
 from pymoo_hdte.cli.simulate import SIMULATE
 from pymoo_hdte.cli.table7 import TABLE_7
 
-COMMANDS = (ROBUST, OPTIMISE, SIMULATE, IDENTIFY, PLAN, INIT, DISCREPANCY, EXPORT, TABLE_7)
+COMMANDS = (
+    *(ROBUST, EXAMPLE, OPTIMISE, SIMULATE, IDENTIFY, PLAN, INIT, DISCREPANCY, DECIDE),
+    *(EXPORT, TABLE_7),
+)
 """Commands in the order of the help."""
 
 

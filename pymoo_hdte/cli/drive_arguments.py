@@ -10,20 +10,21 @@ from typing import TYPE_CHECKING
 from pymoo_hdte.checks import InvalidInput
 
 if TYPE_CHECKING:
-    from pymoo_hdte.drive import DataSheet, DriveModel
+    from pymoo_hdte.drive import CataloguePage, DataSheet, DriveModel
 
 BUILT_IN_SHEET = "hs_20_100"
 
-DRIVE_DETAILS = """DATASHEET is a TOML file with teeth, rated condition and nominal values, or the
-word hs_20_100 for the drive of the paper. MODEL is a TOML file with the make-up of theta_s and the
-effects beside Eq. (9), or a preset: calibrated, resonant or published, made for the HS-20-100."""
+DRIVE_DETAILS = """DATASHEET is a TOML file: a catalogue page (write one with: pymoo-hdte example),
+or teeth, rated condition and nominal values; or the word hs_20_100 for the drive of the paper.
+MODEL is a TOML file with the make-up of theta_s and the effects beside Eq. (9), or a preset:
+calibrated, resonant or published, made for the HS-20-100. A catalogue page has its own."""
 
 
 def add_drive_arguments(parser: argparse.ArgumentParser) -> None:
     """Add DATASHEET and --model."""
     parser.add_argument("datasheet", metavar="DATASHEET", help=f"TOML file, or {BUILT_IN_SHEET}")
     parser.add_argument(
-        "--model", default="calibrated", help="TOML file or preset (default calibrated)"
+        "--model", help="TOML file or preset (default: that of DATASHEET, else calibrated)"
     )
 
 
@@ -39,6 +40,15 @@ def read_drive(options: argparse.Namespace) -> tuple[DriveModel, tuple[str, ...]
     """
     from pymoo_hdte.drive import PRESETS, hs_20_100, load_model, preset
 
+    if (own_model := _whole_drive(options.datasheet)) is not None:
+        if options.model is None:
+            return own_model, remarks_on_estimates(options.datasheet)
+        sheet = own_model.sheet
+        if options.model not in PRESETS:
+            return load_model(Path(options.model), sheet), ()
+        allowed = f"none, as {Path(options.datasheet).name} has its own model, or a TOML file"
+        raise InvalidInput("--model", options.model, allowed)
+    options.model = "calibrated" if options.model is None else options.model
     sheet = read_sheet(options.datasheet)
     unsaid = _of_the_held_member(options.datasheet, sheet)
     if options.model not in PRESETS:
@@ -51,6 +61,56 @@ def read_drive(options: argparse.Namespace) -> tuple[DriveModel, tuple[str, ...]
         f"Effects, order lines and scatter of theta_s are those of the model {model.name!r}, made "
         f"for the {own.name}; they need not hold for {sheet.name}. Measure them, or give --model.",
     )
+
+
+def _whole_drive(named: str) -> DriveModel | None:
+    """Return the drive of a file that holds more than a data sheet."""
+    from pymoo_hdte.drive import load_drive
+    from pymoo_hdte.drive.drive_file import holds_model
+
+    if named == BUILT_IN_SHEET or not named or not Path(named).exists():
+        return None
+    return load_drive(named) if holds_model(named) else None
+
+
+def catalogue_page(named: str) -> CataloguePage | None:
+    """Return the catalogue page of a file; None for a drive that is described otherwise."""
+    from pymoo_hdte._io.toml import read_toml
+    from pymoo_hdte.drive import load_page
+
+    if named == BUILT_IN_SHEET or not read_toml(Path(named)).has("catalogue"):
+        return None
+    return load_page(named)
+
+
+def exceeded(page: CataloguePage, speed: float, load: float) -> tuple[str, ...]:
+    """Say which printed torque and speed of a page a condition, rad/s and N.m, exceeds."""
+    from pymoo_hdte.drive.catalogue import FIGURES, figure_text
+
+    given = {"torque": abs(load), "speed": speed}
+    above = [
+        f"{figure.name.replace('_', ' ')}, {figure_text(figure.name, figure.value)}"
+        for figure in page.entered
+        if figure.name.split("_")[0] in ("average", "repeated", "momentary", "largest")
+        and given[FIGURES[figure.name]] > figure.value
+    ]
+    return (f"This is above what is printed as the {'; '.join(above)}.",) if above else ()
+
+
+def remarks_on_estimates(named: str) -> tuple[str, ...]:
+    """Say which figures of a catalogue page are estimated, and how far they may be off."""
+    from pymoo_hdte.drive import complete
+    from pymoo_hdte.drive.catalogue import figure_text
+
+    page = catalogue_page(named)
+    if page is None:
+        return ()
+    estimated = [
+        f"{name} {figure_text(name, entry.value)} (± {100.0 * entry.tolerance:.0f} %)"
+        for name, entry in complete(page).items()
+        if entry.estimated
+    ]
+    return (f"Not on the page, so estimated: {', '.join(estimated)}.",) if estimated else ()
 
 
 def _of_the_held_member(named: str, sheet: DataSheet) -> tuple[str, ...]:
@@ -81,6 +141,8 @@ def read_sheet(named: str) -> DataSheet:
 
     if named == BUILT_IN_SHEET:
         return hs_20_100()
+    if (whole := _whole_drive(named)) is not None:
+        return whole.sheet
     if not named or not Path(named).exists():
         raise InvalidInput("DATASHEET", named, f"a TOML file that is there, or {BUILT_IN_SHEET}")
     return load_datasheet(Path(named))

@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
 from pymoo_hdte.checks import InvalidInput
+from pymoo_hdte.drive import CataloguePage, complete
 from pymoo_hdte.identification import (
     ErrorStatistics,
     LinearFit,
@@ -18,12 +20,14 @@ from pymoo_hdte.identification import (
     TorsionLoop,
     bearing_damping,
     error_statistics,
+    hysteresis_width,
     mesh_damping,
     read_error_measurements,
     read_no_load_runs,
     read_torsion_loops,
     series,
     stiffness,
+    stiffness_between,
 )
 from pymoo_hdte.identification.prototypes import RunKey
 
@@ -88,12 +92,81 @@ class Identification:
     loops : mapping of (prototype, repeat) to TorsionLoop
     errors : ErrorStatistics or None
         Errors of components in micrometres.
+    complete : mapping of (prototype, repeat) to NoLoadRun
+        Of the whole drive.
     """
 
     folder: str
     parameters: tuple[Parameter, ...]
     loops: Mapping[RunKey, TorsionLoop]
     errors: ErrorStatistics | None
+    complete: Mapping[RunKey, NoLoadRun]
+
+
+class MeasuredFigure(NamedTuple):
+    """A figure of a catalogue page, as records have it.
+
+    Attributes
+    ----------
+    value : float
+        Mean over the prototypes of the means of their repeats, SI.
+    prototypes : int
+        How many there are.
+    scatter : float
+        Standard deviation over them, SI; NaN for one.
+    """
+
+    value: float
+    prototypes: int
+    scatter: float
+
+
+def measured_figures(
+    identification: Identification, page: CataloguePage
+) -> dict[str, MeasuredFigure]:
+    """Return the figures of a catalogue page that the records hold.
+
+    K1 to K3 are the slopes between 0, T1, T2 and the peak of the loops, with T1 and T2 of the page;
+    starting and running torque are the line through the no-load torque of the whole drive, at rest
+    and at the rated speed.
+
+    Parameters
+    ----------
+    identification : Identification
+    page : CataloguePage
+
+    Returns
+    -------
+    dict of MeasuredFigure
+        By name; a loop that ends below T2 says nothing of K3.
+    """
+    entries = complete(page)
+    first, second, rated = (entries[name].value for name in ("T1", "T2", "rated_speed"))
+    ranges = {"K1": (0.0, first), "K2": (first, second), "K3": (second, np.inf)}
+    values: dict[str, dict[RunKey, float]] = {}
+    for key, loop in identification.loops.items():
+        peak = float(np.abs(loop.torque).max())
+        for name, (low, high) in ranges.items():
+            if peak > 1.2 * low:
+                values.setdefault(name, {})[key] = stiffness_between(loop, low, high).slope
+        if peak > 0.9 * entries["rated_torque"].value:
+            values.setdefault("hysteresis_loss", {})[key] = hysteresis_width(loop)
+    for key, run in identification.complete.items():
+        line = bearing_damping(run)
+        values.setdefault("no_load_starting_torque", {})[key] = line.intercept
+        running = line.intercept + line.slope * rated
+        values.setdefault("no_load_running_torque", {})[key] = running
+    return {name: _over_prototypes(runs) for name, runs in values.items()}
+
+
+def _over_prototypes(runs: Mapping[RunKey, float]) -> MeasuredFigure:
+    prototypes = sorted({prototype for prototype, _ in runs})
+    means = [
+        np.mean([value for (prototype, _), value in runs.items() if prototype == one])
+        for one in prototypes
+    ]
+    scatter = float(np.std(means, ddof=1)) if len(means) > 1 else np.nan
+    return MeasuredFigure(float(np.mean(means)), len(means), scatter)
 
 
 def identify_drive(folder: Path) -> Identification:
@@ -131,6 +204,7 @@ def identify_drive(folder: Path) -> Identification:
         folder=folder.resolve().name or str(folder),
         parameters=tuple(Parameter(name, runs) for name, runs in fits.items() if runs),
         loops=loops,
+        complete=runs.get(COMPLETE, {}),
         errors=error_statistics(*read_error_measurements(folder / ERRORS))
         if ERRORS in present
         else None,

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import tomllib
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -10,27 +12,38 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
+from pymoo_hdte._io.fields import Fields
+from pymoo_hdte._io.toml import toml_text
 from pymoo_hdte._reports.figures import AFTER, BEFORE, GREY, data_uri
 from pymoo_hdte._reports.folder import ReportFolder
 from pymoo_hdte._reports.html import digits, number, page
 from pymoo_hdte.cli.command import heading
-from pymoo_hdte.cli.identification import LOOPS, Identification, Parameter
-from pymoo_hdte.drive import DataSheet
+from pymoo_hdte.cli.identification import (
+    LOOPS,
+    Identification,
+    MeasuredFigure,
+    Parameter,
+    measured_figures,
+)
+from pymoo_hdte.drive import DataSheet, drive_of, load_page
+from pymoo_hdte.drive.catalogue import FIGURES, figure_text, page_from_fields
 from pymoo_hdte.drive.datasheet import NOMINAL_FIELDS, unit_of
 from pymoo_hdte.drive.datasheet_file import check_twist
 from pymoo_hdte.drive.toml_text import sheet_toml
+from pymoo_hdte.effects.quantities import with_unit
 from pymoo_hdte.identification import ErrorStatistics, hysteresis_width, lost_energy
 from pymoo_hdte.units import ARCSEC, UNITS
 
 SHEET_FILE = "identified_sheet.toml"
-FOLDER = ReportFolder("parameters.json", optional=(SHEET_FILE,))
+DRIVE_FILE = "identified_drive.toml"
+FOLDER = ReportFolder("parameters.json", optional=(SHEET_FILE, DRIVE_FILE))
 
 _TOO_EQUAL = 1e-3
 """Scatter over prototypes, as a share of one record's error, too small for separate drives."""
 
 
 def write_identification_report(
-    identification: Identification, sheet: DataSheet | None, out: Path
+    identification: Identification, sheet: DataSheet | None, out: Path, page: Path | None = None
 ) -> dict[str, Any]:
     """Write a report; errors as `ReportFolder.write`.
 
@@ -40,6 +53,8 @@ def write_identification_report(
     sheet : DataSheet or None
         Data sheet that receives the identified values; None for none.
     out : Path
+    page : Path, optional
+        File of a catalogue page, which receives the measured figures in place of a data sheet.
 
     Returns
     -------
@@ -48,10 +63,44 @@ def write_identification_report(
     """
     document = identification_document(identification, sheet)
     others = {}
-    if sheet is not None:
+    if page is not None:
+        figures = measured_figures(identification, load_page(page))
+        document["figures"] = {
+            name: {
+                "value": figure.value,
+                "prototypes": figure.prototypes,
+                "std_between_prototypes": figure.scatter if figure.prototypes > 1 else None,
+            }
+            for name, figure in figures.items()
+        }
+        document["sentences"].append(_of_page(figures))
+        others[DRIVE_FILE] = filled_in(page, figures, identification.folder)
+    elif sheet is not None:
         others[SHEET_FILE] = sheet_toml(identified_sheet(identification, sheet))
     FOLDER.write(out, _page(identification, document), document, others)
     return document
+
+
+def _of_page(figures: Mapping[str, MeasuredFigure]) -> str:
+    said = ", ".join(f"{name} {figure_text(name, one.value)}" for name, one in figures.items())
+    return f"Figures of the page: {said}." if said else "No figure of the page was measured."
+
+
+def filled_in(page: Path, figures: Mapping[str, MeasuredFigure], source: str) -> str:
+    """Return a catalogue page as TOML with measured figures in place of its own.
+
+    Raises
+    ------
+    InvalidInput
+        If the drive that follows is none.
+    """
+    table = tomllib.loads(page.read_text(encoding="utf-8"))
+    for name, figure in figures.items():
+        table["catalogue"][name] = with_unit(figure.value, FIGURES[name])
+    table["source"] = f"{table['source']}; {', '.join(figures)} identified from {source}"
+    text = toml_text(table)
+    drive_of(page_from_fields(Fields(tomllib.loads(text), DRIVE_FILE)))
+    return text
 
 
 def identified_sheet(identification: Identification, sheet: DataSheet) -> DataSheet:

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 
 from pymoo_hdte.cli.command import Command, Outcome, Say, outcome_of
-from pymoo_hdte.cli.drive_arguments import BUILT_IN_SHEET, read_sheet
+from pymoo_hdte.cli.drive_arguments import BUILT_IN_SHEET, catalogue_page, read_sheet
 
 _DETAILS = """example:
   pymoo-hdte identify bench/series-1 --out reports/series-1
@@ -18,7 +18,9 @@ RECORDS is a folder with one or more of these CSV files, each with columns proto
   no_load_output.csv     the same of the output bearing, at its own speeds                  (B_out)
   errors.csv             one column SYMBOL_um for each error of a component         (Table 2)
 DIR gets report.html, parameters.json and, with --datasheet, identified_sheet.toml: that data sheet
-with the identified values in it. An earlier report there is replaced, anything else refused.
+with the identified values in it; or identified_drive.toml, a catalogue page with its K1 to K3,
+hysteresis loss and no-load torques as measured. An earlier report there is replaced, anything else
+refused.
 Exit codes: 0 identified; 2 the input is at fault."""
 
 
@@ -39,12 +41,15 @@ def _run(options: argparse.Namespace, say: Say) -> Outcome:
 
     with FOLDER.held(options.out):
         sheet = read_sheet(options.datasheet) if options.datasheet is not None else None
+        page = None
+        if options.datasheet is not None and catalogue_page(options.datasheet) is not None:
+            page = Path(options.datasheet)
         say("reading the records and fitting")
         identification = identify_drive(options.records)
         if sheet is not None:
             check_filled_in(identification, sheet)
         return outcome_of(
-            write_identification_report(identification, sheet, options.out), options.out
+            write_identification_report(identification, sheet, options.out, page), options.out
         )
 
 

@@ -7,7 +7,19 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pymoo_hdte.drive import DriveModel, Run, simulate_drive
+from pymoo_hdte.drive import (
+    CataloguePage,
+    Comparison,
+    DriveModel,
+    OperatingMap,
+    Run,
+    back_driving_torque,
+    compared,
+    efficiency,
+    operating_map,
+    simulate_drive,
+    starting_torque,
+)
 from pymoo_hdte.drive.dte_map import (
     SpeedLoadMap,
     TorsionalMode,
@@ -20,10 +32,16 @@ from pymoo_hdte.units import ARCSEC, REVOLUTION_PER_MINUTE
 FASTEST = 2.0
 """Highest speed of the map, as a multiple of the condition's."""
 SPEEDS = 80
+MAP_SPEEDS, MAP_LOADS = 40, 17
+"""Grid of the operating map; the number of loads is odd, so that no load is among them."""
 SETTLE = 1.5
 """Time before the record begins, s."""
 TURNS_TO_SETTLE = 0.02
 """Least number of output turns before the record begins; it decides at low speed."""
+
+WITH_MEMORY = 1e-5
+"""Tolerance of the integration where a law has memory, whose kinks cost steps: the DTE is off by
+less than 1 % then."""
 
 Values = NDArray[np.float64]
 
@@ -46,6 +64,13 @@ class Simulation:
         DTE over `SPEEDS` speeds up to `FASTEST` times this speed, at this load.
     mode : TorsionalMode
     resonances : list of (order, input speed in r/min)
+    efficiency : float
+        Power out over power in; NaN without load.
+    starting, back_driving : float
+        Torque that starts the unloaded input, and the free output, N.m.
+    printed : tuple of Comparison
+        Figures of the catalogue page that were not entered.
+    map : OperatingMap or None
     """
 
     model: DriveModel
@@ -55,6 +80,11 @@ class Simulation:
     speeds: SpeedLoadMap
     mode: TorsionalMode
     resonances: list[tuple[float, float]]
+    efficiency: float
+    starting: float
+    back_driving: float
+    printed: tuple[Comparison, ...] = ()
+    map: OperatingMap | None = None
 
     @property
     def speed(self) -> float:
@@ -67,8 +97,18 @@ class Simulation:
         return self.run.dte_arcsec() / self.steady - 1.0
 
 
-def simulate_condition(model: DriveModel) -> Simulation:
+def simulate_condition(
+    model: DriveModel, with_map: bool = False, page: CataloguePage | None = None
+) -> Simulation:
     """Simulate the nominal design of a model at the condition of its data sheet.
+
+    Parameters
+    ----------
+    model : DriveModel
+    with_map : bool
+        Whether to go over speeds, loads and directions, too.
+    page : CataloguePage, optional
+        Whose printed figures are compared.
 
     Raises
     ------
@@ -83,7 +123,12 @@ def simulate_condition(model: DriveModel) -> Simulation:
     speeds = np.linspace(0.0, fastest, SPEEDS + 1)[1:]
     return Simulation(
         model=model,
-        run=simulate_drive(model, model.nominal, settle=max(SETTLE, TURNS_TO_SETTLE * turn)),
+        run=simulate_drive(
+            model,
+            model.nominal,
+            settle=max(SETTLE, TURNS_TO_SETTLE * turn),
+            rtol=WITH_MEMORY if _remembers(model) else 1e-8,
+        ),
         steady=float(spectrum.peak_to_peak(model.sheet.ratio)[0] / ARCSEC),
         lines={
             order: float(amplitude[0] / ARCSEC)
@@ -92,4 +137,20 @@ def simulate_condition(model: DriveModel) -> Simulation:
         speeds=speed_load_map(model, speeds, np.array([model.sheet.load_torque])),
         mode=torsional_mode(model),
         resonances=critical_speeds(model),
+        efficiency=float(efficiency(model, model.sheet.input_speed, model.sheet.load_torque)[0]),
+        starting=starting_torque(model),
+        back_driving=back_driving_torque(model),
+        printed=() if page is None else tuple(compared(page)),
+        map=_map(model, fastest) if with_map else None,
     )
+
+
+def _remembers(model: DriveModel) -> bool:
+    laws = (effect.at_port() for effect in model.effects)
+    return any(law is not None and law[1].states for law in laws)
+
+
+def _map(model: DriveModel, fastest: float) -> OperatingMap:
+    load = abs(model.sheet.load_torque) or 1.0
+    speeds = np.linspace(0.0, fastest * REVOLUTION_PER_MINUTE, MAP_SPEEDS + 1)[1:]
+    return operating_map(model, speeds, np.linspace(-load, load, MAP_LOADS))

@@ -7,21 +7,27 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from pymoo_hdte._io.csv_table import csv_text
-from pymoo_hdte._reports.figures import AFTER, BEFORE, GREY, data_uri
+from pymoo_hdte._reports.figures import AFTER, BEFORE, GREY, svg, svg_uri
 from pymoo_hdte._reports.folder import ReportFolder
 from pymoo_hdte._reports.html import change, number, page
 from pymoo_hdte.cli.command import heading
 from pymoo_hdte.cli.simulation import FASTEST, Simulation
-from pymoo_hdte.drive.dte_map import neighbouring_resonances
-from pymoo_hdte.units import ARCSEC
+from pymoo_hdte.drive import OperatingMap
+from pymoo_hdte.drive.catalogue import figure_text
+from pymoo_hdte.drive.dte_map import DIRECTIONS, neighbouring_resonances
+from pymoo_hdte.units import ARCSEC, REVOLUTION_PER_MINUTE
 
 TURN_FILE = "transmission_error.csv"
 LINES_FILE = "order_lines.csv"
 SPEEDS_FILE = "speeds.csv"
-FOLDER = ReportFolder("simulation.json", (TURN_FILE, LINES_FILE, SPEEDS_FILE))
+MAP_FILE, MAP_PICTURE = "map.csv", "map.svg"
+FOLDER = ReportFolder(
+    "simulation.json", (TURN_FILE, LINES_FILE, SPEEDS_FILE), (MAP_FILE, MAP_PICTURE)
+)
 
 _RESONANCE_MARGIN = 0.15
 """Distance of speed and resonance, relative, below which the report mentions it."""
@@ -48,8 +54,39 @@ def write_simulation_report(
         LINES_FILE: csv_text(("order", "amplitude_arcsec"), simulation.lines.items()),
         SPEEDS_FILE: csv_text(("input_speed_r_min", "dte_arcsec"), speeds.tolist()),
     }
-    FOLDER.write(out, _page(simulation, document), document, others)
+    pictures = {
+        "turn": svg(_turn_figure(simulation)),
+        "lines": svg(_lines_figure(simulation)),
+        "speeds": svg(_speeds_figure(simulation)),
+    }
+    if simulation.map is not None:
+        pictures["map"] = svg(map_figure(simulation.map))
+        others |= {MAP_FILE: map_table(simulation.map), MAP_PICTURE: pictures["map"]}
+    FOLDER.write(out, _page(simulation, document, pictures), document, others)
     return document
+
+
+def map_table(mapped: OperatingMap) -> str:
+    """Return an operating map as CSV, a row a condition; unknown values are empty."""
+    columns = (
+        "direction", "input_speed_r_min", "load_Nm", "dte_arcsec", "torque_ripple_Nm",
+        "motor_torque_Nm", "efficiency",
+    )  # fmt: skip
+    rows = [
+        (
+            direction,
+            speed,
+            load,
+            *(
+                None if np.isnan(values[place, row, column]) else float(values[place, row, column])
+                for values in (mapped.dte, mapped.ripple, mapped.motor_torque, mapped.efficiency)
+            ),
+        )
+        for place, direction in enumerate(DIRECTIONS)
+        for row, load in enumerate(mapped.loads.tolist())
+        for column, speed in enumerate((mapped.speeds / REVOLUTION_PER_MINUTE).tolist())
+    ]
+    return csv_text(columns, rows)
 
 
 def simulation_document(simulation: Simulation, notes: Sequence[str]) -> dict[str, Any]:
@@ -66,6 +103,23 @@ def simulation_document(simulation: Simulation, notes: Sequence[str]) -> dict[st
             "frequency_Hz": simulation.mode.frequency,
             "damping_ratio": simulation.mode.damping_ratio,
         },
+        "efficiency": None if np.isnan(simulation.efficiency) else simulation.efficiency,
+        "starting_torque_Nm": simulation.starting,
+        "back_driving_torque_Nm": (
+            simulation.back_driving if np.isfinite(simulation.back_driving) else None
+        ),
+        "printed_figures": [
+            {
+                "figure": comparison.figure.name,
+                "printed": comparison.figure.value,
+                "limit": comparison.figure.limit,
+                "tolerance": comparison.figure.tolerance,
+                "predicted": comparison.value,
+                "interval90": [comparison.low, comparison.high],
+                "holds": comparison.holds,
+            }
+            for comparison in simulation.printed
+        ],
         "resonances": [
             {"order": order, "input_speed_r_min": speed} for order, speed in simulation.resonances
         ],
@@ -87,12 +141,52 @@ def sentences(simulation: Simulation) -> list[str]:
         )
     else:
         mode = "The torsional mode is damped too much to resonate."
-    return [
+    said = [
         f"DTE {simulation.steady:.2f} arcsec peak-to-peak at {simulation.speed:.0f} r/min and "
         f"{number(simulation.model.sheet.load_torque)} N.m.",
         f"Its largest lines, by order of the input turn: {made_of}.",
         mode,
+        _torques(simulation),
     ]
+    if simulation.printed:
+        off = [c.figure.name for c in simulation.printed if not c.holds]
+        said.append(
+            f"Of {len(simulation.printed)} printed figures that were not entered, the model meets "
+            f"{len(simulation.printed) - len(off)}"
+            + (f"; it does not meet {', '.join(off)}." if off else ".")
+        )
+    if simulation.map is not None:
+        said.append(_of_map(simulation.map))
+    return said
+
+
+def _torques(simulation: Simulation) -> str:
+    """Say what the drive loses, and which torque starts it from either side."""
+    starting = f"{number(1e3 * simulation.starting, 3)} mN.m start the unloaded input"
+    back = (
+        f"and {number(simulation.back_driving, 3)} N.m at the output drive it back"
+        if np.isfinite(simulation.back_driving)
+        else "and no torque at the output drives it back"
+    )
+    if np.isnan(simulation.efficiency):
+        return f"{starting}, {back}."
+    return f"Efficiency {number(100.0 * simulation.efficiency, 3)} %; {starting}, {back}."
+
+
+def _of_map(mapped: OperatingMap) -> str:
+    """Say where the map has its largest error and which loads the motor cannot let drive."""
+    place, row, column = np.unravel_index(np.nanargmax(mapped.dte), mapped.dte.shape)
+    speed = mapped.speeds[column] / REVOLUTION_PER_MINUTE
+    said = (
+        f"Over the map the DTE is largest, {mapped.dte[place, row, column]:.0f} arcsec, "
+        f"{list(DIRECTIONS)[place]} at {speed:.0f} r/min and "
+        f"{number(mapped.loads[row], 3)} N.m"
+    )
+    driving = (mapped.loads < 0.0)[None, :, None]
+    pushed = np.mean(mapped.motor_torque[np.broadcast_to(driving, mapped.dte.shape)] > 0.0)
+    return (
+        f"{said}; {100.0 * pushed:.0f} % of the conditions with a driving load still need a motor."
+    )
 
 
 def limits(simulation: Simulation, notes: Sequence[str]) -> list[str]:
@@ -116,6 +210,11 @@ def limits(simulation: Simulation, notes: Sequence[str]) -> list[str]:
             f"{change(100.0 * simulation.difference)}: "
             "the input angle itself fluctuates, or the motion has not settled."
         )
+    if simulation.map is not None and simulation.map.not_found:
+        said.append(
+            f"At {simulation.map.not_found} of {simulation.map.dte.size} conditions of the map no "
+            "steady state was found."
+        )
     if simulation.speeds.unstable:
         said.append(
             f"At {simulation.speeds.unstable} of {simulation.speeds.dte.size} speeds the drive "
@@ -131,7 +230,7 @@ def _moving(simulation: Simulation) -> dict[float, float]:
     return {order: size for order, size in lines.items() if size >= least}
 
 
-def _page(simulation: Simulation, document: dict[str, Any]) -> str:
+def _page(simulation: Simulation, document: dict[str, Any], pictures: dict[str, str]) -> str:
     return page(
         "pymoo_hdte.cli",
         "simulation.html.j2",
@@ -140,11 +239,8 @@ def _page(simulation: Simulation, document: dict[str, Any]) -> str:
         document=document,
         lines=_moving(simulation),
         fastest=FASTEST,
-        pictures={
-            "turn": data_uri(_turn_figure(simulation)),
-            "lines": data_uri(_lines_figure(simulation)),
-            "speeds": data_uri(_speeds_figure(simulation)),
-        },
+        figure_text=figure_text,
+        pictures={name: svg_uri(text) for name, text in pictures.items()},
     )
 
 
@@ -195,3 +291,55 @@ def _speeds_figure(simulation: Simulation) -> Figure:
     axis.set_xlabel("input speed [r/min]")
     axis.set_ylabel("DTE [arcsec]")
     return figure
+
+
+def map_figure(mapped: OperatingMap) -> Figure:
+    """Draw error, torque ripple and efficiency over speed and load, a row for each direction."""
+    speeds = mapped.speeds / REVOLUTION_PER_MINUTE
+    figure = Figure(figsize=(11.0, 6.4), layout="constrained")
+    axes = figure.subplots(2, 3, sharex=True, sharey=True)
+    parts = (
+        ("DTE [arcsec]", mapped.dte, "viridis"),
+        ("torque ripple [N.m]", mapped.ripple, "viridis"),
+        ("efficiency", mapped.efficiency, "cividis"),
+    )
+    for column, (label, values, colours) in enumerate(parts):
+        low, high = (0.0, 1.0) if label == "efficiency" else np.nanquantile(values, [0.0, 0.98])
+        for place, direction in enumerate(DIRECTIONS):
+            axis = axes[place, column]
+            mesh = axis.pcolormesh(
+                speeds, mapped.loads, values[place], vmin=low, vmax=high, cmap=colours,
+                shading="nearest", rasterized=True,
+            )  # fmt: skip
+            axis.set_title(f"{label}, {direction}", fontsize=10)
+            _draw_resonances(axis, mapped, label != "efficiency")
+        figure.colorbar(mesh, ax=axes[:, column], extend="max" if high != 1.0 else "neither")
+    for axis in axes[:, 0]:
+        axis.set_ylabel("load against the motion [N.m]")
+    for axis in axes[-1]:
+        axis.set_xlabel("input speed [r/min]")
+    return figure
+
+
+def _draw_resonances(axis: Axes, mapped: OperatingMap, shown: bool) -> None:
+    """Draw the speed of each resonance over the load, named at the top."""
+    if not shown:
+        return
+    fastest = mapped.speeds[-1] / REVOLUTION_PER_MINUTE
+    for order, at in mapped.resonances().items():
+        speeds = at / REVOLUTION_PER_MINUTE
+        if speeds.min() > fastest or order % 1.0:
+            continue
+        axis.plot(speeds, mapped.loads, color="white", linestyle="--", linewidth=1.0)
+        axis.annotate(
+            f"order {order:g}",
+            (min(speeds[-1], fastest), mapped.loads[-1]),
+            xytext=(-3, -3),
+            textcoords="offset points",
+            color="white",
+            fontsize=8,
+            rotation=90,
+            ha="right",
+            va="top",
+        )
+    axis.set_xlim(0.0, fastest)

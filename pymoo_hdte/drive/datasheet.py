@@ -176,7 +176,7 @@ class DataSheet:
     input_speed : float
         Rated, rad/s.
     load_torque : float
-        Rated, N.m at the output.
+        Rated, N.m at the output; negative where the load drives.
     nominal : Nominal
         Parameters of the motion, Eq. (9), as in Table 4: ``static_error`` in rad, ``stiffness``
         in N.m/rad, inertias in kg.m2 and damping in N.m.s/rad.
@@ -217,7 +217,7 @@ class DataSheet:
         if self.orders_as_held is not None:
             one_of("orders_as_held", self.orders_as_held, MEMBERS)
         real_number("input_speed", self.input_speed, above=0.0)
-        real_number("load_torque", self.load_torque, at_least=0.0)
+        real_number("load_torque", self.load_torque)
         symbols = [source.symbol for source in self.error_sources]
         if len(set(symbols)) != len(symbols):
             raise InvalidInput("symbols of the error sources", symbols, "each symbol once")

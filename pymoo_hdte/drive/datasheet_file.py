@@ -106,7 +106,7 @@ def datasheet_from_fields(sheet: Fields, unstated: Arrangement | None = None) ->
         held=held,
         orders_as_held=as_held,
         input_speed=rated.quantity("input_speed", "speed", above=0.0),
-        load_torque=rated.quantity("load_torque", "torque", at_least=0.0),
+        load_torque=rated.quantity("load_torque", "torque"),
         nominal=_nominal(sheet.table("nominal")),
         mesh=_mesh(sheet.table("mesh")),
         error_sources=tuple(_error_source(row) for row in sheet.tables("error_source")),
@@ -149,7 +149,7 @@ def check_twist(sheet: DataSheet, field: str = "stiffness", cause: str = LOST_PO
     >>> check_twist(hs_20_100())
     """
     stiffness = sheet.nominal.stiffness
-    if sheet.load_torque > LARGEST_TWIST * stiffness:
+    if abs(sheet.load_torque) > LARGEST_TWIST * stiffness:
         allowed = (
             f"at least {sheet.load_torque / LARGEST_TWIST:.3g} N.m/rad, or the rated load of the "
             f"data sheet would twist the drive by more than {LARGEST_TWIST:g} rad; {cause}"

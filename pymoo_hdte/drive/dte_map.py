@@ -1,4 +1,4 @@
-"""DTE of one design over input speed and load, with the resonances that explain it."""
+"""One design over input speed, load and direction, with the resonances that explain it."""
 
 from __future__ import annotations
 
@@ -10,9 +10,14 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from pymoo_hdte.drive._solve.coefficients import Coefficients
+from pymoo_hdte.drive._solve.free_angle import harmonic_balance
+from pymoo_hdte.drive._solve.order_spectrum import OrderSpectrum
 from pymoo_hdte.drive._solve.stability import state_matrix
+from pymoo_hdte.drive._solve.steady_motion import BY_CASE, SteadyMotion
+from pymoo_hdte.drive.figures import power_share
 from pymoo_hdte.drive.model import DriveModel
-from pymoo_hdte.units import REVOLUTION_PER_MINUTE
+from pymoo_hdte.units import ARCSEC, REVOLUTION_PER_MINUTE
 
 _PROMINENCE = 0.02
 """Least prominence of a peak over speed, as a share of its height."""
@@ -149,3 +154,154 @@ def speed_load_map(
             # Left NaN: a motion that grows, or is not found, has no peak-to-peak.
             continue
     return SpeedLoadMap(model, speeds, loads, dte)
+
+
+DIRECTIONS = {"forward": 1.0, "reverse": -1.0}
+"""Directions of an operating map, with the sign of the input speed."""
+
+
+@dataclass(frozen=True, eq=False)
+class OperatingMap:
+    """What the nominal design does over speed, load and direction.
+
+    A positive load opposes the motion, in either direction; a negative one drives it.
+
+    Attributes
+    ----------
+    model : DriveModel
+    speeds : ndarray, shape (n,)
+        Of the input, rad/s, above 0.
+    loads : ndarray, shape (m,)
+        N.m at the output.
+    dte : ndarray, shape (2, m, n)
+        Peak-to-peak of the transmission error over an output turn, arcsec; first index as
+        `DIRECTIONS`. NaN, here and below, where no steady state was found.
+    ripple : ndarray, shape (2, m, n)
+        Peak-to-peak of the torque between drive and load inertia, N.m.
+    motor_torque : ndarray, shape (2, m, n)
+        Mean torque of the motor in the direction of motion, N.m; negative where it brakes.
+    efficiency : ndarray, shape (2, m, n)
+        Power out over power in, whichever side drives, dimensionless; 0 where both have to push,
+        NaN without load.
+    tangent : ndarray, shape (m,)
+        Mean stiffness of the mesh about the torsion under each load, N.m/rad.
+
+    Examples
+    --------
+    >>> mapped = operating_map(preset("calibrated"), np.array([100.0, 200.0]), np.array([-40.0]))
+    >>> mapped.dte.shape, mapped.not_found
+    ((2, 1, 2), 0)
+    """
+
+    model: DriveModel
+    speeds: NDArray[np.float64]
+    loads: NDArray[np.float64]
+    dte: NDArray[np.float64]
+    ripple: NDArray[np.float64]
+    motor_torque: NDArray[np.float64]
+    efficiency: NDArray[np.float64]
+    tangent: NDArray[np.float64]
+
+    @property
+    def not_found(self) -> int:
+        """Number of conditions without a steady state."""
+        return int(np.isnan(self.dte).sum())
+
+    def resonances(self) -> dict[float, NDArray[np.float64]]:
+        """Return the input speed of the resonance of each excited order under each load, rad/s.
+
+        That of the two inertias against the `tangent` stiffness; empty where damping leaves none.
+
+        Returns
+        -------
+        dict of ndarray, shape (m,)
+            By order, rad/s.
+        """
+        if not torsional_mode(self.model).resonates:
+            return {}
+        coefficients = self.model.coefficients(self.model.nominal[None])
+        input_inertia = coefficients.input_inertia[0] * coefficients.ratio**2
+        compliance = 1.0 / input_inertia + 1.0 / np.ravel(coefficients.output_inertia)[0]
+        frequency = np.sqrt(self.tangent * compliance)
+        orders = {order for order, _ in critical_speeds(self.model)}
+        return {order: frequency / order for order in sorted(orders)}
+
+
+def operating_map(
+    model: DriveModel, speeds: NDArray[np.float64], loads: NDArray[np.float64]
+) -> OperatingMap:
+    """Return error, ripple, motor torque and efficiency over speed, load and direction.
+
+    Parameters
+    ----------
+    model : DriveModel
+    speeds : ndarray, shape (n,)
+        Of the input, rad/s, above 0.
+    loads : ndarray, shape (m,)
+        N.m at the output; positive ones oppose the motion.
+
+    Returns
+    -------
+    OperatingMap
+
+    Examples
+    --------
+    >>> mapped = operating_map(preset("calibrated"), np.array([200.0]), np.array([40.0]))
+    >>> print(f"{mapped.efficiency[0, 0, 0]:.2f}")
+    0.92
+    """
+    shape = (len(DIRECTIONS), len(loads), len(speeds))
+    sign = np.reshape(list(DIRECTIONS.values()), (-1, 1, 1))
+    speed = np.broadcast_to(sign * speeds, shape).ravel()
+    load = np.broadcast_to(sign * loads[:, None], shape).ravel()
+    rows = model.coefficients(np.repeat(model.nominal[None], len(speed), axis=0))
+    motion = _near_what_was_found(
+        rows, harmonic_balance(rows, input_speed=speed, load_torque=load), speed, load
+    )
+    found = np.where(motion.converged, 1.0, np.nan)
+    torque = motion.motor_torque[:, 0].real * found
+    ripple = OrderSpectrum(motion.torus.orders[1:], motion.coupling_torque[:, 1:])
+    of_motion = np.reshape(torque, shape) * sign
+    tangent = np.reshape(motion.slopes[:, 0] * found, shape)
+    return OperatingMap(
+        model=model,
+        speeds=speeds,
+        loads=loads,
+        dte=np.reshape(motion.spectrum().peak_to_peak(model.sheet.ratio) / ARCSEC * found, shape),
+        ripple=np.reshape(ripple.peak_to_peak(model.sheet.ratio) * found, shape),
+        motor_torque=of_motion,
+        efficiency=power_share(
+            of_motion * model.sheet.ratio, np.broadcast_to(loads[:, None], shape)
+        ),
+        tangent=np.nanmedian(np.moveaxis(tangent, 1, 0).reshape(len(loads), -1), axis=1),
+    )
+
+
+def _near_what_was_found(
+    rows: Coefficients,
+    motion: SteadyMotion,
+    speed: NDArray[np.float64],
+    load: NDArray[np.float64],
+) -> SteadyMotion:
+    """Return the motion with lost conditions solved again from the nearest ones in speed and load.
+
+    It ends when a round finds none.
+    """
+    places = np.column_stack([speed / np.abs(speed).max(), load / max(np.abs(load).max(), 1e-300)])
+    while (~motion.converged).any() and motion.converged.any():
+        lost, known = np.flatnonzero(~motion.converged), np.flatnonzero(motion.converged)
+        nearest = known[scipy.spatial.cKDTree(places[known]).query(places[lost])[1]]
+        again = harmonic_balance(
+            rows.rows(lost),
+            input_speed=speed[lost],
+            load_torque=load[lost],
+            torus=motion.torus,
+            start=motion.rows(nearest),
+        )
+        if not again.converged.any():
+            break
+        values = {name: getattr(motion, name).copy() for name in BY_CASE}
+        for name, whole in values.items():
+            whole[lost[again.converged]] = getattr(again, name)[again.converged]
+        motion = SteadyMotion(motion.torus, **values)
+    return motion

@@ -168,7 +168,7 @@ class DriveModel(ModelValues):
         input_speed : float
             Mean speed of the input, rad/s, above 0.
         load_torque : float
-            N.m at the output, at least 0.
+            N.m at the output; negative where it drives the motion.
 
         Returns
         -------

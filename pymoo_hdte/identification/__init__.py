@@ -25,6 +25,7 @@ from pymoo_hdte.identification.torsion import (
     loop_branches,
     lost_energy,
     stiffness,
+    stiffness_between,
 )
 
 __all__ = [
@@ -50,4 +51,5 @@ __all__ = [
     "read_torsion_loops",
     "series",
     "stiffness",
+    "stiffness_between",
 ]

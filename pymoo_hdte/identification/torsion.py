@@ -186,6 +186,53 @@ def stiffness(loop: TorsionLoop) -> LinearFit:
     return fit_line(torsion, torque, noise_of(loop.torque - slope * loop.torsion))
 
 
+def stiffness_between(loop: TorsionLoop, low: float, high: float) -> LinearFit:
+    """Return the stiffness between two torques, of either sign: K1, K2 or K3 of a catalogue.
+
+    One slope of torque over torsion through the samples whose torque is between the two in size,
+    each branch about its own mean, so that the width of the loop does not count. From zero on, they
+    are those of a2 to a4, since a1 begins without hysteresis; further up, those of the loading
+    branches a1 and a3, since after a turning point the loop is as stiff as before slip.
+
+    Parameters
+    ----------
+    loop : TorsionLoop
+        In N.m and rad.
+    low, high : float
+        N.m, at least 0; 0 and T1 for K1.
+
+    Returns
+    -------
+    LinearFit
+        Slope in N.m/rad; the intercept is about 0.
+
+    Raises
+    ------
+    InvalidInput
+        If fewer than three samples lie there.
+
+    Examples
+    --------
+    >>> torque = np.concatenate([np.linspace(a, b, 50) for a, b in ((0, 9), (9, -9), (-9, 0))])
+    >>> print(f"{stiffness_between(TorsionLoop(torque, torque / 3e4), 2.0, 6.0).slope:.0f} N.m/rad")
+    30000 N.m/rad
+    """
+    torques, torsions = [], []
+    size = np.abs(loop.torque)
+    for name in ("a1", "a3") if low > 0.0 else ("a2", "a3", "a4"):
+        branch = np.zeros(len(size), dtype=bool)
+        branch[loop.branches[name]] = True
+        inside = branch & (size >= low) & (size <= high)
+        if inside.any():
+            torques.append(loop.torque[inside] - loop.torque[inside].mean())
+            torsions.append(loop.torsion[inside] - loop.torsion[inside].mean())
+    found = sum(len(part) for part in torques)
+    if found < FEWEST_SAMPLES:
+        allowed = f"at least {FEWEST_SAMPLES}"
+        raise InvalidInput(f"samples between {low:g} and {high:g} N.m", found, allowed)
+    return fit_line(np.concatenate(torsions), np.concatenate(torques))
+
+
 def hysteresis_width(loop: TorsionLoop) -> float:
     """Return the torsion at zero torque after forward minus that after reverse loading, rad.
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from pymoo_hdte.mechanism.mechanism import Mechanism
 from pymoo_hdte.mechanism.motion import smoothed_noise
-from pymoo_hdte.mechanism.parts import LawAt
+from pymoo_hdte.mechanism.parts import LawAt, Port
 from pymoo_hdte.mechanism.port_motion import PortMotion
 from pymoo_hdte.mechanism.records import Record
 
@@ -117,11 +117,7 @@ def moving_rows(
     period = max(round(1.0 / (cutoff * step)), 2)
 
     def still(values: Values, channels: Mapping[str, float]) -> NDArray[np.bool_]:
-        noise = [
-            share * smoothed_noise(record.noise_of(channel), record.step, cutoff)[1]
-            for channel, share in channels.items()
-        ]
-        return np.abs(values) < STILL * np.hypot.reduce(noise)
+        return np.abs(values) < STILL * _noise_of_speed(channels, record, cutoff)
 
     standing = [still(values, {name: 1.0}) for name, values in speed.items()]
     rests = _long(np.logical_and.reduce(standing), period)
@@ -138,6 +134,19 @@ def moving_rows(
     if not rests.any():
         return MovingRows(np.ones_like(away))
     return MovingRows(away) if enough else MovingRows(np.ones_like(away), rests=True)
+
+
+def speed_noise(port: Port, record: Record, cutoff: float) -> float:
+    """Return the standard deviation of the noise of the smoothed speed at a port, SI."""
+    return _noise_of_speed({**port.motion, **port.followed}, record, cutoff)
+
+
+def _noise_of_speed(channels: Mapping[str, float], record: Record, cutoff: float) -> float:
+    noise = [
+        share * smoothed_noise(record.noise_of(channel), record.step, cutoff)[1]
+        for channel, share in channels.items()
+    ]
+    return float(np.hypot.reduce(noise))
 
 
 def _long(still: NDArray[np.bool_], least: int) -> NDArray[np.bool_]:

@@ -123,7 +123,7 @@ def test_the_ratio_of_a_sheet_that_does_not_say_which_member_is_held_is_said(tmp
     [
         (("--speed", "0"), "--speed is 0.0"),
         (("--speed", "inf"), "--speed is inf"),
-        (("--load", "-3"), "--load is -3.0"),
+        (("--load", "-2000000"), "--load is -2000000.0"),
         (("--load", "1e300"), "--load is 1e+300"),
         (("--speed", "1e6"), "--speed is 1000000.0"),
     ],

@@ -20,8 +20,8 @@ def commands():
         line for block in re.findall(r"```sh\n(.*?)```", PAGE, re.S) for line in block.splitlines()
     ]
     optimise, simulate = (
-        next(shlex.split(line)[1:] for line in lines if f"pymoo-hdte {command}" in line)
-        for command in ("optimise", "simulate")
+        next(shlex.split(line)[1:] for line in lines if f"pymoo-hdte {command} " in line)
+        for command in ("optimise", "simulate optimum/optimum_sheet.toml")
     )
     optimise[1] = "hs_20_100"
     return optimise, simulate

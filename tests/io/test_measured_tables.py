@@ -79,7 +79,7 @@ def test_all_numbers_of_matlab_in_rows_and_columns(tmp_path):
 def test_every_unit_is_converted(tmp_path):
     path = write(tmp_path, "csv", {"a": np.arange(20.0)})
     known = {"um": 1e-6, "rev": 2 * math.pi, "arcsec": math.pi / 648000, "r/min": math.pi / 30}
-    known |= {"rpm": math.pi / 30}
+    known |= {"rpm": math.pi / 30, "arcmin": math.pi / 10800, "N.cm": 1e-2}
     known |= dict.fromkeys(("ms", "mm", "mm/s", "N.mm", "mN.m", "mA", "mV"), 1e-3)
     known |= dict.fromkeys(("deg", "deg/s"), math.pi / 180)
     si = {"K", "s", "m", "rad", "rad/s", "m/s", "N", "N.m", "A", "V", "m/s2", "rad/s2", "1"}
@@ -281,7 +281,7 @@ BAD_LAYOUTS = [
     ("-2", "1e16", r"channels\.q\.scale is 1e\+16"),
     ("= true", "= 1", r"channels\.q\.unwrap is 1"),
     ("unwrap", "wrap", r"channels\.q\.wrap is True, .*no such"),
-    ('"deg"', '"m"', r"channels\.q\.unit is 'm', .*'rad', 'deg', 'arcsec', 'rev'$"),
+    ('"deg"', '"m"', r"channels\.q\.unit is 'm', .*'rad', 'deg', 'arcmin', 'arcsec', 'rev'$"),
     ('"deg", scale = -2, unwrap = true', '"lb"', r"q\.unit is 'lb', .*'N\.mm'"),
     ("q = {", "# {", r"channels is \{\}, .*at least one"),
 ]

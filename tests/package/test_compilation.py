@@ -8,8 +8,12 @@ import numpy as np
 import pytest
 from pymoo.optimize import minimize
 
-from pymoo_hdte.algorithms import ElitistSwarm
-from pymoo_hdte.algorithms.hypervolume import _selected_of_two, _selected_of_two_in_numpy
+from pymoo_hdte.algorithms import ElitistSwarm, hypervolume
+from pymoo_hdte.algorithms.hypervolume import (
+    _selected_of_two,
+    _selected_of_two_in_numpy,
+    most_hypervolume,
+)
 from pymoo_hdte.algorithms.spread import _selected, _selected_in_numpy
 from pymoo_hdte.problems import RobustDTE
 
@@ -55,7 +59,16 @@ def test_without_numba_swarms_and_problems_give_the_same():
 def test_both_truncations_by_spread_keep_the_same(n_obj, size, rng):
     # Steps of a tenth give equal distances.
     scaled = np.round(rng.uniform(0.0, 1.0, (60, n_obj)), 1)
-    np.testing.assert_array_equal(_selected_in_numpy(scaled, size), _selected(scaled, size))
+    order = np.argsort(scaled[:, 0], kind="stable")
+    np.testing.assert_array_equal(_selected_in_numpy(scaled, size), _selected(scaled, order, size))
+
+
+@pytest.mark.parametrize("size", [3, 20, 59])
+def test_both_truncations_of_three_objectives_keep_the_same(size, rng, monkeypatch):
+    F = rng.dirichlet(np.ones(3), 60)
+    kept = most_hypervolume(F, size)
+    monkeypatch.setattr(hypervolume, "COMPILES", False)
+    np.testing.assert_array_equal(most_hypervolume(F, size), kept)
 
 
 @pytest.mark.parametrize("size", [1, 2, 7, 40])

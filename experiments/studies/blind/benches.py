@@ -10,6 +10,8 @@ forty pairs of the ideal bench and the level ``mild``, and five with each of `TO
 from __future__ import annotations
 
 import argparse
+import csv
+import json
 import time
 from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
@@ -27,6 +29,7 @@ from experiments.studies.blind.rig.nuisances import GROUPS, LEVELS, MILD, Nuisan
 from experiments.studies.blind.scoring import COLUMNS, verdict_scores
 from experiments.studies.blind.truth import may_be_named
 from pymoo_hdte._runner.campaign import Campaign, Run
+from pymoo_hdte._runner.provenance import environment
 from pymoo_hdte._runner.workers import make_executor
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy._answers.bench_faults import (
@@ -204,6 +207,32 @@ def text_of(comparisons: Sequence[Comparison]) -> str:
     return "\n".join(lines)
 
 
+def write_table(comparisons: Sequence[Comparison], path: Path) -> None:
+    """Write a row a comparison as CSV, below a line with date and versions."""
+    made = {"date": time.strftime("%Y-%m-%d")} | environment()
+    with path.open("w", newline="", encoding="utf-8") as file:
+        file.write(f"# {json.dumps(made)}\n")
+        table = csv.writer(file, lineterminator="\n")
+        table.writerow(
+            ("bench", "case", "truth", "ideal", "named_ideal", "real", "named_real", "told")
+        )
+        for comparison in comparisons:
+            ideal, real = comparison.ideal, comparison.real
+            table.writerow(
+                (
+                    comparison.bench,
+                    f"{ideal.case.kind} {ideal.case.number}",
+                    ideal.case.truth,
+                    *(
+                        part
+                        for each in (ideal, real)
+                        for part in (each.status, " ".join(each.chosen))
+                    ),
+                    " ".join(sorted(comparison.told)),
+                )
+            )
+
+
 def _line(comparison: Comparison) -> str:
     case = comparison.ideal.case
     said = [
@@ -249,9 +278,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     with executor or nullcontext():
         chosen = [cases[number - 1] for number in options.cases]
         campaign = Campaign(options.out, executor)
-        print(text_of(compare(chosen, benches, campaign)))
+        comparisons = compare(chosen, benches, campaign)
+        print(text_of(comparisons), flush=True)
         if options.protocol:
-            print(text_of(compare(chosen[:EACH], list(TOLD_AS), campaign)))
+            alone = compare(chosen[:EACH], list(TOLD_AS), campaign)
+            print(text_of(alone))
+            comparisons += alone
+        write_table(comparisons, options.out / "benches.csv")
     return 0
 
 

@@ -1,7 +1,7 @@
-"""``python -m experiments.studies.one_score CAMPAIGNS TRUTH.json --out TABLE.csv [CASE ...]``.
+"""Grow sets by the score beside a search by the rules: ``python -m experiments.studies.one_score``.
 
-Analyse the campaigns of a folder as ever, score the sets that were fitted, and write a table of
-both answers beside the truth. TRUTH.json maps the name of a campaign to its ``effects``.
+Takes a folder of campaigns, or of logs of mechanisms, with the truth of each in a file of JSON, and
+writes a table in which both stand beside each other.
 """
 
 from __future__ import annotations
@@ -13,10 +13,11 @@ import time
 from pathlib import Path
 from typing import Any
 
-from experiments.studies.one_score.comparison import compare
+from experiments.studies.one_score.comparison import compare, with_held_out
 from experiments.studies.one_score.table import COLUMNS, row_of
 from pymoo_hdte.discrepancy import analyse, read_campaign, read_rig
-from pymoo_hdte.discrepancy._verdicts import drive, mechanism_choice, rattling
+from pymoo_hdte.discrepancy._selection.fitting import fit
+from pymoo_hdte.discrepancy._verdicts import mechanism, rattling
 
 
 def main() -> None:
@@ -38,23 +39,29 @@ def main() -> None:
 
 
 def _row(case: str, folder: Path, truth: dict[str, Any], held_out: bool) -> dict[str, Any]:
-    searched: list[Any] = []
-    for module in (drive, rattling, mechanism_choice):
-        # The candidates of a search are in no finding.
-        module.judge = _noting(module.judge, searched)  # type: ignore[attr-defined]
+    asked = list[tuple[Any, ...]]()
+    rattling.judge = _noting(rattling.judge, asked)
+    mechanism.judged = _noting(mechanism.judged, asked)
     campaign = (folder / "campaign.toml").is_file()
     measured = read_campaign(folder) if campaign else read_rig(folder)
     started = time.process_time()
     finding: Any = analyse(measured).finding
     seconds = time.process_time() - started
-    found = compare(finding.data, finding.verdict, searched, held_out)
+    # What was asked first: before nuisances of the bench joined the base.
+    first, second, candidates, *best = asked[0]
+    if campaign:
+        data = with_held_out(first) if held_out else first
+        base = fit(data, start=second.values) if held_out else second
+        found = compare(data, base, candidates)
+    else:
+        found = compare(second, fit(second), candidates, best[0] and best[0].fit)
     return row_of(case, truth, finding.verdict, found, seconds)
 
 
-def _noting(judge: Any, searched: list[Any]) -> Any:
-    def noted(data: Any, base: Any, candidates: Any, *further: Any, **named: Any) -> Any:
-        searched[:] = candidates
-        return judge(data, base, candidates, *further, **named)
+def _noting(judge: Any, asked: list[tuple[Any, ...]]) -> Any:
+    def noted(*arguments: Any, **named: Any) -> Any:
+        asked.append(arguments)
+        return judge(*arguments, **named)
 
     return noted
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
 from experiments.studies.one_score.comparison import Comparison
@@ -32,8 +32,11 @@ def said_by(decision: Decision) -> Said:
     return decision.status, [] if plain else decision.members
 
 
-def answer(truth: Mapping[str, Any], said: Said) -> str:
-    """Return "right", "partly", "missed" or "wrong" (said without qualification, and false)."""
+def answer(truth: Mapping[str, Any], said: Said, of_bench: Collection[str] = ()) -> str:
+    """Return "right", "partly", "missed" or "wrong" (said without qualification, and false).
+
+    Nuisances ``of_bench`` are told beside a drive that lacks nothing.
+    """
     status, members = said
     wanted = set(truth["effects"])
     names = [{name for name, _ in member} for member in members]
@@ -51,7 +54,8 @@ def answer(truth: Mapping[str, Any], said: Said) -> str:
             port in (None, place) for _, place in (members[0] if members else ())
         )
         in_part = status == "partial" and (by_name or not first)
-        if status == "unlisted" or in_part or (sure and by_name):
+        told = status == "adequate" and listed in of_bench
+        if status == "unlisted" or in_part or told or (sure and by_name):
             return "right"
         return "wrong" if sure else "missed"
     if status == "named":
@@ -94,10 +98,11 @@ def row_of(
 ) -> dict[str, Any]:
     """Return a row of the table."""
     today, now = said_today(verdict), said_by(found.decision)
-    judge = answer if "effects" in truth else answer_of_log
-    top = found.scored[0]
+    top = found.sets[0]
+    of_bench = {candidate.name for candidate in top.candidates if candidate.nuisance}
+    of_campaign = "effects" in truth
     other = next(
-        (entry for entry in found.scored[1:] if entry.explanation.names != top.explanation.names),
+        (entry for entry in found.sets[1:] if entry.explanation.names != top.explanation.names),
         None,
     )
     return dict(
@@ -108,16 +113,16 @@ def row_of(
                 _truth(truth),
                 today[0],
                 _words(today[1]),
-                judge(truth, today),
+                answer(truth, today) if of_campaign else answer_of_log(truth, today),
                 now[0],
                 _words(now[1]),
-                judge(truth, now),
+                answer(truth, now, of_bench) if of_campaign else answer_of_log(truth, now),
                 f"{found.decision.probability:.3f}",
                 f"{found.decision.outside:.3f}",
                 other.explanation.label if other else "-",
-                f"{_ln(other) - _ln(top):.1f}" if other else "-",
+                f"{other.weight - top.weight:.1f}" if other else "-",
                 without_truth(truth, found),
-                len(found.scored),
+                sum(not entry.outside for entry in found.sets),
                 f"{seconds:.1f}",
                 f"{found.seconds:.1f}",
             ),
@@ -137,10 +142,10 @@ def without_truth(truth: Mapping[str, Any], found: Comparison) -> str:
     wanted += [truth["name_if_listed"]] if "name_if_listed" in truth else []
     rest = [
         entry
-        for entry in found.scored
+        for entry in found.sets
         if not any(name == missing for missing in wanted for name, _ in entry.explanation.names)
     ]
-    if not wanted or not rest or len(rest) == len(found.scored):
+    if not wanted or not rest or len(rest) == len(found.sets):
         return "-"
     decision = decide([entry.explanation for entry in rest], [entry.prior for entry in rest])
     status, members = said_by(decision)
@@ -153,10 +158,6 @@ def _truth(truth: Mapping[str, Any]) -> str:
     if "effects" in truth:
         return "+".join(truth["effects"]) or "-"
     return "+".join(truth.get("all", [])) or "|".join(truth.get("any", [])) or "not known"
-
-
-def _ln(entry: Any) -> float:
-    return float(entry.explanation.ln + entry.prior)
 
 
 def _words(members: Sequence[frozenset[Name]]) -> str:

@@ -21,8 +21,10 @@ from pymoo_hdte.drive import (
     DriveModel,
     LoadInertia,
     load_datasheet,
+    load_drive,
     load_model,
 )
+from pymoo_hdte.drive.drive_file import holds_model
 
 LEAST = 1e-12
 """Value that replaces zero in a data sheet, which refuses zero, SI."""
@@ -40,9 +42,10 @@ def read_drive_model(path: str | Path, sheet: str | Path | None = None) -> Drive
     Parameters
     ----------
     path : str or Path
-        File of the model, in the format of `load_model`.
+        File of the whole drive, as `load_drive` reads it, or of the model, in the format of
+        `load_model`.
     sheet : str or Path, optional
-        File of its data sheet; by default ``NAME_sheet.toml`` beside ``NAME.toml``.
+        File of the model's data sheet; by default ``NAME_sheet.toml`` beside ``NAME.toml``.
 
     Returns
     -------
@@ -62,6 +65,8 @@ def read_drive_model(path: str | Path, sheet: str | Path | None = None) -> Drive
     'my_drive'
     """
     path = Path(path)
+    if sheet is None and path.is_file() and holds_model(path):
+        return load_drive(path)
     sheet = path.with_name(f"{path.stem}{SHEET_SUFFIX}{path.suffix}") if sheet is None else sheet
     # Where neither file exists, the error is about the model's.
     path.stat()

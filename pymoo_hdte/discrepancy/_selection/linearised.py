@@ -86,7 +86,7 @@ def linearise(
                 Sized(f"form of {candidate.label}", changes, LEAST_ERROR, most, none, none > 0.0)
             )
     of_free = np.column_stack(free) if free else np.empty((n, 0))
-    stated = (np.array(values) for values in zip(*priors, strict=True))
+    stated = np.array(priors).reshape(-1, 5).T
     return Linearised(
         fitted.residuals[:n], channels, Free(of_free, *stated), tuple(sized), noise, shares
     )
@@ -163,11 +163,21 @@ def _size(
 
 
 def _released(parameter: Parameter, value: float, column: NDArray[np.float64]) -> Sized:
-    """Return a base parameter as out of tolerance: by that much at least."""
-    scale = parameter.scale
-    most = max(parameter.upper - parameter.start, parameter.start - parameter.lower) / scale
-    at = np.array([(value - parameter.start) / scale])
-    return Sized(f"parameter:{parameter.name}", column, 1.0, most, at, np.array([False]), True)
+    """Return a base parameter as out of tolerance by its logarithm: by that much at least.
+
+    Its sign is known, so that no linear model may change it.
+    """
+    start = parameter.start
+    bounds = np.log(np.abs([parameter.lower, parameter.upper]) / abs(start))
+    return Sized(
+        f"parameter:{parameter.name}",
+        column * value / parameter.scale,
+        float(np.log1p(parameter.scale / abs(start))),
+        float(np.abs(bounds).max()),
+        np.array([np.log(value / start)]),
+        np.array([False]),
+        True,
+    )
 
 
 _Prior = tuple[float, float, float, float, float]

@@ -186,7 +186,7 @@ class Score:
 
 def score(hypothesis: Linearised) -> Score:
     """Return the marginal likelihood of a hypothesis."""
-    return _Integral(hypothesis).score()
+    return Integral(hypothesis).score()
 
 
 def score_with_outside(hypothesis: Linearised, places: Sequence[Sized]) -> tuple[Score, list[str]]:
@@ -210,7 +210,7 @@ def score_with_outside(hypothesis: Linearised, places: Sequence[Sized]) -> tuple
         Names of the places.
     """
     price = float(np.log(max(len(places), 1)))
-    integral = _Integral(hypothesis)
+    integral = Integral(hypothesis)
     best, taken, remaining = integral.score(), list[Sized](), list(places)
     while remaining and len(taken) < MOST_PLACES:
         gains = integral.gains(remaining)
@@ -221,7 +221,7 @@ def score_with_outside(hypothesis: Linearised, places: Sequence[Sized]) -> tuple
                 return replace(best, ln=best.ln + mean), []
             break
         place = remaining.pop(int(np.argmax(gains)))
-        integral = _Integral(hypothesis.beside(*taken, place))
+        integral = Integral(hypothesis.beside(*taken, place))
         trial = integral.score()
         trial = replace(trial, ln=trial.ln - (len(taken) + 1) * price)
         if taken and trial.ln <= best.ln:
@@ -236,7 +236,7 @@ than noise, which the check of the likeliest explanation sees."""
 
 
 @dataclass(eq=False)
-class _Integral:
+class Integral:
     """The integral over all unknowns of a hypothesis, with the state of its approximation."""
 
     hypothesis: Linearised
@@ -262,7 +262,7 @@ class _Integral:
         shares = np.ones(len(residuals)) if hypothesis.shares is None else hypothesis.shares
         self.weights = np.sqrt(shares)
         whole *= self.weights[:, None]
-        self.grams = np.array([whole[rows].T @ whole[rows] for rows in self.rows])
+        self.grams = np.array([(part := whole[rows]).T @ part for rows in self.rows])
         self.counts = np.array([np.sum(shares[rows]) for rows in self.rows])
         self.factors = np.ones(n_channels)
         self._set_priors()
@@ -354,7 +354,7 @@ class _Integral:
         by_row = self.factors[self.hypothesis.channels] / self.weights
         left = (self.shift + self.columns @ mean) / by_row
         scaled = self.columns / by_row[:, None]
-        followed = np.einsum("ij,jk,ik->i", scaled, covariance, scaled)
+        followed = np.sum(scaled @ covariance * scaled, axis=1)
         return Score(
             ln,
             {part.name: float(scale) for part, scale in zip(sized, self.scales, strict=True)},
@@ -367,7 +367,7 @@ class _Integral:
 
     def _gram(self) -> tuple[Matrix, Vector, float]:
         """Return curvature, slope and constant of the likelihood with the present factors."""
-        gram = np.einsum("cij,c->ij", self.grams, 1.0 / self.factors**2)
+        gram = np.tensordot(1.0 / self.factors**2, self.grams, axes=1)
         return gram[:-1, :-1], -gram[:-1, -1], float(gram[-1, -1])
 
     def _natural(self) -> tuple[Matrix, Vector]:
@@ -479,26 +479,60 @@ class _Integral:
         self.scales[number] = np.exp(at)
         self.corrections[number] = whole - largest
 
-    def gains(self, places: Sequence[Sized]) -> Vector:
-        """Return by how much each further quantity alone would raise the logarithm, (n_places,)."""
+    def gains(self, places: Sequence[Sized], renewed: bool = False) -> Vector:
+        """Return by how much each further quantity alone would raise the logarithm, (n_places,).
+
+        To first order; minus infinity for one that would be invisible at its largest scale. The
+        noise stays, or is ``renewed`` as it would be beside the most probable sizes.
+        """
         mean, covariance = self._posterior()
         by_row = self.factors[self.hypothesis.channels] / self.weights
         scaled = self.columns / by_row[:, None]
         left = (self.shift + self.columns @ mean) / by_row
-        gains = np.empty(len(places))
+        gains = np.full(len(places), -np.inf)
         every = np.column_stack([part.columns for part in places]) / by_row[:, None]
-        with_unknowns = scaled.T @ every
+        beyond = every - scaled @ (covariance @ (scaled.T @ every))
         ends = np.cumsum([0, *(part.columns.shape[1] for part in places)])
         for number, part in enumerate(places):
             place = slice(ends[number], ends[number + 1])
-            columns, across = every[:, place], with_unknowns[:, place]
-            curvature = columns.T @ columns - across.T @ covariance @ across
-            along = -columns.T @ left
-            values, vectors = np.linalg.eigh(curvature)
-            grid = np.linspace(np.log(part.least), np.log(part.most), _GRID)
-            projected = (vectors.T @ along) ** 2
-            gains[number] = _mean_over_scales(grid, np.maximum(values, 0.0), projected)[0]
+            along = -every[:, place].T @ left
+            values, vectors = np.linalg.eigh(every[:, place].T @ beyond[:, place])
+            values = np.maximum(values, 0.0)
+            least = part.least
+            if part.cut:
+                largest = float(values.max(initial=0.0))
+                least = max(least, np.sqrt(VISIBLE / largest) if largest > 0.0 else np.inf)
+            if least >= part.most:
+                continue
+            grid = np.linspace(np.log(least), np.log(part.most), _GRID)
+            cut, one_sided = least if part.cut else 0.0, bool(part.positive.all())
+            projected = vectors.T @ along
+            gains[number], _, at = _mean_over_scales(grid, values, projected**2, cut, one_sided)
+            if renewed:
+                sizes = vectors @ (projected / (values + np.exp(-2.0 * at)))
+                after = left + beyond[:, place] @ sizes
+                gains[number] += self._gain_of_noise(after, covariance)
         return gains
+
+    def _gain_of_noise(self, left: Vector, covariance: Matrix) -> float:
+        """Return by how much factors that fit residuals (n,), in units of them, are likelier."""
+        spread, channels = self.hypothesis.noise, self.hypothesis.channels
+        if spread <= 0.0:
+            return 0.0
+        freedom = self._freedom(covariance)
+        before = np.log(self.factors)
+        power = np.zeros_like(before)
+        np.add.at(power, channels, left**2)
+        after = before + _log_factor(power, freedom, before, spread)
+        of_prior = (before**2 - after**2) / (2.0 * spread**2)
+        ratio = after - before
+        of_data = -freedom * ratio + 0.5 * power * (1.0 - np.exp(-2.0 * ratio))
+        return float(np.sum(of_data + of_prior))
+
+    def _freedom(self, covariance: Matrix) -> Vector:
+        """Return the number of values of each channel that no unknown follows, (n_channels,)."""
+        followed = np.tensordot(self.grams[:, :-1, :-1], covariance, axes=2) / self.factors**2
+        return np.asarray(np.maximum(self.counts - followed, 0.0))
 
     def _set_factors(self) -> float:
         """Move the factors of the noise to their mode; return the logarithm of their integral."""
@@ -507,20 +541,29 @@ class _Integral:
             return 0.0
         mean, covariance = self._posterior()
         whole = np.append(mean, 1.0)
-        left = np.einsum("cij,i,j->c", self.grams, whole, whole)
-        followed = np.einsum("cij,ij->c", self.grams[:, :-1, :-1], covariance) / self.factors**2
-        freedom = np.maximum(self.counts - followed, 0.0)
+        left = self.grams @ whole @ whole
+        freedom = self._freedom(covariance)
         log = np.log(self.factors)
-        # Newton's method in the logarithm: freedom = left / factor^2 - log / spread^2.
-        for _ in range(20):
-            scaled = left * np.exp(-2.0 * log)
-            step = (scaled - freedom - log / spread**2) / (2.0 * scaled + 1.0 / spread**2)
-            log = log + np.clip(step, -1.0, 1.0)
-            if np.max(np.abs(step)) < 1e-6:
-                break
+        log = log + _log_factor(left / self.factors**2, freedom, log, spread)
         self.factors = np.exp(log)
         curvature = 2.0 * freedom + 1.0 / spread**2
         return float(np.sum(-0.5 * (log / spread) ** 2 - np.log(spread) - 0.5 * np.log(curvature)))
+
+
+def _log_factor(power: Vector, freedom: Vector, log: Vector, spread: float) -> Vector:
+    """Return by how much logarithms of factors have to change to be most probable, (n_channels,).
+
+    For residuals of a ``power`` in units of the present factors, whose logarithms are ``log``. By
+    Newton's method: freedom = power / ratio^2 - log / spread^2.
+    """
+    step, change = np.zeros_like(log), np.zeros_like(log)
+    for _ in range(20):
+        scaled = power * np.exp(-2.0 * change)
+        step = (scaled - freedom - (log + change) / spread**2) / (2.0 * scaled + 1.0 / spread**2)
+        change = change + np.clip(step, -1.0, 1.0)
+        if np.max(np.abs(step), initial=0.0) < 1e-6:
+            break
+    return change
 
 
 def _mean_over_scales(

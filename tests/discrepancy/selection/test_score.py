@@ -11,6 +11,7 @@ from pymoo_hdte.discrepancy._selection.process import TERMS, sine_of
 from pymoo_hdte.discrepancy._selection.score import (
     VISIBLE,
     Free,
+    Integral,
     Linearised,
     Sized,
     score,
@@ -238,9 +239,7 @@ def test_said_probabilities_are_the_shares_that_are_right():
     base = rng.normal(size=(20, 1))
     most, unknowns = 50.0, free(base, [-1.0], [1.0], [0.1])
     empty = [hypothesis(np.zeros(20), unknowns, sized(d, 0.0, most, cut=True)) for d in directions]
-    from pymoo_hdte.discrepancy._selection.score import _Integral
-
-    least = [_Integral(item).least[0] for item in empty]
+    least = [Integral(item).least[0] for item in empty]
     said, right = [], []
     for _ in range(120):
         truth = int(rng.integers(3))
@@ -298,3 +297,36 @@ def test_a_chance_beyond_is_that_of_the_residuals(rng):
         found = score(hypothesis(rng.normal(size=30), free(np.empty((30, 0)))))
         chances.append(found.worst_chance([np.arange(30)]))
     assert kstest(chances, "uniform").pvalue > 1e-3
+
+
+@pytest.mark.parametrize("cut", [False, True])
+@pytest.mark.parametrize("size", [0.0, 1.0, 8.0])
+def test_gains_are_those_of_the_whole_integral(rng, cut, size):
+    """Of one more quantity beside all that there is, which is exact where nothing has bounds."""
+    unknowns = free(rng.normal(size=(N, 2)), mean=[0.0, 0.0], deviation=[1.0, 3.0])
+    # What is visible is so beyond unknowns, whatever form laws have.
+    present = () if cut else (sized(rng.normal(size=(N, 3)), 0.5, 0.5),)
+    column = rng.normal(size=(N, 1))
+    further = sized(column, 0.1, 20.0, cut=cut)
+    residuals = rng.normal(size=N) - size * column[:, 0]
+    without = hypothesis(residuals, unknowns, *present)
+    integral = Integral(without)
+    before = integral.score().ln
+    wanted = score(hypothesis(residuals, unknowns, *present, further)).ln - before
+    (gain,) = integral.gains([further])
+    assert gain == pytest.approx(wanted, abs=0.1)
+
+
+def test_a_gain_counts_the_noise_that_is_left(rng):
+    """Unknown noise takes what an effect explains, and returns it."""
+    count = 100
+    column = rng.normal(size=(count, 1))
+    residuals = 0.3 * rng.normal(size=count) - 40.0 * column[:, 0]
+    unknowns = free(np.ones((count, 1)), mean=0.0, deviation=1.0)
+    further = sized(column, 0.1, 100.0)
+    noise = float(np.log(10.0))
+    integral = Integral(hypothesis(residuals, unknowns, noise=noise))
+    before = integral.score().ln
+    wanted = score(hypothesis(residuals, unknowns, further, noise=noise)).ln - before
+    assert integral.gains([further])[0] < 0.5 * wanted
+    assert integral.gains([further], renewed=True)[0] == pytest.approx(wanted, rel=0.1)

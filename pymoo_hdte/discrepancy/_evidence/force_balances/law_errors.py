@@ -1,8 +1,8 @@
 """Relative errors of laws in force balances, and what no law of the library holds.
 
 Both are Gaussian processes over the motion at a port: over its position, over its speed, over its
-load and over the time. What a real machine leaves is coloured, so that residuals count as fewer
-independent values than there are.
+load and over the time. What a real machine leaves is coloured: each band of frequencies has a
+noise of its own.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import uniform_filter1d
 
 from pymoo_hdte.discrepancy._evidence.force_balances.evidence import MeasuredData
 from pymoo_hdte.discrepancy._selection.candidate import Candidate
@@ -23,6 +24,7 @@ from pymoo_hdte.discrepancy._selection.process import TERMS, sine_of
 from pymoo_hdte.discrepancy._selection.score import Linearised, Sized
 from pymoo_hdte.effects.law import Law
 from pymoo_hdte.mechanism.port_motion import PortMotion, law_force
+from pymoo_hdte.mechanism.rests import STILL, speed_noise
 
 Matrix = NDArray[np.float64]
 
@@ -30,10 +32,10 @@ NOISE = float(np.log(10.0))
 """Standard deviation of the logarithm of the noise, which nobody states of a balance."""
 TURNS = (1e-3, 1.0)
 """Range of the force around a turn that is not known, as a share of what holds a port at rest."""
-_STILL = 0.02
-"""Share of the largest speed below which a port counts as still."""
 _SMOOTHED = 9
-"""Bins over which a spectrum is smoothed, to see how coloured it is."""
+"""Coefficients over which a spectrum is smoothed, to see how coloured it is."""
+_FEWEST = 20
+"""Fewest coefficients of a band: they know its level to 16 %."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,19 +47,34 @@ class BalanceErrors:
     data : MeasuredData
     base : Fit
         Without effects.
-    best : Fit
-        Of the least residuals: how coloured these are tells how many of them are independent.
+    best : Fit or None
+        Of the least residuals: where these are lines, as of a motion that repeats, fewer of them
+        are independent.
     """
 
     data: MeasuredData
     base: Fit
-    best: Fit
+    best: Fit | None = None
     _of_turns: dict[str, Matrix] = field(default_factory=dict)
 
-    @property
+    @cached_property
     def channels(self) -> NDArray[np.int_]:
-        """Balance of each residual."""
-        return self.data._part
+        """Balance and band of frequencies of each residual, of which each has a noise of its own.
+
+        What a real machine leaves is coloured: its level changes from octave to octave. Bands are
+        octaves below the highest frequency of a balance, the lowest ones together.
+        """
+        channels, count = np.zeros(len(self.data.frequency), dtype=int), 0
+        for part in np.unique(self.data._part):
+            rows = np.flatnonzero(self.data._part == part)
+            frequency = self.data.frequency[rows]
+            octave = np.log2(frequency.max() / np.maximum(frequency, 1e-12)).astype(int)
+            sizes = np.bincount(np.minimum(octave, len(rows)))
+            lowest = int(np.flatnonzero(sizes >= _FEWEST)[-1]) if sizes.max() >= _FEWEST else 0
+            octave = np.minimum(octave, lowest)
+            channels[rows] = count + octave
+            count += lowest + 1
+        return channels
 
     @property
     def groups(self) -> list[NDArray[np.int_]]:
@@ -70,16 +87,21 @@ class BalanceErrors:
 
     @cached_property
     def shares(self) -> Matrix:
-        """Independent values that each residual counts for, shape (n,)."""
+        """Independent values that each residual counts for, shape (n,).
+
+        By the moments of the residuals' power in each record and band (Satterthwaite, Biometrics
+        Bulletin 2, 1946).
+        """
         shares = np.ones(len(self.channels))
-        window = np.ones(_SMOOTHED) / _SMOOTHED
+        if self.best is None:
+            return shares
+        power = self.best.residuals**2
         for record in np.unique(self.data._record):
-            for part in np.unique(self.data._part):
-                rows = np.flatnonzero((self.data._record == record) & (self.data._part == part))
-                if len(rows) < _SMOOTHED:
-                    continue
-                power = np.convolve(self.best.residuals[rows] ** 2, window, "same")
-                shares[rows] = np.sum(power) ** 2 / (len(rows) * np.sum(power**2))
+            for channel in np.unique(self.channels):
+                rows = np.flatnonzero((self.data._record == record) & (self.channels == channel))
+                if len(rows) >= _SMOOTHED:
+                    smooth = uniform_filter1d(power[rows], _SMOOTHED, mode="reflect")
+                    shares[rows] = smooth.mean() ** 2 / np.mean(smooth**2)
         return shares
 
     def linearised(self, fitted: Fit) -> Linearised:
@@ -97,24 +119,34 @@ class BalanceErrors:
             ]
             return np.column_stack(columns)
 
-        hypothesis = linearise(fitted, self.channels, errors, NOISE, self.shares)
-        return hypothesis.beside(*self._turning(fitted))
+        return linearise(fitted, self.channels, errors, NOISE, self.shares).beside(
+            *self._turning(fitted)
+        )
 
     def _turning(self, fitted: Fit) -> Iterator[Sized]:
         """Yield what dry friction may do where a port turns, starts or stops.
 
-        When it does is known to a part of the time over which the motion is smoothed only.
+        When it does is known to a part of the time over which the motion is smoothed only. What
+        smoothing does to a kink of the motion is the same at every turn, but for its size: so a
+        part is common to all turns, and another one is each turn's own.
         """
         for effect in fitted.effects:
             if not (effect.law.breakaway and (columns := self._turns(effect.port)).size):
                 continue
-            none = np.zeros(columns.shape[1])
-            name = f"turns of {effect.name}:{effect.port}"
-            force = effect.law.breakaway * columns
-            yield Sized(name, force, *TURNS, none, none > 0.0)
+            label = f"{effect.name}:{effect.port}"
+            for name, part in (
+                (f"all turns of {label}", columns.reshape(len(columns), -1, 2).sum(axis=1)),
+                (f"turns of {label}", columns),
+            ):
+                none = np.zeros(part.shape[1])
+                yield Sized(name, effect.law.breakaway * part, *TURNS, none, none > 0.0)
 
     def _turns(self, port: str) -> Matrix:
-        """Return whitened balances of a unit force around each turn of a port, (n, 2 n_turns)."""
+        """Return whitened balances of a unit force around each turn of a port, (n, 2 n_turns).
+
+        First that of a turn that is early or late, then that of one that takes its time; both with
+        the sign of the speed after the turn.
+        """
         if port not in self._of_turns:
             self._of_turns[port] = np.column_stack(
                 [np.empty((len(self.channels), 0)), *self._pulses(port)]
@@ -126,11 +158,14 @@ class BalanceErrors:
         for number, balance in enumerate(self.data.spectra):
             speed, step = balance.ports[port].speed, float(balance.time[1] - balance.time[0])
             smoothed = 1.0 / (balance.cutoff * step)
-            for turn in _turns_of(speed, _STILL * float(np.abs(speed).max()), 2.0 * smoothed):
+            still = speed_noise(balance.mechanism.port(port), balance.record, balance.cutoff)
+            for turn, after in _turns_of(speed, STILL * still, smoothed / 2.0):
+                if not balance.moving.weight[int(turn)]:
+                    continue
                 place = (np.arange(len(speed)) - turn) / (smoothed / 4.0)
                 for pulse in (np.exp(-0.5 * place**2), place * np.exp(-0.5 * place**2)):
                     column = np.zeros(len(self.channels))
-                    force = balance.of_port(port, pulse) / self.data.deviation[number]
+                    force = balance.of_port(port, after * pulse) / self.data.deviation[number]
                     column[ends[number] : ends[number + 1]] = force[balance.kept]
                     yield column
 
@@ -168,14 +203,10 @@ class BalanceErrors:
                 columns = np.column_stack(
                     [self._column(port.name, over, number) for number in range(1, TERMS + 1)]
                 )
-                columns = columns * np.sqrt(self.shares)[:, None]
-                size = max(float(np.sum(columns**2)), 1e-24)
-                independent = float(np.sum(self.shares))
-                most = np.sqrt(
-                    max(float(self.shares @ self.base.residuals**2), 4.0 * independent) / size
-                )
+                size = max(float(self.shares @ np.sum(columns**2, axis=1)), 1e-24)
+                misfit = float(self.shares @ self.base.residuals**2)
+                most = np.sqrt(max(misfit, 4.0 * float(self.shares.sum())) / size)
                 none = np.zeros(TERMS)
-                columns = columns / np.sqrt(self.shares)[:, None]
                 yield Sized(
                     f"outside: {over} at {port.name}",
                     columns,
@@ -186,17 +217,18 @@ class BalanceErrors:
                 )
 
 
-def _turns_of(speed: Matrix, still: float, long: float) -> list[float]:
+def _turns_of(speed: Matrix, still: float, apart: float) -> list[tuple[float, float]]:
     """Return the rows, perhaps between two, at which a motion turns, stops or starts.
 
-    A rest of more than ``long`` rows has two of them, its end and its beginning.
+    Each with the sign of the speed after it. Where a motion is ``still`` for long, it may do so
+    anywhere: at rows that are about so far ``apart``.
     """
-    turns, moving = list[float](), np.flatnonzero(np.abs(speed) >= still)
+    turns, moving = list[tuple[float, float]](), np.flatnonzero(np.abs(speed) >= still)
     for before, after in pairwise(moving.tolist()):
-        if after - before > long:
-            turns += [before, after]
-        elif speed[before] * speed[after] < 0.0:
-            turns.append((before + after) / 2.0)
+        if after - before > apart or speed[before] * speed[after] < 0.0:
+            count = 1 + int((after - before) / apart)
+            places = before + (after - before) * (np.arange(count) + 0.5) / count
+            turns += [(place, float(np.sign(speed[after]))) for place in places.tolist()]
     return turns
 
 

@@ -1,0 +1,430 @@
+"""Sets of effects grown, exchanged and pruned by their posterior probability.
+
+A set is extended as long as it is among the likeliest ones, by the effects that could raise its
+probability: to first order each is one more quantity of unknown size, beside the unknowns of the
+set and the errors of its laws. Those that could are fitted jointly with the base and scored. Of the
+likeliest set each member is left out and exchanged in turn. Nothing here knows a machine, and
+nothing is compared but probabilities.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pymoo_hdte.discrepancy._selection.candidate import Candidate
+from pymoo_hdte.discrepancy._selection.decision import (
+    SURE,
+    Decision,
+    Explanation,
+    decide,
+    log_prior,
+)
+from pymoo_hdte.discrepancy._selection.fitted_sets import may_be_together
+from pymoo_hdte.discrepancy._selection.fitting import Evidence, Fit, fit
+from pymoo_hdte.discrepancy._selection.hypothesis import Hypothesis, hypothesis_of, label_of
+from pymoo_hdte.discrepancy._selection.released import gain_of_released, released_together
+from pymoo_hdte.discrepancy._selection.score import (
+    VISIBLE,
+    Integral,
+    Linearised,
+    Score,
+    Sized,
+    score_with_outside,
+)
+from pymoo_hdte.discrepancy._selection.screening import Screened, screen
+from pymoo_hdte.discrepancy._selection.starts import best_fit, other_starts
+
+Vector = NDArray[np.float64]
+
+WINDOW = float(np.log(1000.0))
+"""Logarithm of odds within which a set may still matter: all that is further behind changes no
+probability by more than some thousandths (Occam's window of Madigan and Raftery, JASA 89, 1994)."""
+MOST_MEMBERS = 3
+"""Most effects of a set; values out of tolerance count as one."""
+MOST_FIRSTS = 4
+"""Most sets that are extended although another one is likelier, if that one lacks something: two
+effects may be missing of which each alone explains less than a third one."""
+WIDTH = 8
+"""Most extensions of a set that are fitted, the likeliest to first order."""
+TRUSTED = 3.0
+"""Factor by which an effect may remove more than it does to first order, as springs that slip do on
+logs: a width of the search."""
+OF_ONE_NAME = 2
+"""Most of them that have one name."""
+MOST_OUTSIDE = 6
+"""Sets beside which something outside of the library is looked for, the likeliest without it."""
+
+
+class Errors(Protocol):
+    """What the score has to know about the data of fits."""
+
+    @property
+    def outside(self) -> tuple[Sized, ...]:
+        """What no law of the library holds, by place."""
+        ...
+
+    @property
+    def groups(self) -> list[NDArray[np.int_]]:
+        """Rows of each record and of each channel."""
+        ...
+
+    def linearised(self, fitted: Fit) -> Linearised:
+        """Return a fit as a hypothesis."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class Weighed:
+    """A set of effects with its probability.
+
+    Attributes
+    ----------
+    fit : Fit
+    linearised : Linearised
+    score : Score
+    prior : float
+        Logarithm of its prior odds against nothing.
+    outside : bool
+        Whether something outside of the library is there as well.
+    places : tuple of str
+        Where that is.
+    worst_chance : float
+        As of `Explanation`.
+    """
+
+    fit: Fit
+    linearised: Linearised
+    score: Score
+    prior: float
+    worst_chance: float
+    outside: bool = False
+    places: tuple[str, ...] = ()
+
+    @property
+    def weight(self) -> float:
+        """Logarithm of the unnormalised posterior probability."""
+        return self.score.ln + self.prior
+
+    @property
+    def candidates(self) -> tuple[Candidate, ...]:
+        """Members of the set."""
+        return self.fit.candidates
+
+    @property
+    def explanation(self) -> Explanation:
+        """It as a decision takes it: nuisances of a bench have no name."""
+        named = [candidate for candidate in self.candidates if not candidate.nuisance]
+        return Explanation(
+            "+".join(candidate.label for candidate in self.candidates) or "nothing",
+            frozenset(candidate.named_effect for candidate in named),
+            self.score.ln,
+            self.outside,
+            self.worst_chance,
+            bool(named) and all(map(_is_value, named)),
+        )
+
+
+@dataclass(eq=False)
+class Growth:
+    """The sets of effects that may explain some data, grown by their probability.
+
+    Attributes
+    ----------
+    data : Evidence
+    base : Fit
+        Without any effect.
+    candidates : sequence of Candidate
+        Effects that may be missing, and nuisances of the bench.
+    errors : Errors
+    """
+
+    data: Evidence
+    base: Fit
+    candidates: Sequence[Candidate]
+    errors: Errors
+    counts: Counter[str] = field(init=False)
+    _known: dict[frozenset[str], Weighed] = field(default_factory=dict)
+    _invisible: set[frozenset[str]] = field(default_factory=set)
+    _extended: set[frozenset[str]] = field(default_factory=set)
+    _complete: set[frozenset[str]] = field(default_factory=set)
+    _signatures: dict[str, Screened] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self.counts = Counter(candidate.name for candidate in self.candidates)
+        self.counts["parameter"] = len(self.data.base)
+
+    @property
+    def ranked(self) -> list[Weighed]:
+        """All sets that were weighed, the likeliest first."""
+        return sorted(self._known.values(), key=lambda weighed: -weighed.weight)
+
+    def grow(self) -> None:
+        """Extend, exchange and prune sets until none could become as likely as the best."""
+        self._weigh(self.base)
+        self._settle()
+        for _ in range(MOST_FIRSTS):
+            further = [weighed for weighed in self.ranked if self._may_be_extended(weighed)]
+            if not further or not self._lacks_something(self.ranked[0]):
+                break
+            self._extend(further[0])
+            self._settle()
+
+    def _settle(self) -> None:
+        """Extend the likeliest sets, and exchange members of the best one, until it stays best."""
+        varied = frozenset[str]()
+        while True:
+            while (weighed := self._open()) is not None:
+                self._extend(weighed)
+            best = self.ranked[0]
+            if (label := label_of(best.candidates)) == varied:
+                return
+            varied = label
+            for member in best.candidates:
+                if (without := self._without(best, member)) is not None:
+                    self._exchange(without, member)
+
+    def _lacks_something(self, weighed: Weighed) -> bool:
+        """Tell whether it is not sure that a set leaves nothing to something outside."""
+        odds = self._with_outside(weighed).weight - weighed.weight
+        return odds > np.log((1.0 - SURE) / SURE)
+
+    def decide(self) -> tuple[Decision, list[Weighed]]:
+        """Return what is said, and all sets with and without something outside of the library."""
+        ranked = self.ranked
+        looked_beside = [
+            weighed
+            for number, weighed in enumerate(ranked)
+            if number < MOST_OUTSIDE or not weighed.candidates
+        ]
+        every = sorted(
+            [*ranked, *map(self._with_outside, looked_beside)],
+            key=lambda weighed: -weighed.weight,
+        )
+        explanations = [weighed.explanation for weighed in every]
+        return decide(explanations, [weighed.prior for weighed in every]), every
+
+    def _open(self) -> Weighed | None:
+        """Return the likeliest set that may be extended, fitted to the end."""
+        while ranked := self.ranked:
+            for weighed in ranked:
+                if weighed.weight < ranked[0].weight - WINDOW:
+                    return None
+                label = label_of(weighed.candidates)
+                if label not in self._complete:
+                    self._complete_fit(weighed)
+                    break
+                if self._may_be_extended(weighed):
+                    return weighed
+            else:
+                return None
+        return None
+
+    def _may_be_extended(self, weighed: Weighed) -> bool:
+        label = label_of(weighed.candidates)
+        return label not in self._extended and _size(weighed.candidates) < MOST_MEMBERS
+
+    def _complete_fit(self, weighed: Weighed) -> None:
+        """Fit a set to the end, from other starts as well, and without each of its members."""
+        label = label_of(weighed.candidates)
+        self._complete.add(label)
+        if not weighed.candidates:
+            return
+        hypothesis = self._as_hypothesis(weighed.fit)
+        others = [self._as_hypothesis(other.fit) for other in self._known.values()]
+        starts = other_starts(hypothesis, self.base.values)
+        self._weigh(best_fit(self.data, hypothesis, starts, others))
+        weighed = self._known[label]
+        for member in weighed.candidates if len(weighed.candidates) > 1 else ():
+            self._without(weighed, member)
+
+    def _exchange(self, without: Weighed, member: Candidate) -> None:
+        """Fit what a set may have in place of a member: other forms of it, and other effects."""
+        for candidate in self.candidates:
+            if candidate.is_form_of(member) or candidate.replaces(member):
+                for start in candidate.starts:
+                    values = np.append(without.fit.values, start)
+                    self._fit((*without.candidates, candidate), values, again=True)
+        if self._may_be_extended(without):
+            self._extend(without)
+
+    def _extend(self, weighed: Weighed) -> None:
+        """Fit a set with each effect that could make it likelier."""
+        self._extended.add(label_of(weighed.candidates))
+        self._release(weighed)
+        members = weighed.candidates
+        candidates = [
+            candidate
+            for candidate in self.candidates
+            if not candidate.instead_of and all(candidate.goes_with(member) for member in members)
+        ]
+        integral = Integral(weighed.linearised)
+        integral.score()
+        n = len(weighed.linearised.residuals)
+        if self._signatures:
+            before = [self._signatures[c.label] for c in candidates if c.label in self._signatures]
+            hopeful = self._gains(integral, before, n)
+            candidates = [
+                effect.candidate
+                for effect, gain in zip(before, hopeful, strict=True)
+                if gain >= -WINDOW
+            ] + [c for c in candidates if c.label not in self._signatures]
+        if not candidates:
+            return
+        screened = screen(self.data, weighed.fit, candidates)
+        if not members:
+            self._signatures.update((effect.candidate.label, effect) for effect in screened)
+        gains = self._gains(integral, screened, n)
+        ranked = np.argsort(-gains, kind="stable")
+        taken = Counter[str]()
+        for place in ranked[gains[ranked] >= -WINDOW]:
+            effect = screened[place]
+            if taken.total() == WIDTH or not effect.start:
+                break
+            if taken[effect.candidate.name] == OF_ONE_NAME:
+                continue
+            prior = self._prior((effect.candidate,))
+            most = TRUSTED * max(gains[place] - prior, 0.0) + prior
+            if weighed.weight + most < self.ranked[0].weight - WINDOW:
+                break
+            taken[effect.candidate.name] += 1
+            self._fit((*members, effect.candidate), np.append(weighed.fit.values, effect.start))
+
+    def _release(self, weighed: Weighed) -> None:
+        """Fit a set with the values released that it leaves at the bounds of their tolerance."""
+        members = weighed.candidates
+        already = {candidate.releases for candidate in members} - {None}
+        bounded = self.data.out_of_tolerance(weighed.fit.at_bounds, together=bool(already))
+        for candidate in bounded:
+            if candidate.releases not in already:
+                self._fit((*members, candidate), weighed.fit.values)
+        together = self.data.out_of_tolerance(weighed.fit.at_bounds, True)
+        hopeful = len(together) > 1 and not already
+        if hopeful and gain_of_released(weighed.fit, together) > VISIBLE:
+            released, fitted = released_together(self.data, weighed.fit)
+            self._fit((*members, *released), fitted.values)
+
+    def _gains(self, integral: Integral, screened: Sequence[Screened], n: int) -> Vector:
+        """Return by how much each effect could raise the probability of a set to first order."""
+        parts, owners = list[Sized](), list[int]()
+        for number, effect in enumerate(screened):
+            for part in _first_order(effect, n):
+                parts.append(part)
+                owners.append(number)
+        gains = np.full(len(screened), -np.inf)
+        if parts:
+            np.maximum.at(gains, owners, integral.gains(parts, renewed=True))
+        priors = [self._prior((effect.candidate,)) for effect in screened]
+        return gains + np.array(priors)
+
+    def _without(self, weighed: Weighed, member: Candidate) -> Weighed | None:
+        """Return a set without a member, fitted to the end; None if that is not to be seen."""
+        members = tuple(candidate for candidate in weighed.candidates if candidate is not member)
+        label = label_of(members)
+        if label not in self._known:
+            values = [weighed.fit.values[: weighed.fit.n_base]]
+            values += [
+                weighed.fit.values[place]
+                for candidate, place in weighed.fit.places
+                if candidate is not member
+            ]
+            self._fit(members, np.concatenate(values))
+        return self._known.get(label)
+
+    def _fit(self, members: Sequence[Candidate], start: Vector, again: bool = False) -> None:
+        """Fit a set just enough to rank it, and weigh it, unless it is known.
+
+        A known set is fitted ``again`` from another start.
+        """
+        label = label_of(members)
+        known = label in self._known or label in self._invisible
+        if (known and not again) or not may_be_together(tuple(members)):
+            return
+        if _size(members) > MOST_MEMBERS:
+            return
+        self._weigh(fit(self.data, members, start, settled=self.data.rules.trial_gain))
+
+    def _weigh(self, fitted: Fit) -> None:
+        """Keep a fit with its probability, unless one of its effects would be invisible."""
+        label = label_of(fitted.candidates)
+        known = self._known.get(label)
+        if known is not None and known.fit.chi_square <= fitted.chi_square:
+            return
+        linearised = self.errors.linearised(fitted)
+        score = Integral(linearised).score()
+        evident = self.data.evident
+        lacking = evident and not evident & {member.name for member in fitted.candidates}
+        if score.invisible or (lacking and fitted.candidates):
+            self._invisible.add(label)
+            return
+        prior = self._prior(fitted.candidates)
+        chance = score.worst_chance(self.errors.groups)
+        self._known[label] = Weighed(fitted, linearised, score, prior, chance)
+
+    def _with_outside(self, weighed: Weighed) -> Weighed:
+        """Return a set with something outside of the library as well."""
+        score, places = score_with_outside(weighed.linearised, self.errors.outside)
+        return replace(
+            weighed,
+            score=score,
+            prior=self._prior(weighed.candidates, True),
+            worst_chance=score.worst_chance(self.errors.groups),
+            outside=True,
+            places=tuple(places),
+        )
+
+    def _prior(self, members: Sequence[Candidate], outside: bool = False) -> float:
+        """Return the logarithm of the prior odds of a set against nothing."""
+        names = [member.named_effect for member in members]
+        forms = [max(self.counts[member.name], 1) for member in members]
+        return log_prior(names, forms, outside)
+
+    def _as_hypothesis(self, fitted: Fit) -> Hypothesis:
+        excess = max(self.base.chi_square - len(self.base.residuals), 1.0)
+        return hypothesis_of(fitted, excess)
+
+
+def _is_value(member: Candidate) -> bool:
+    """Tell whether a member is a value of the base, released or under the name of an effect."""
+    return member.releases is not None or bool(member.effect and member.effect.covers)
+
+
+def _size(members: Sequence[Candidate]) -> int:
+    """Return the number of members, of which nuisances do not count and released values are one."""
+    effects = [m for m in members if m.releases is None and not m.nuisance]
+    return len(effects) + any(member.releases is not None for member in members)
+
+
+def _first_order(effect: Screened, n: int) -> list[Sized]:
+    """Return an effect to first order: all its lines as one quantity, or each of its starts."""
+    candidate = effect.candidate
+    if not effect.signatures.size:
+        return []
+    uppers = np.array([parameter.upper for parameter in candidate.parameters])
+    first = [int(np.flatnonzero(start)[0]) for start in candidate.starts]
+    most = [
+        float(uppers[place] / abs(start[place]))
+        for place, start in zip(first, candidate.starts, strict=True)
+    ]
+    if candidate.linear:
+        blocks, most = [effect.signatures[:, :n].T], [min(most)]
+    else:
+        blocks = [signature[:n, None] for signature in effect.signatures]
+    return [
+        Sized(
+            candidate.label,
+            block,
+            0.0,
+            size,
+            np.zeros(block.shape[1]),
+            np.zeros(block.shape[1], dtype=bool),
+            True,
+        )
+        for block, size in zip(blocks, most, strict=True)
+        if size > 0.0
+    ]

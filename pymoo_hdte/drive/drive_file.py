@@ -1,0 +1,128 @@
+"""One file for one drive: a catalogue page, or a data sheet with its model below ``[model]``."""
+
+from __future__ import annotations
+
+from importlib.resources import files
+from pathlib import Path
+
+from pymoo_hdte._io.toml import read_toml, toml_with_lines
+from pymoo_hdte.checks import InvalidInput
+from pymoo_hdte.drive.catalogue import CataloguePage, drive_of, page_from_fields
+from pymoo_hdte.drive.datasheet_file import check_twist, datasheet_from_fields
+from pymoo_hdte.drive.model import DriveModel
+from pymoo_hdte.drive.model_values import values_of
+
+
+def holds_model(path: str | Path) -> bool:
+    """Return whether a TOML file describes a whole drive, not its data sheet alone.
+
+    Raises
+    ------
+    InvalidInput, OSError
+        As `load_drive`.
+    """
+    top = read_toml(Path(path))
+    return top.has("catalogue") or top.has("model")
+
+
+BUILT_IN_SIZES = (14, 20, 25)
+"""Sizes of the catalogue pages that the package brings along, all of ratio 100."""
+
+
+def built_in_page(size: int) -> Path:
+    """Return the file of a catalogue page that the package brings along.
+
+    Parameters
+    ----------
+    size : {14, 20, 25}
+
+    Raises
+    ------
+    InvalidInput
+        For another size.
+
+    Examples
+    --------
+    >>> built_in_page(20).name
+    'size_20.toml'
+    """
+    if size not in BUILT_IN_SIZES:
+        raise InvalidInput("size", size, ", ".join(map(str, BUILT_IN_SIZES)))
+    return Path(str(files("pymoo_hdte.drive"))) / "data" / f"size_{size}.toml"
+
+
+def load_page(path: str | Path) -> CataloguePage:
+    """Read a catalogue page: ``name``, ``source``, ``[catalogue]`` and any ``[[printed]]``.
+
+    Parameters
+    ----------
+    path : str or Path
+        A TOML file, in which every quantity has its unit.
+
+    Returns
+    -------
+    CataloguePage
+
+    Raises
+    ------
+    InvalidInput
+        Naming file and line, for a field that is wrong, unit-less or superfluous.
+    OSError
+        If the file cannot be read.
+
+    Examples
+    --------
+    >>> page = load_page(built_in_page(20))
+    >>> page.teeth
+    (200, 202)
+    """
+    file = Path(path).name
+    with toml_with_lines(Path(path)) as top:
+        try:
+            page = page_from_fields(top)
+            top.finish()
+        except InvalidInput as error:
+            if error.field.startswith(f"{file}."):
+                raise
+            raise InvalidInput(f"{file}: {error.field}", error.value, error.allowed) from None
+    return page
+
+
+def load_drive(path: str | Path) -> DriveModel:
+    """Read a drive from one file.
+
+    Parameters
+    ----------
+    path : str or Path
+        A TOML file: a catalogue page, as `load_page` reads it, or a data sheet as `load_datasheet`
+        reads it with a table ``[model]``, as `load_model` reads it.
+
+    Returns
+    -------
+    DriveModel
+
+    Raises
+    ------
+    InvalidInput
+        Naming file and field, for one that is wrong, missing, superfluous or unit-less.
+    OSError
+        If the file cannot be read.
+
+    Examples
+    --------
+    >>> load_drive(built_in_page(20)).sheet.ratio
+    100.0
+    """
+    file = Path(path).name
+    if read_toml(Path(path)).has("catalogue"):
+        try:
+            return drive_of(load_page(path))
+        except InvalidInput as error:
+            if error.field.startswith(file):
+                raise
+            raise InvalidInput(f"{file}: {error.field}", error.value, error.allowed) from None
+    with toml_with_lines(Path(path)) as top:
+        fields = top.table("model")
+        sheet = datasheet_from_fields(top)
+        check_twist(sheet)
+        return DriveModel(**values_of(fields, sheet))

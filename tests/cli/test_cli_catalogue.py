@@ -1,0 +1,194 @@
+"""From a catalogue page to a decision: commands, and what they write against known truths."""
+
+import csv
+import json
+import re
+import shlex
+import shutil
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from places import DOCS
+
+from pymoo_hdte.checks import InvalidInput
+from pymoo_hdte.cli import command_line as cli
+from pymoo_hdte.cli import decision
+from pymoo_hdte.cli.drive_arguments import exceeded, read_drive
+from pymoo_hdte.cli.example_records import TRUTH
+from pymoo_hdte.discrepancy import read_drive_model
+from pymoo_hdte.drive import (
+    ESTIMATES,
+    built_in_page,
+    complete,
+    load_drive,
+    load_page,
+    preset,
+    starting_torque,
+)
+from pymoo_hdte.drive.catalogue import accuracy_of_parts
+from pymoo_hdte.drive.levers import GRADE, LEVERS, SHARES, Lever, changed_drive
+from pymoo_hdte.units import REVOLUTION_PER_MINUTE
+
+PAGE = load_page(built_in_page(20))
+FIGURES = complete(PAGE, {**ESTIMATES, **SHARES})
+
+
+@pytest.fixture(scope="module")
+def gear(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("work") / "my_gear"
+    assert cli.main(["example", str(folder), "--quiet"]) == 0
+    return folder
+
+
+def test_records_give_the_figures_of_the_drive_that_was_measured(gear, tmp_path):
+    out = tmp_path / "identified"
+    files = (str(gear / "bench"), "--datasheet", str(gear / "gear.toml"))
+    assert cli.main(["identify", *files, "--out", str(out), "--quiet"]) == 0
+    before, after = (
+        complete(load_page(gear / "gear.toml")),
+        load_page(out / "identified_drive.toml"),
+    )
+    measured = complete(after)
+    for name, factor in TRUTH.items():
+        assert measured[name].value == pytest.approx(factor * before[name].value, rel=0.05)
+        assert not measured[name].estimated
+    assert measured["load_inertia"] == before["load_inertia"]
+    assert after.printed == load_page(gear / "gear.toml").printed
+    assert load_drive(out / "identified_drive.toml").sheet.ratio == 100.0
+
+
+def test_an_example_is_not_written_over_anything(gear, capsys):
+    assert cli.main(["example", str(gear)]) == cli.MISTAKE
+    assert "new or empty" in capsys.readouterr().err
+
+
+def test_the_map_is_the_model_over_speed_load_and_direction(tmp_path):
+    out = tmp_path / "map"
+    load = ("--load", "-20", "--speed", "1500")
+    assert cli.main(["simulate", "hs_20_100", *load, "--map", "--out", str(out), "--quiet"]) == 0
+    with (out / "map.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    model = preset("calibrated")
+    for row in rows[:: len(rows) // 7]:
+        if row["direction"] == "reverse" or float(row["load_Nm"]) == 0.0:
+            continue
+        there = model.at(
+            float(row["input_speed_r_min"]) * REVOLUTION_PER_MINUTE, float(row["load_Nm"])
+        )
+        (dte,) = there.dte_arcsec(model.nominal[None])
+        # The map lets the input angle fluctuate, Hill's method does not.
+        assert float(row["dte_arcsec"]) == pytest.approx(dte, rel=0.03)
+        assert 0.0 <= float(row["efficiency"]) < 1.0
+    assert {row["direction"] for row in rows} == {"forward", "reverse"}
+    assert (out / "map.svg").read_text().startswith("<?xml")
+    document = json.loads((out / "simulation.json").read_text())
+    assert document["load_torque_Nm"] == -20.0
+    assert 0.0 < document["efficiency"] < 1.0
+
+
+def test_a_thicker_wall_is_half_of_the_compliance_and_half_of_the_torque():
+    thick = changed_drive(PAGE, FIGURES, {"wall_thickness": 1.1})
+    plain = changed_drive(PAGE, FIGURES, {})
+    share = plain.sheet.nominal.stiffness / thick.sheet.nominal.stiffness
+    assert share == pytest.approx(0.5 / 1.1 + 0.5)
+    expected = starting_torque(plain) * (0.5 + 0.5 * 1.1**3)
+    assert starting_torque(thick) == pytest.approx(expected, rel=1e-3)
+    assert thick.sheet.nominal.input_damping == pytest.approx(plain.sheet.nominal.input_damping)
+
+
+def test_classes_of_cam_and_teeth_change_their_own_errors_only():
+    plain = changed_drive(PAGE, FIGURES, {}).sheet
+    for name, classes in (("cam_class", {"e_w"}), ("tooth_class", {"e_p", "e_h"})):
+        finer = changed_drive(PAGE, FIGURES, {name: -1.0}).sheet
+        for old, new in zip(plain.error_sources, finer.error_sources, strict=True):
+            factor = 1.0 / GRADE if old.error_class in classes else 1.0
+            assert (new.mean, new.std) == pytest.approx((factor * old.mean, factor * old.std))
+        assert finer.nominal.static_error == accuracy_of_parts(finer)[0]
+        assert finer.nominal.static_error < plain.nominal.static_error
+
+
+def test_a_printed_accuracy_changes_as_that_of_the_parts():
+    accuracy = replace(FIGURES["K3"], value=2e-4)
+    figures = FIGURES | {"transmission_accuracy": accuracy}
+    both = [changed_drive(PAGE, figures, s).sheet for s in ({}, {"cam_class": -1.0})]
+    assert both[0].nominal.static_error == 2e-4
+    parts = [accuracy_of_parts(sheet)[0] for sheet in both]
+    expected = 2e-4 * parts[1] / parts[0]
+    assert both[1].nominal.static_error == pytest.approx(expected)
+
+
+def test_what_has_no_influence_is_said_and_not_chosen(monkeypatch):
+    """A lever that does nothing is idle; of the other, the best setting within the limits."""
+    nothing = Lever("nothing", 1.0, (0.5, 1.0, 2.0), lambda figures, parts, s: (figures, parts), "")
+    levers = (nothing, next(lever for lever in LEVERS if lever.name == "preload"))
+    monkeypatch.setattr(decision, "LEVERS", levers)
+    monkeypatch.setattr(decision, "DRIVES", 8)
+    monkeypatch.setattr(decision, "DRAWS", 3)
+
+    def changed(page, figures, settings):
+        return changed_drive(page, figures, settings, levers)
+
+    monkeypatch.setattr(decision, "changed_drive", changed)
+    made = decision.decide(PAGE)
+    assert made.idle == ("nothing",)
+    assert made.settings == {"preload": 1.25}
+    assert made.after.goal < made.before.goal
+    assert made.after.starting == pytest.approx(1.125 * made.before.starting, rel=1e-3)
+    tight = decision.Limits(starting_torque=1.1)
+    assert decision.decide(PAGE, limits=tight).settings == {}
+
+
+OF_DRIVES = ("example", "identify", "simulate", "discrepancy", "decide", "optimise", "plan")
+
+
+def commands_of_the_page():
+    """Return every command on drives of the page on the command line."""
+    text = (DOCS / "command_line.md").read_text(encoding="utf-8")
+    blocks = re.findall(r"```sh\n(.*?)```", text, re.S)
+    lines = [line for block in blocks for line in block.splitlines() if line]
+    return [line for line in lines if line.split()[1] in OF_DRIVES]
+
+
+def test_the_commands_of_the_page_name_files_that_an_earlier_one_writes():
+    known = {"hs_20_100", "eyring_drag.py"}
+    for line in commands_of_the_page():
+        _, *words = shlex.split(line)
+        options = cli._parser().parse_args(words)
+        for word in words:
+            if "/" in word or word.endswith((".toml", ".py")):
+                made = {word, word.split("/")[0], "/".join(word.split("/")[:2])} & known
+                assert made or word == str(getattr(options, "out", None)), line
+        known.add(str(getattr(options, "out", None) or options.folder))
+
+
+@pytest.mark.nightly
+def test_the_commands_of_the_page_run_as_printed(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    shutil.copy(DOCS / "examples" / "eyring_drag.py", tmp_path)
+    for line in commands_of_the_page():
+        program, *words = shlex.split(line)
+        assert program == "pymoo-hdte"
+        assert cli.main([*words, "--quiet"]) == 0, line
+    found = json.loads((tmp_path / "my_gear" / "decision" / "decision.json").read_text())["found"]
+    depths = [e["depth"] for e in found if e["name"] == "mesh_stiffness_variation" if "depth" in e]
+    assert np.max(depths) == pytest.approx(0.06, abs=0.02)
+
+
+def test_every_command_reads_the_same_drive_from_the_page(gear):
+    expected = load_drive(gear / "gear.toml")
+    assert read_drive_model(gear / "gear.toml") == expected
+    options = cli._parser().parse_args(["optimise", str(gear / "gear.toml"), "--out", "x"])
+    model, remarks = read_drive(options)
+    assert model == expected
+    estimated = [name for name, entry in complete(PAGE).items() if entry.estimated]
+    assert all(name in remarks[0] for name in estimated)
+    with pytest.raises(InvalidInput, match="has its own model"):
+        read_drive(cli._parser().parse_args(["optimise", str(gear / "gear.toml"), "--out", "x",
+                                             "--model", "resonant"]))  # fmt: skip
+
+
+@pytest.mark.parametrize(("load", "words"), [(60.0, 0), (-70.0, 1), (150.0, 2), (200.0, 3)])
+def test_a_load_above_printed_torques_is_said(load, words):
+    said = exceeded(PAGE, 200.0, load)
+    assert " ".join(said).count("N.m") == words

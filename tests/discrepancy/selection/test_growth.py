@@ -1,0 +1,151 @@
+"""Sets grown by their probability against all sets that there are, on linear data."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import combinations
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+
+from pymoo_hdte.discrepancy._selection.candidate import Candidate
+from pymoo_hdte.discrepancy._selection.excess import Excess
+from pymoo_hdte.discrepancy._selection.fitting import Unknowns, built, fit
+from pymoo_hdte.discrepancy._selection.growth import Growth
+from pymoo_hdte.discrepancy._selection.linearised import linearise
+from pymoo_hdte.discrepancy._selection.rules import RULES
+from pymoo_hdte.discrepancy._selection.score import Linearised, Sized
+from pymoo_hdte.effects.unknowns import Parameter, unknown
+
+N = 60
+
+
+class Multiple(NamedTuple):
+    """So many times a column."""
+
+    name: str
+    number: int
+    size: float
+
+
+class Objective(Unknowns):
+    """Residuals of linear data."""
+
+    def __init__(self, data: LinearData, candidates: Sequence[Candidate]) -> None:
+        super().__init__(data.base, candidates)
+        self.data = data
+
+    def residuals(self, values):
+        effects = [effect for part in built(self.candidates, values[1:]) for effect in part]
+        return values[0] * self.data.level + self.data.force(effects) - self.data.measured
+
+    def jacobian(self, values):
+        numbers = [int(candidate.port) for candidate in self.candidates]
+        return np.column_stack([self.data.level, *self.data.columns.T[numbers]]) * self.scale
+
+
+@dataclass(eq=False)
+class LinearData:
+    """Numbers of white noise beside multiples of a level and of columns, as evidence and errors."""
+
+    measured: np.ndarray
+    columns: np.ndarray
+    level: np.ndarray
+    base: tuple[Parameter, ...] = (Parameter("level", 0.0, -10.0, 10.0, 1.0),)
+    rules: object = RULES
+    evident: frozenset[str] = frozenset()
+    outside: tuple[Sized, ...] = ()
+
+    def force(self, effects):
+        return sum((part.size * self.columns[:, part.number] for part in effects), np.zeros(N))
+
+    def objective(self, candidates):
+        return Objective(self, candidates)
+
+    def response(self, fitted):
+        return self.force
+
+    def rows_of_parts(self):
+        return [np.arange(N)]
+
+    def excess(self, fitted):
+        return Excess(np.array([[fitted.chi_square - N]]), np.array([[float(N)]]))
+
+    def out_of_tolerance(self, at_bounds, together=False):
+        return []
+
+    @property
+    def groups(self):
+        return [np.arange(N)]
+
+    def linearised(self, fitted) -> Linearised:
+        return linearise(fitted, np.zeros(N, int), lambda candidate, place: None, 0.0)
+
+
+def candidate(number):
+    return Candidate(
+        f"effect_{number}",
+        str(number),
+        (unknown("size", -30.0, 30.0, 1.0, linear=True),),
+        ((1.0,),),
+        lambda values: (Multiple(f"effect_{number}", number, values[0]),),
+        "",
+    )
+
+
+def grown(measured, columns, level, outside=()):
+    data = LinearData(measured, columns, level, outside=outside)
+    growth = Growth(data, fit(data), [candidate(k) for k in range(columns.shape[1])], data)
+    growth.grow()
+    return growth
+
+
+@pytest.fixture
+def rng():
+    return np.random.default_rng(3)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_no_set_is_likelier_than_the_best_one_grown(seed):
+    """Columns alike to .7, so that one stands for another until both are exchanged."""
+    rng = np.random.default_rng(seed)
+    shared = rng.normal(size=(N, 1))
+    columns = 0.7 * shared + 0.7 * rng.normal(size=(N, 6))
+    true = rng.choice(6, size=2, replace=False)
+    sizes = rng.choice([-1.0, 1.0], size=2) * rng.uniform(1.0, 3.0, size=2)
+    level = np.ones(N)
+    measured = columns[:, true] @ sizes + 0.5 + rng.normal(size=N)
+    growth = grown(measured, columns, level)
+    best = growth.ranked[0]
+    assert {int(member.port) for member in best.candidates} == set(true.tolist())
+    every = Growth(growth.data, growth.base, growth.candidates, growth.errors)
+    for size in range(3):
+        for members in combinations(growth.candidates, size):
+            every._weigh(fit(growth.data, members))
+    assert best.weight >= every.ranked[0].weight - 0.01
+    assert len(growth.ranked) < len(every.ranked)
+
+
+@pytest.fixture
+def place():
+    """Something that no column holds, along three waves."""
+    at = np.linspace(-1.0, 1.0, N)
+    waves = np.column_stack([np.sin(k * np.pi * at) for k in range(1, 4)])
+    return Sized("place", waves, 0.2, 30.0, np.zeros(3), np.zeros(3, bool))
+
+
+def test_nothing_is_grown_from_noise(rng, place):
+    growth = grown(rng.normal(size=N), rng.normal(size=(N, 5)), np.ones(N), (place,))
+    decision, _ = growth.decide()
+    assert decision.status == "adequate"
+    assert growth.ranked[0].candidates == ()
+
+
+def test_what_no_column_holds_is_outside(rng, place):
+    measured = place.columns @ [3.0, -2.0, 4.0] + rng.normal(size=N)
+    decision, every = grown(measured, rng.normal(size=(N, 5)), np.ones(N), (place,)).decide()
+    assert decision.status == "unlisted"
+    assert decision.outside > 0.95
+    assert every[0].places == ("place",)
