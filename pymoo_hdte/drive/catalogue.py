@@ -91,6 +91,28 @@ Examples
 (True, False)
 """
 
+COMPARED = (
+    "efficiency",
+    "no_load_running_torque",
+    "no_load_starting_torque",
+    "no_load_back_driving_torque",
+    "hysteresis_loss",
+    "lost_motion",
+    "transmission_accuracy",
+)
+"""Figures that `figures.predicted` has for a model."""
+_MAY_BE_ZERO = (
+    "load_inertia",
+    "hysteresis_loss",
+    "no_load_starting_torque",
+    "output_damping",
+    "load_friction",
+    "driven_friction",
+    "mesh_damping_share",
+    "wall_share",
+    "ring_share",
+    "preload_share",
+)
 SHARPNESS = 20.0
 """Corner between the straight pieces of a printed stiffness: off by 3 % at the corner itself."""
 ROOM_TEMPERATURE = 20.0 + ORIGINS["C"]
@@ -145,6 +167,12 @@ class Figure:
     limit : bool
         Whether the value is the largest that the maker allows ("< 1 arcmin").
 
+    Raises
+    ------
+    InvalidInput
+        For a value, speed, load or temperature that is not finite and above 0, but for what may be
+        missing in a drive, or an efficiency above 1.
+
     Examples
     --------
     >>> Figure("efficiency", 0.77, tolerance=0.04).limit
@@ -158,6 +186,16 @@ class Figure:
     temperature: float = ROOM_TEMPERATURE
     tolerance: float = 0.0
     limit: bool = False
+
+    def __post_init__(self) -> None:
+        most = 1.0 if self.name == "efficiency" else np.inf
+        if self.name in _MAY_BE_ZERO:
+            real_number(self.name, self.value, at_least=0.0)
+        else:
+            real_number(self.name, self.value, above=0.0, at_most=most)
+        for condition in ("speed", "load", "temperature"):
+            if (value := getattr(self, condition)) is not None:
+                real_number(f"{self.name}.{condition}", value, above=0.0)
 
 
 @dataclass(frozen=True)
@@ -287,7 +325,7 @@ def page_from_fields(top: Fields) -> CataloguePage:
         if not table.has(name):
             continue
         if table.is_table(name):
-            value = table.quantity(name, quantity, at_least=0.0)
+            value = table.quantity(name, quantity)
             # What does not depend on temperature holds at all; the rest is printed for 20 C.
             entered.append(Figure(name, value, temperature=_printed_at(name, temperature)))
         else:
@@ -327,22 +365,26 @@ def _figure(row: Fields, name: str, temperature: float) -> Figure:
             conditions[condition] = row.quantity(condition, quantity)
     if row.has("temperature"):
         conditions["temperature"] = _temperature(row, "temperature")
-    value = row.quantity("value", FIGURES[name], at_least=0.0)
+    value = row.quantity("value", FIGURES[name])
     row.finish()
     return Figure(name, value, **conditions)
 
 
 def _temperature(table: Fields, name: str) -> float:
     raw = table.take(name, '{ value = ..., unit = "C" }')
-    if not isinstance(raw, Mapping) or set(raw) != {"value", "unit"} or raw["unit"] not in "CK":
+    if (
+        not isinstance(raw, Mapping)
+        or set(raw) != {"value", "unit"}
+        or raw["unit"] not in ("C", "K")
+    ):
         raise InvalidInput(name, raw, '{ value = ..., unit = "C" } or "K"')
     return real_number(name, raw["value"]) + ORIGINS.get(raw["unit"], 0.0)
 
 
 def _printed(row: Fields) -> Figure:
-    name = row.choice("figure", tuple(FIGURES))
+    name = row.choice("figure", COMPARED)
     tolerance = row.number("tolerance", at_least=0.0) if row.has("tolerance") else 0.0
-    limit = bool(row.take("limit", "true or false")) if row.has("limit") else False
+    limit = row.truth("limit") if row.has("limit") else False
     if not limit and tolerance == 0.0:
         raise InvalidInput("printed.tolerance", None, "above 0, or limit = true")
     return replace(_figure(row, name, ROOM_TEMPERATURE), tolerance=tolerance, limit=limit)
@@ -446,7 +488,11 @@ def _enter_friction(
         enter("load_friction", Entry(share))
     back = page.of("no_load_back_driving_torque")
     if back and "driven_friction" not in entries:
-        enter("driven_friction", Entry(1.0 - page.ratio * start / back[0].value))
+        least = page.ratio * start
+        if back[0].value < least:
+            allowed = f"at least {least:.3g} N.m, ratio times starting torque"
+            raise InvalidInput("catalogue.no_load_back_driving_torque", back[0].value, allowed)
+        enter("driven_friction", Entry(1.0 - least / back[0].value))
 
 
 def sampled(

@@ -246,6 +246,13 @@ def test_the_map_has_the_model_in_all_four_quadrants(drives):
     assert stiffer[1] > stiffer[0]
 
 
+PART, NO_LOAD = '{ value = 70, unit = "%" }', '{ value = 0, unit = "N.m" }'
+
+
+def _with(line, words):
+    return "ratio = 100\n", f"ratio = 100\n{line}\n", words
+
+
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
@@ -260,6 +267,21 @@ def test_the_map_has_the_model_in_all_four_quadrants(drives):
         ("value = 16e3,", "value = 26e3,", r"K1, K2, K3 is .*rising"),
         ("ratio = 100", 'ratio = 100\ntemperature = { value = 5, unit = "C" }', r"for 5 C"),
         ("tolerance = 0.039", "", r"printed\.tolerance.*limit = true"),
+        ("limit = true", 'limit = "false"', r"limit is 'false'.*true or false"),
+        ('figure = "lost_motion"', 'figure = "K1"', r"figure is 'K1'.*lost_motion"),
+        ("value = 29e3,", "value = 0,", r"K3 is 0\.0.*above 0"),
+        ("value = 2000,", "value = -2000,", r"rated_speed is -209"),
+        _with("temperature = { value = 20, unit = 5 }", r"temperature is .*or \"K\""),
+        _with('temperature = { value = 20, unit = "" }', r"temperature is .*or \"K\""),
+        _with('efficiency = { value = 0, unit = "%" }', r"efficiency is 0\.0.*above 0"),
+        _with('efficiency = { value = 101, unit = "%" }', r"efficiency is 1\.01.*at most 1"),
+        _with(f"efficiency = [{{ value = {PART}, load = {NO_LOAD} }}]", r"efficiency\.load is 0"),
+        _with(f"no_load_back_driving_torque = {NO_LOAD}", r"back_driving_torque is 0\.0"),
+        # Less than the starting torque alone takes would be energy from nothing.
+        _with(
+            'no_load_back_driving_torque = { value = 1, unit = "N.m" }',
+            r"back_driving_torque is 1\.0.*ratio times starting torque",
+        ),
     ],
 )
 def test_what_is_missing_or_wrong_is_asked_for_by_name(old, new, words, tmp_path):
