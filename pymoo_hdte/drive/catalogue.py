@@ -500,6 +500,8 @@ def sampled(
 ) -> Iterator[dict[str, Entry]]:
     """Yield n completed pages whose estimates are drawn within their tolerances.
 
+    A draw that no drive has, such as a running torque below the starting torque, is drawn again.
+
     Parameters
     ----------
     entries : mapping of Entry
@@ -510,12 +512,39 @@ def sampled(
     Yields
     ------
     dict of Entry
+
+    Raises
+    ------
+    InvalidInput
+        As `drive_of`, if no drive has the estimates themselves.
     """
-    for _ in range(n):
-        yield {
+    _require_consistent(entries)
+    drawn = 0
+    while drawn < n:
+        draw = {
             name: replace(entry, value=entry.value * (1.0 + entry.tolerance * rng.uniform(-1, 1)))
             for name, entry in entries.items()
         }
+        try:
+            _require_consistent(draw)
+        except InvalidInput:
+            continue
+        drawn += 1
+        yield draw
+
+
+def _require_consistent(entries: Mapping[str, Entry]) -> None:
+    """Raise `InvalidInput` for figures that no drive has together."""
+    value = {name: entry.value for name, entry in entries.items()}
+    start, running = value["no_load_starting_torque"], value["no_load_running_torque"]
+    if running <= start:
+        allowed = f"above the starting torque, {start:.3g} N.m"
+        raise InvalidInput("catalogue.no_load_running_torque", float(f"{running:.3g}"), allowed)
+    stiffnesses = (value["K1"], value["K2"], value["K3"])
+    if not stiffnesses[0] <= stiffnesses[1] <= stiffnesses[2]:
+        raise InvalidInput("catalogue.K1, K2, K3", stiffnesses, "rising")
+    if not 0.0 < value["T1"] < value["T2"]:
+        raise InvalidInput("catalogue.T1, T2", (value["T1"], value["T2"]), "above 0, and rising")
 
 
 def drive_of(
@@ -557,11 +586,9 @@ def drive_of(
     ('RT1 size 20, ratio 100', 100.0)
     """
     entries = complete(page) if entries is None else entries
+    _require_consistent(entries)
     value = {name: entry.value for name, entry in entries.items()}
     start, running = value["no_load_starting_torque"], value["no_load_running_torque"]
-    if running <= start:
-        allowed = f"above the starting torque, {start:.3g} N.m"
-        raise InvalidInput("catalogue.no_load_running_torque", float(f"{running:.3g}"), allowed)
     drag = (running - start) / value["rated_speed"]
     teeth = dict(zip(("flexspline", "circular_spline"), page.teeth, strict=True))
     sources = tuple(sources or page.error_sources or hs_20_100().error_sources)
@@ -612,10 +639,6 @@ def drive_of(
 
 def _effects(value: Mapping[str, float]) -> tuple[DriveEffect, ...]:
     first, second, third = (value[name] for name in ("K1", "K2", "K3"))
-    if not first <= second <= third:
-        raise InvalidInput("catalogue.K1, K2, K3", (first, second, third), "rising")
-    if not 0.0 < value["T1"] < value["T2"]:
-        raise InvalidInput("catalogue.T1, T2", (value["T1"], value["T2"]), "above 0, and rising")
     corner = value["T1"] / first
     upper = corner + (value["T2"] - value["T1"]) / second
     mesh: list[DriveEffect] = []
@@ -678,7 +701,7 @@ def loop_width(model: DriveModel, torque: float) -> float:
     """
     path = torque * np.array([1.0, 0.0, -1.0, 0.0])
     loop = quasi_static_torsion(model.coefficients(model.nominal[None]), path)[0]
-    return float(loop[1] - loop[3])
+    return float(abs(loop[1] - loop[3]))
 
 
 def _static_error(sheet: DataSheet, printed: float | None) -> tuple[float, float]:

@@ -11,6 +11,7 @@ from scipy.stats import gmean
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.drive import (
     ESTIMATES,
+    Entry,
     Figure,
     back_driving_torque,
     compared,
@@ -27,6 +28,8 @@ from pymoo_hdte.drive import (
     quasi_static_torsion,
     starting_torque,
 )
+from pymoo_hdte.drive.catalogue import sampled
+from pymoo_hdte.drive.datasheet_file import check_twist
 from pymoo_hdte.drive.toml_text import model_toml, sheet_toml
 from pymoo_hdte.units import ARCSEC, REVOLUTION_PER_MINUTE
 
@@ -342,3 +345,27 @@ def test_one_file_holds_sheet_and_model(tmp_path, drives):
     path = tmp_path / "drive.toml"
     path.write_text(text + nested, encoding="utf-8")
     assert load_drive(path) == model
+
+
+def test_draws_are_of_drives_that_there_may_be(pages):
+    """At a low speed the running torque is near the starting torque, and both are estimates."""
+    out = ("no_load_running_torque", "rated_speed")
+    entered = [f for f in pages[14].entered if f.name not in out]
+    entered.append(Figure("rated_speed", 500.0 * REVOLUTION_PER_MINUTE))
+    page = replace(pages[14], entered=tuple(entered))
+    draws = list(sampled(complete(page), 50, np.random.default_rng(1)))
+    assert len(draws) == 50
+    for draw in draws:
+        assert drive_of(page, draw).sheet.nominal.input_damping > 0.0
+    impossible = {**draws[0], "no_load_running_torque": Entry(1e-3)}
+    with pytest.raises(InvalidInput, match="above the starting torque"):
+        next(sampled(impossible, 1, np.random.default_rng(1)))
+
+
+def test_a_rated_load_that_drives_has_the_same_loops(drives):
+    model = drives[20]
+    driven = replace(model, sheet=replace(model.sheet, load_torque=-model.sheet.load_torque))
+    for width in (hysteresis_loss, lost_motion):
+        assert width(driven) == pytest.approx(width(model), rel=1e-9)
+    with pytest.raises(InvalidInput, match=r"at least 1e\+06 N"):
+        check_twist(replace(model.sheet, load_torque=-1e5))
