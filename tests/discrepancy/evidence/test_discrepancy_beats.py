@@ -13,7 +13,9 @@ from pymoo_hdte.discrepancy._evidence.order_lines.parameters import base_paramet
 from pymoo_hdte.discrepancy._evidence.order_lines.prediction import Conditions, predict
 from pymoo_hdte.discrepancy._plan.imagined import imagined_campaign, possible_tests
 from pymoo_hdte.discrepancy._plan.limits import PlanLimits
+from pymoo_hdte.drive import LawAtPort
 from pymoo_hdte.drive._effects import MeshStiffnessVariation
+from pymoo_hdte.effects.ripple import COGGING_ORDERS, PeriodicTorque
 from pymoo_hdte.units import REVOLUTION_PER_MINUTE
 
 DEPTH, PHASE, SECOND = 0.05, 0.7, 0.2
@@ -106,3 +108,30 @@ def test_two_lines_of_the_input_beat_as_its_inertia_has_it(speed):
         # The load behind the gear adds a few per cent to the inertia.
         found = predicted.phasors[0, 0, 1, orders.index(beat)]
         assert found == pytest.approx(expected, rel=0.05)
+
+
+@pytest.mark.parametrize("analysed", [[], [24.0]])
+def test_what_a_record_folds_down_it_does_whatever_others_show(analysed):
+    """Two records of one motor: the rows of the first show order 24, those of the other fold it."""
+    orders = [1.0, 6.0, *analysed]
+    folded = np.zeros((2, len(COGGING_ORDERS), 2, 1 + len(orders)), dtype=complex)
+    folded[1, COGGING_ORDERS.index(24.0), :, 2] = 0.3, 0.3j
+    conditions = Conditions(
+        np.array([3.0, 200.0]),
+        np.zeros(2),
+        np.zeros(2),
+        np.zeros((2, 3, 1 + len(orders)), dtype=complex),
+        lead=np.zeros((2, len(orders)), dtype=complex),
+    )
+    values = {
+        one.name: np.array([one.start]) for one in base_parameters(BELIEVED, QUIET, PHASES, 0.0)
+    }
+    cogging = LawAtPort("cogging", "input", PeriodicTorque(24.0, 0.4, 2e-3))
+    without, present = (
+        predict(BELIEVED, QUIET, some, orders, values, (cogging,)).phasors[0]
+        for some in (conditions, replace(conditions, folded=folded))
+    )
+    shown = (present - without)[..., :2]
+    assert not shown[0].any()
+    # The motor takes the torque through its inertia, from which the drive is decoupled.
+    assert shown[1, 1, 1] == pytest.approx(0.3 * 2e-3 * np.exp(0.4j), rel=0.2)

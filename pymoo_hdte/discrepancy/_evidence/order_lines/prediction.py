@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pymoo_hdte.discrepancy._evidence.order_lines.bench import IDEAL, Bench
-from pymoo_hdte.discrepancy._evidence.order_lines.folded_lines import beyond_orders, folded_down
+from pymoo_hdte.discrepancy._evidence.order_lines.folded_lines import beyond_rows, folded_down
 from pymoo_hdte.discrepancy._evidence.order_lines.parameters import READING
 from pymoo_hdte.discrepancy._evidence.order_lines.steady_states import (
     PREDICTION,
@@ -278,7 +278,7 @@ def _predict_group(
     for places, further in parts:
         some = {name: values[name][places] for name in READING}
         readings = mean[places], phasors[places]
-        if conditions.folded is not None and (beyond := beyond_orders(further, orders)):
+        if conditions.folded is not None and (beyond := beyond_rows(further, conditions.folded)):
             rows = _cases(places, records)
             held_by = SpeedLoop(rig.proportional, rig.integral)
             folded = folded_down(
