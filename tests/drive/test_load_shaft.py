@@ -55,6 +55,15 @@ def test_a_stiff_shaft_is_a_rigid_one():
     assert hill_steady_state(stiff).phasors == pytest.approx(expected, rel=1e-5)
 
 
+def test_a_shaft_that_nothing_turns_behind_changes_nothing():
+    bare = preset("published")
+    model = replace(bare, effects=(LoadShaft(COMPLIANCE, TIME),))
+    drives = [one.coefficients(one.nominal[None]) for one in (bare, model)]
+    expected, found = (floquet_multipliers(drive) for drive in drives)
+    assert found == pytest.approx(expected, rel=1e-12)
+    assert np.isfinite(simulate_drive(model, model.nominal).transmission_error).all()
+
+
 def test_vibrations_are_those_of_three_inertias():
     """Of a bare chain input, output, load; the input is referred to the output."""
     model = replace(preset("published"), effects=(LoadInertia(LOAD), LoadShaft(COMPLIANCE, 0.0)))
