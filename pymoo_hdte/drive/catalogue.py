@@ -254,8 +254,8 @@ class CataloguePage:
     Raises
     ------
     InvalidInput
-        For a value out of range, a figure that is entered twice for one condition, or a ratio that
-        no pair of tooth numbers with a difference of two gives.
+        For a value out of range, a figure that is entered twice for one condition or from which
+        nothing is made, or a ratio that no pair of tooth numbers with a difference of two gives.
 
     Examples
     --------
@@ -282,6 +282,9 @@ class CataloguePage:
                 "half a number of teeth: turns of the input per turn of the output, as printed"
             )
             raise InvalidInput("ratio", self.ratio, allowed)
+        if any(figure.name == "lost_motion" for figure in self.entered):
+            allowed = "below [[printed]]: it is compared with the model, which follows without it"
+            raise InvalidInput("catalogue.lost_motion", "entered", allowed)
         conditions = [(f.name, f.speed, f.load, f.temperature) for f in self.entered]
         for condition in conditions:
             if conditions.count(condition) > 1:
@@ -427,7 +430,7 @@ def complete(
     for name in FIGURES:
         figures = page.of(name)
         plain = [f for f in figures if f.speed is None and f.load is None]
-        if plain and name not in ("efficiency", "no_load_back_driving_torque", "lost_motion"):
+        if plain and name not in ("efficiency", "no_load_back_driving_torque"):
             enter(name, Entry(plain[0].value))
     for name, what in ASKED_FOR.items():
         if name not in entries:

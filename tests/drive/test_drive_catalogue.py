@@ -1,8 +1,6 @@
 """Catalogue pages: printed figures that were not entered, sizes held out, and what is asked for."""
 
 from dataclasses import replace
-from importlib.resources import files
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,6 +12,7 @@ from pymoo_hdte.drive import (
     Entry,
     Figure,
     back_driving_torque,
+    built_in_page,
     compared,
     complete,
     drive_of,
@@ -33,8 +32,7 @@ from pymoo_hdte.drive.datasheet_file import check_twist
 from pymoo_hdte.drive.toml_text import model_toml, sheet_toml
 from pymoo_hdte.units import ARCSEC, REVOLUTION_PER_MINUTE
 
-DATA = Path(str(files("pymoo_hdte.drive"))) / "data"
-PAGES = {size: DATA / f"size_{size}.toml" for size in (14, 20, 25)}
+PAGES = {size: built_in_page(size) for size in (14, 20, 25)}
 ARCMIN = 60.0 * ARCSEC
 
 # Schaeffler TPI 275, series RT1-H-CS, ratio 100, 20 C: rated torque N.m, efficiency at it and at
@@ -95,8 +93,6 @@ def test_rules_of_friction_hold_for_sizes_that_they_do_not_come_from(name, colum
     assert rule.formula({"size": 1.0, **at_2000}) == pytest.approx(
         gmean(list(known.values())), rel=0.01
     )
-    worst = max(abs(held_out(known, size) / known[size] - 1.0) for size in known)
-    assert worst <= 0.25
     assert max(abs(known[size] / held_out(known, size) - 1.0) for size in known) <= rule.tolerance
 
 
@@ -277,6 +273,7 @@ def _with(line, words):
         _with("temperature = { value = 20, unit = 5 }", r"temperature is .*or \"K\""),
         _with('temperature = { value = 20, unit = "" }', r"temperature is .*or \"K\""),
         _with('efficiency = { value = 0, unit = "%" }', r"efficiency is 0\.0.*above 0"),
+        _with('lost_motion = { value = 1, unit = "arcmin" }', r"lost_motion is .*\[\[printed"),
         _with('efficiency = { value = 101, unit = "%" }', r"efficiency is 1\.01.*at most 1"),
         _with(f"efficiency = [{{ value = {PART}, load = {NO_LOAD} }}]", r"efficiency\.load is 0"),
         _with(f"no_load_back_driving_torque = {NO_LOAD}", r"back_driving_torque is 0\.0"),
