@@ -195,7 +195,7 @@ class Coefficients:
 
     @property
     def loaded_shaft(self) -> tuple[float, float] | None:
-        """The ``shaft``, if a load turns behind it: what nothing twists is rigid."""
+        """The ``shaft``, in rad/(N.m) and s, if a load turns behind it: else it is rigid."""
         return self.shaft if np.any(self.load_inertia) else None
 
     @property
