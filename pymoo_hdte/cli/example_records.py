@@ -15,6 +15,7 @@ from pymoo_hdte.cli.identification import BEARING, COMPLETE, LOOPS
 from pymoo_hdte.discrepancy import read_limits, write_campaign
 from pymoo_hdte.discrepancy._plan.imagined import imagined_campaign, possible_tests
 from pymoo_hdte.discrepancy._records.believed_model import believed_of_model
+from pymoo_hdte.discrepancy._records.known_values import known_values
 from pymoo_hdte.drive import (
     CataloguePage,
     DriveModel,
@@ -42,6 +43,10 @@ TRUTH = {
 """Figures of the drive that was measured, as multiples of its page."""
 VARIATION = MeshStiffnessVariation(0.06, 0.7)
 """What the measured drive has besides."""
+TOLERANCE = 0.1
+"""By how much figures of a page may be off, as the campaign states it."""
+FIGURES = ("softening", "stiffening", "torsion", "force", "level")
+"""Numbers of effects that follow from them."""
 PROTOTYPES, SCATTER = 4, 0.02
 HELD_OUT = 3
 """Every so many running records one is held out."""
@@ -148,10 +153,17 @@ def _write_campaign(draft: Path, page: CataloguePage, rng: np.random.Generator) 
         replace(record, role="held_out" if place % HELD_OUT == 1 else "train")
         for place, record in enumerate(campaign.running)
     )
+    described = believed_of_model(drive_of(page), TOLERANCE)
+    # Figures held to be exact would leave an effect to explain by how much they are off.
+    numbers = {
+        name: TOLERANCE
+        for name in known_values(described.effects)
+        if name.rpartition(".")[2] in FIGURES
+    }
     campaign = replace(
         campaign,
         title=f"{page.name}, computed records",
-        believed=believed_of_model(drive_of(page), tolerance=0.1),
+        believed=replace(described, tolerances=numbers),
         running=running,
     )
     write_campaign(campaign, draft / CAMPAIGN)
