@@ -22,7 +22,12 @@ LARGEST_OUTPUT = 2**24
 _LARGEST_PROGRAM = 2**28
 """Bytes of a file by which a program is told from others."""
 _STANDARD_OUTPUT, _STANDARD_ERROR = "stdout.txt", "stderr.txt"
-_NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eEdD][-+]?\d+)?|[-+]?(?:nan|inf)", re.IGNORECASE)
+_NUMBER = re.compile(
+    r"[-+]?(?:(?:\d++(?:\.\d*+|(?!,\d))|\.\d++)(?:[ed][-+]?\d++)?+(?![-+.]\d)"
+    r"|(?:nan|inf(?:inity)?)\b)",
+    re.IGNORECASE,
+)
+"""Never the beginning of one: of 2,5, of 1.5.2, or of Fortran's 0.12-102 for 0.12E-102."""
 _LINE = re.compile(r"\s*([A-Za-z_]\w*)\s*[=:,\s]\s*(\S+)\s*")
 _SAFELY = os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)
 """A link is not followed, and a pipe not waited for."""

@@ -19,7 +19,7 @@ from pymoo.core.algorithm import Algorithm
 from pymoo_hdte._io.budget import LARGEST_TOML
 from pymoo_hdte._io.fields import Fields
 from pymoo_hdte._io.toml import toml_with_lines
-from pymoo_hdte.checks import Complaints, InvalidInput, SeveralComplaints, real_number, whole_number
+from pymoo_hdte.checks import Complaints, InvalidInput, SeveralComplaints, real_number
 from pymoo_hdte.cli.own_effects import on_one_line
 from pymoo_hdte.cli.program import Program, digest_of, program_at
 from pymoo_hdte.problems import (
@@ -46,8 +46,9 @@ _FUNCTION = re.compile(r"([A-Za-z_]\w*(?:\.[A-Za-z_]\w*)*):([A-Za-z_]\w*)", re.A
 _RESERVED = ("input_file", "output_file", "study")
 _FILE = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]*")
 _MOST_WORKERS = 256
-ALGORITHMS = ("ElitistSwarm", "CompactSwarm", "NSGA2", "SMSEMOA", "GA", "DE")
-"""Algorithms of this package and of pymoo, by name; the last two have a single objective."""
+_OF_ONE_OBJECTIVE = ("GA", "DE")
+ALGORITHMS = ("ElitistSwarm", "CompactSwarm", "NSGA2", "SMSEMOA", *_OF_ONE_OBJECTIVE)
+"""Algorithms of this package and of pymoo, by name."""
 _DISTRIBUTIONS: dict[str, tuple[str, ...]] = {
     "normal": ("mean", "std"),
     "uniform": ("lower", "upper"),
@@ -124,14 +125,12 @@ def _study(fields: Fields, folder: Path) -> RobustStudy:
     complaints = Complaints()
     parts: dict[str, Any] = {}
     title = fields.text("title") if fields.has("title") else "Robust design"
-    for name, part in (
-        ("inputs", _inputs),
-        ("goals", _goals),
-        ("settings", _settings),
-        ("search", _search),
-    ):
+    for name, part in (("inputs", _inputs), ("goals", _goals), ("settings", _settings)):
         with complaints.noted():
             parts[name] = part(fields)
+    with complaints.noted():
+        count = len(parts["goals"]["objectives"]) if "goals" in parts else None
+        parts["search"] = _search(fields, count)
     with complaints.noted():
         names = _names_of(parts["inputs"]) if "inputs" in parts else None
         simulator, running = _simulator(fields.table("simulator"), folder, names)
@@ -354,6 +353,9 @@ def _inputs(fields: Fields) -> dict[str, Any]:
         for table in fields.tables("scenarios"):
             with complaints.noted():
                 names, scenarios = _scenarios(table)
+                if names in noise:
+                    allowed = "other names than of the scenarios before"
+                    raise InvalidInput(table.name_of("names"), list(names), allowed)
                 noise[names] = scenarios
     complaints.finish()
     return {"designs": designs, "noise": noise}
@@ -504,9 +506,12 @@ def _statistic(fields: Fields, place: str) -> Statistic:
         for name in ("above", "below"):
             if fields.has(name):
                 given[name] = fields.number(name)
-        for name, joined in (("any_of", Event.__or__), ("all_of", Event.__and__)):
-            if fields.has(name):
-                given["event"] = _event(fields, name, joined)
+        joined = {"any_of": Event.__or__, "all_of": Event.__and__}
+        several = [name for name in joined if fields.has(name)]
+        if len(several) > 1:
+            raise InvalidInput(place, several, "either any_of or all_of")
+        for name in several:
+            given["event"] = _event(fields, name, joined[name])
     with _at(place):
         return kind(**given)
 
@@ -550,18 +555,22 @@ def _settings(fields: Fields) -> dict[str, Any]:
     return given
 
 
-def _search(fields: Fields) -> tuple[Algorithm, int, int]:
+def _search(fields: Fields, n_objectives: int | None) -> tuple[Algorithm, int, int]:
     if not fields.has("search"):
         return _algorithm("ElitistSwarm", None), 100, 1
     table = fields.table("search")
     name = "ElitistSwarm"
     if table.has("algorithm"):
         name = table.choice("algorithm", ALGORITHMS)
+    if name in _OF_ONE_OBJECTIVE and n_objectives is not None and n_objectives > 1:
+        several = [other for other in ALGORITHMS if other not in _OF_ONE_OBJECTIVE]
+        allowed = f"one for {n_objectives} objectives: {', '.join(several)}"
+        raise InvalidInput(table.name_of("algorithm"), name, allowed)
     population = table.whole("population", 4) if table.has("population") else None
     generations = table.whole("generations", 1) if table.has("generations") else 100
     seed = table.whole("seed", 0) if table.has("seed") else 1
     table.finish()
-    return _algorithm(name, population), whole_number("generations", generations, 1), seed
+    return _algorithm(name, population), generations, seed
 
 
 def _algorithm(name: str, population: int | None) -> Algorithm:

@@ -53,6 +53,17 @@ population = 12
 generations = 8
 """
 OF_FUNCTION = '[simulator]\nfunction = "steps_of_a_test:staircase"\n'
+CASES = """
+[[scenarios]]
+names = ["a", "b"]
+rows = [[1, 2], [3, 4]]
+"""
+TWO_EVENTS = """[[constraint]]
+statistic = "failure_probability"
+any_of = [{ response = "cost", above = 3 }]
+all_of = [{ response = "height", below = 1 }]
+at_most = 0.1
+[search]"""
 STAIRCASE = """
 def staircase(x, load):
     return {"cost": x * load, "height": load * x**2}
@@ -268,6 +279,32 @@ def test_numbers_of_an_output(text, value):
 
 
 @pytest.mark.parametrize(
+    "text",
+    ["a = 2,5", "a = 1,234.5", "a = 0.1234-102", "a = 1.5.2", "a = 1e5-3", "a = information"],
+)
+def test_half_a_number_is_none(text):
+    for mark in ("a =", None):
+        with pytest.raises(RuntimeError, match="no a: "):
+            responses_in(text, [("a", mark)])
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("2.5e8Pa", 2.5e8),
+        ("3.", 3.0),
+        ("4; 5", 4.0),
+        ("1.0,2.0", 1.0),
+        ("5 %", 5.0),
+        ("7e2.", 7e2),
+        ("-Infinity", -np.inf),
+    ],
+)
+def test_what_follows_a_number_does_not_matter(text, value):
+    assert responses_in(f"a = {text}", [("a", "a =")]) == {"a": value}
+
+
+@pytest.mark.parametrize(
     ("simulator", "words"),
     [
         ('[simulator]\nfunction = "no_such_module_here:f"\n', "ModuleNotFoundError"),
@@ -315,6 +352,17 @@ def test_a_simulator_that_is_none_is_named_with_what_is_allowed(simulator, words
         (INPUTS, GOALS.replace("at_least", "at_best"), "either at_most or at_least"),
         (INPUTS, GOALS + 'algorithm = "NSGA4"\n', "one of 'ElitistSwarm'"),
         (INPUTS, GOALS.replace('"cost"', '"costs"', 1), "one of .'cost', 'height'"),
+        (INPUTS + 2 * CASES, GOALS, r"scenarios\[1\].names .* other names than"),
+        (
+            INPUTS,
+            GOALS + 'algorithm = "GA"\n',
+            "search.algorithm is 'GA', allowed: .* 2 objectives",
+        ),
+        (
+            INPUTS,
+            GOALS.replace("[search]", TWO_EVENTS),
+            "constraint.1. is .*either any_of or all_of",
+        ),
     ],
 )
 def test_a_mistake_in_the_study_is_named_with_its_line(inputs, goals, words, folder, capsys):
@@ -411,6 +459,16 @@ def test_where_no_design_meets_the_constraints_the_nearest_is_told(folder, capsy
     document = json.loads(capsys.readouterr().out)
     assert not document["feasible"]
     assert document["design"]["x"] == pytest.approx(2.0, abs=0.02)
+
+
+def test_a_warning_of_every_run_is_told_once(folder, capsys):
+    warned = STAIRCASE.replace(
+        "    return", "    warnings.warn('rough', RuntimeWarning)\n    return"
+    )
+    (folder / "steps_of_a_test.py").write_text("import warnings\n" + warned)
+    written(folder)
+    assert robust("study.toml", "--out", "report", "--json") == 0
+    assert json.loads(capsys.readouterr().out)["limits"] == ["rough"]
 
 
 def test_a_simulator_that_always_fails_is_the_mistake(folder, capsys):
