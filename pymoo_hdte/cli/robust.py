@@ -64,7 +64,8 @@ def _run(options: argparse.Namespace, say: Say) -> Outcome:
             kept = f"finished runs are kept in {runs}; the same command goes on from there"
             raise KeyboardInterrupt(kept) from None
         # A simulator may warn in every run.
-        messages = [str(entry.message) for entry in noted if entry.category is RuntimeWarning]
+        kinds = RuntimeWarning, UserWarning
+        messages = [str(entry.message) for entry in noted if entry.category in kinds]
         said = list(dict.fromkeys(messages))
         say("writing the report")
         document = write_robust_report(study.title, problem, result, said, options.out)

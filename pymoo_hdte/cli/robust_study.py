@@ -46,9 +46,11 @@ _FUNCTION = re.compile(r"([A-Za-z_]\w*(?:\.[A-Za-z_]\w*)*):([A-Za-z_]\w*)", re.A
 _RESERVED = ("input_file", "output_file", "study")
 _FILE = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]*")
 _MOST_WORKERS = 256
-_OF_ONE_OBJECTIVE = ("GA", "DE")
-ALGORITHMS = ("ElitistSwarm", "CompactSwarm", "NSGA2", "SMSEMOA", *_OF_ONE_OBJECTIVE)
-"""Algorithms of this package and of pymoo, by name."""
+ALGORITHMS = {
+    "several": ("ElitistSwarm", "CompactSwarm", "NSGA2", "SMSEMOA"),
+    "one": ("DE", "GA"),
+}
+"""Algorithms of this package and of pymoo by the number of objectives, the default first."""
 _DISTRIBUTIONS: dict[str, tuple[str, ...]] = {
     "normal": ("mean", "std"),
     "uniform": ("lower", "upper"),
@@ -129,8 +131,8 @@ def _study(fields: Fields, folder: Path) -> RobustStudy:
         with complaints.noted():
             parts[name] = part(fields)
     with complaints.noted():
-        count = len(parts["goals"]["objectives"]) if "goals" in parts else None
-        parts["search"] = _search(fields, count)
+        goals = parts.get("goals", {"objectives": ()})
+        parts["search"] = _search(fields, len(goals["objectives"]))
     with complaints.noted():
         names = _names_of(parts["inputs"]) if "inputs" in parts else None
         simulator, running = _simulator(fields.table("simulator"), folder, names)
@@ -555,17 +557,12 @@ def _settings(fields: Fields) -> dict[str, Any]:
     return given
 
 
-def _search(fields: Fields, n_objectives: int | None) -> tuple[Algorithm, int, int]:
-    if not fields.has("search"):
-        return _algorithm("ElitistSwarm", None), 100, 1
-    table = fields.table("search")
-    name = "ElitistSwarm"
-    if table.has("algorithm"):
-        name = table.choice("algorithm", ALGORITHMS)
-    if name in _OF_ONE_OBJECTIVE and n_objectives is not None and n_objectives > 1:
-        several = [other for other in ALGORITHMS if other not in _OF_ONE_OBJECTIVE]
-        allowed = f"one for {n_objectives} objectives: {', '.join(several)}"
-        raise InvalidInput(table.name_of("algorithm"), name, allowed)
+def _search(fields: Fields, n_objectives: int) -> tuple[Algorithm, int, int]:
+    table = fields.table("search") if fields.has("search") else Fields({}, "search")
+    several, single = ALGORITHMS["several"], ALGORITHMS["one"]
+    # Where the objectives are at fault, any name will do.
+    names = single if n_objectives == 1 else several if n_objectives else (*several, *single)
+    name = table.choice("algorithm", names) if table.has("algorithm") else names[0]
     population = table.whole("population", 4) if table.has("population") else None
     generations = table.whole("generations", 1) if table.has("generations") else 100
     seed = table.whole("seed", 0) if table.has("seed") else 1

@@ -356,7 +356,7 @@ def test_a_simulator_that_is_none_is_named_with_what_is_allowed(simulator, words
         (
             INPUTS,
             GOALS + 'algorithm = "GA"\n',
-            "search.algorithm is 'GA', allowed: .* 2 objectives",
+            "search.algorithm is 'GA', allowed: one of 'Eli",
         ),
         (
             INPUTS,
@@ -461,10 +461,27 @@ def test_where_no_design_meets_the_constraints_the_nearest_is_told(folder, capsy
     assert document["design"]["x"] == pytest.approx(2.0, abs=0.02)
 
 
-def test_a_warning_of_every_run_is_told_once(folder, capsys):
-    warned = STAIRCASE.replace(
-        "    return", "    warnings.warn('rough', RuntimeWarning)\n    return"
-    )
+ONE_GOAL = GOALS.replace('[[objective]]\nstatistic = "std"\nresponse = "cost"\n', "")
+
+
+def test_a_single_objective_has_its_own_algorithm(folder, capsys):
+    written(folder, goals=ONE_GOAL)
+    assert robust("study.toml", "--out", "report", "--json") == 0
+    document = json.loads(capsys.readouterr().out)
+    # As where the front begins: the mean height is 3 (x^2 + 0.05^2), at least 4.5.
+    assert document["design"]["x"] == pytest.approx(np.sqrt(1.5 - 0.05**2), abs=2e-3)
+    assert len(document["objectives"]) == document["front"] == 1
+
+
+def test_algorithms_of_several_objectives_are_refused_before_a_run(folder):
+    path = written(folder, goals=ONE_GOAL + 'algorithm = "CompactSwarm"\n')
+    with pytest.raises(InvalidInput, match="one of 'DE', 'GA'"):
+        studied(path)
+
+
+@pytest.mark.parametrize("category", ["RuntimeWarning", "UserWarning"])
+def test_a_warning_of_every_run_is_told_once(category, folder, capsys):
+    warned = STAIRCASE.replace("return", f"warnings.warn('rough', {category})\n    return")
     (folder / "steps_of_a_test.py").write_text("import warnings\n" + warned)
     written(folder)
     assert robust("study.toml", "--out", "report", "--json") == 0
