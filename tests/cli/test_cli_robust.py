@@ -479,6 +479,7 @@ def test_algorithms_of_several_objectives_are_refused_before_a_run(folder):
         studied(path)
 
 
+@pytest.mark.filterwarnings("default:rough")
 @pytest.mark.parametrize("category", ["RuntimeWarning", "UserWarning"])
 def test_a_warning_of_every_run_is_told_once(category, folder, capsys):
     warned = STAIRCASE.replace("return", f"warnings.warn('rough', {category})\n    return")
