@@ -36,8 +36,8 @@ DRAWS = 24
 SPREAD = 3.0
 """Standard deviations in the goal: mean + 3 std, which few drives exceed."""
 LITTLE = 1e-2
-"""Share of the goal below which a lever is said to have no influence: the scatter of the mean over
-`DRIVES` drives with the usual scatter is of that size."""
+"""Share of the goal below which a lever has no influence, and a change no gain: the scatter of the
+mean over `DRIVES` drives with the usual scatter is of that size."""
 
 
 @dataclass(frozen=True)
@@ -134,7 +134,8 @@ def decide(
     """Choose settings of the levers for the least mean + 3 std of the DTE within limits.
 
     Each lever is tried alone; those without influence are left as they are. Of the others, all
-    combinations of their settings are tried that the limits allow.
+    combinations of their settings are tried that the limits allow. Where the best of them gains
+    less than `LITTLE`, nothing is changed.
 
     Parameters
     ----------
@@ -185,8 +186,10 @@ def decide(
         {name: setting for name, setting in design if setting != unchanged[name]}
         for design in product(*choices)
     ]
-    fit = [one for one in designs if allowed(cost_of(page, figures, one), before, limits)]
-    settings = min(fit or [{}], key=lambda one: np.nan_to_num(outcome(one).goal, nan=np.inf))
+    fit = [design for design in designs if allowed(cost_of(page, figures, design), before, limits)]
+    settings = min(fit, key=lambda design: np.nan_to_num(outcome(design).goal, nan=np.inf))
+    if outcome(settings).goal > (1.0 - LITTLE) * before.goal:
+        settings = {}
     gain, doubts = _doubts(page, figures, settings, found)
     return Decision(
         page, figures, found, before, outcome(settings), effects, settings, idle, gain, doubts
@@ -247,7 +250,7 @@ def _drives(drive: DriveModel) -> NDArray[np.float64]:
     """Return drives of a design: normal theta_s, cut off at 3 std, and uniform other values."""
     shares = scipy.stats.qmc.Sobol(5, scramble=False).random(2 * DRIVES)[DRIVES:]
     drives = drive.nominal * (1.0 + TOLERANCE * (2.0 * shares - 1.0))
-    deviation = scipy.stats.truncnorm.ppf(np.clip(shares[:, 0], 0.01, 0.99), -3.0, 3.0)
+    deviation = scipy.stats.truncnorm.ppf(shares[:, 0], -3.0, 3.0)
     error = drive.nominal[0] + drive.kinematic_error.std * deviation
     drives[:, 0] = np.maximum(error, 0.05 * drive.nominal[0])
     return drives

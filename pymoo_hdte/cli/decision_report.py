@@ -30,8 +30,6 @@ _WORDS = {
 }
 WEIGHTY = 0.05
 """Share of the gain that an estimate must move to be worth a measurement; set by hand."""
-_NO_GAIN = 0.02
-"""Reduction of the goal, relative, below which nothing is recommended."""
 
 
 def write_decision(decision: Decision, notes: Sequence[str], out: Path) -> dict[str, Any]:
@@ -82,17 +80,14 @@ def setting_text(name: str, setting: float) -> str:
 def sentences(decision: Decision) -> list[str]:
     """Say what to change, what it brings, and what to measure to be sure."""
     before, after = decision.before, decision.after
-    gained = 1.0 - after.goal / before.goal
-    if not decision.settings or gained < _NO_GAIN:
-        what = "Change nothing: no setting within the limits brings 2 %."
+    if not decision.settings:
+        said = [f"Change nothing: no setting within the limits brings {100.0 * LITTLE:g} %."]
     else:
         changes = "; ".join(
             f"{_WORDS[name]} {setting_text(name, setting)}"
             for name, setting in decision.settings.items()
         )
-        what = f"Change: {changes}."
-    said = [what]
-    if decision.settings:
+        said = [f"Change: {changes}."]
         low, high = decision.gain
         said.append(
             f"The mean DTE goes from {before.mean:.1f} to {after.mean:.1f} arcsec, its standard "
@@ -106,7 +101,7 @@ def sentences(decision: Decision) -> list[str]:
             f"{number(100.0 * before.efficiency, 3)} to {number(100.0 * after.efficiency, 3)} %, "
             f"bending stress {change(100.0 * (after.stress - 1.0))}."
         )
-    said.append(_to_measure(decision))
+        said.append(_to_measure(decision))
     if decision.idle:
         names = ", ".join(_WORDS[name] for name in decision.idle)
         said.append(f"No influence (below {100.0 * LITTLE:g} %), so left: {names}.")
