@@ -1,6 +1,7 @@
 """The command ``table7``: its files, going on after an end, and what it refuses."""
 
 import json
+import sys
 
 import pytest
 
@@ -68,3 +69,23 @@ def test_a_wrong_name_makes_no_folder(tmp_path, capsys):
     assert main(["table7", "--problems", "zdt99", "--out", str(tmp_path / "out")]) == MISTAKE
     assert "zdt99" in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("option", "name", "words"),
+    [
+        ("--algorithms", "builtins:dict", "no signature found"),
+        ("--algorithms", "ends_of_a_test:end", "SystemExit: 3"),
+        ("--algorithms", "ends_when_it_is_read:MyAlgorithm", "SystemExit: 4"),
+        ("--problems", "ends_when_it_is_read:MyProblem", "SystemExit: 4"),
+    ],
+)
+def test_modules_that_fail_in_any_way_are_named(option, name, words, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "path", [*sys.path])
+    (tmp_path / "ends_of_a_test.py").write_text("def end():\n    raise SystemExit(3)\n")
+    (tmp_path / "ends_when_it_is_read.py").write_text("raise SystemExit(4)\n")
+    assert main(["table7", option, name, "--out", str(tmp_path / "out")]) == MISTAKE
+    printed = capsys.readouterr().err
+    assert f"{option} is {name!r}" in printed
+    assert words in printed
