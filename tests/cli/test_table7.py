@@ -2,11 +2,13 @@
 
 import json
 import sys
+from importlib.metadata import PackageNotFoundError
 
 import pytest
 
 from pymoo_hdte._comparing.named import OpenRun
 from pymoo_hdte._interrupts import INTERRUPTED
+from pymoo_hdte._runner import provenance
 from pymoo_hdte.cli.command_line import MISTAKE, main
 
 SMALL = ["--evaluations", "60", "--pop", "20", "--seeds", "2", "--workers", "1"]
@@ -56,6 +58,20 @@ def test_an_interrupt_keeps_what_is_finished(tmp_path, monkeypatch, capsys):
     assert table7(tmp_path / "out") == INTERRUPTED
     assert str(tmp_path / "out") in capsys.readouterr().err
     assert len([*(tmp_path / "out").rglob("zdt1_*.csv")]) == 1
+
+
+def test_versions_are_told_where_a_package_has_no_wheel(monkeypatch):
+    """On some processors there is no finufft."""
+
+    def version(package, whole=provenance.version):
+        if package == "finufft":
+            raise PackageNotFoundError(package)
+        return whole(package)
+
+    everywhere = provenance.environment()
+    monkeypatch.setattr(provenance, "version", version)
+    expected = {name: value for name, value in everywhere.items() if name != "finufft"}
+    assert provenance.environment() == expected
 
 
 def test_a_folder_with_anything_else_is_refused(tmp_path, capsys):
