@@ -16,6 +16,7 @@ from pathlib import Path
 from string import Template
 
 from pymoo_hdte.checks import InvalidInput
+from pymoo_hdte.problems._simulator.children import SCRATCH
 
 LARGEST_OUTPUT = 2**24
 """Bytes of an output that are read; a program that writes more has failed."""
@@ -75,7 +76,9 @@ class Program:
 
     def __call__(self, **inputs: float) -> dict[str, float]:
         """Make one run; return the responses by name."""
-        with tempfile.TemporaryDirectory(prefix="pymoo-hdte-run-") as name:
+        # A process that is killed over the time limit does not remove the folder itself.
+        parent = os.environ.get(SCRATCH)
+        with tempfile.TemporaryDirectory(prefix="pymoo-hdte-run-", dir=parent) as name:
             folder = Path(name)
             values = {key: repr(float(value)) for key, value in inputs.items()}
             words = values | {"study": self.study}

@@ -8,6 +8,7 @@ import shlex
 import signal
 import subprocess
 import sys
+import tempfile
 import time
 from contextlib import closing
 from functools import partial
@@ -496,7 +497,11 @@ def test_a_simulator_that_always_fails_is_the_mistake(folder, capsys):
     assert "ZeroDivisionError" in capsys.readouterr().err
 
 
-def test_a_program_that_hangs_is_ended_with_its_run(folder):
+def test_a_program_that_hangs_is_ended_with_its_run_and_leaves_no_folder(folder, monkeypatch):
+    temporary = folder / "temporary"
+    temporary.mkdir()
+    monkeypatch.setenv("TMPDIR", str(temporary))
+    monkeypatch.setattr(tempfile, "tempdir", str(temporary))
     (folder / "solve.py").write_text(
         f"import time\ntime.sleep(1.0)\nopen({str(folder / 'late')!r}, 'w').close()\n"
     )
@@ -505,7 +510,9 @@ def test_a_program_that_hangs_is_ended_with_its_run(folder):
     with closing(workers):
         workers.start("run", partial(study.simulator, x=1.0, load=2.0))
         _, gave = workers.next()
-    assert gave.kind == TOO_LONG
+        assert gave.kind == TOO_LONG
+        assert not [*temporary.glob("**/stdout.txt")]
+    assert not [*temporary.iterdir()]
     time.sleep(1.0)
     assert not (folder / "late").exists()
 
