@@ -228,6 +228,10 @@ def _program(fields: Fields, folder: Path, names: tuple[str, ...] | None) -> Pro
     for name in files:
         if fields.has(name):
             files[name] = _file_name(fields.name_of(name), fields.text(name))
+    if files["input_file"] is not None and files["input_file"] == files["output_file"]:
+        # What was written for the program would be taken for what it answers.
+        allowed = "another name than that of the input_file"
+        raise InvalidInput(fields.name_of("output_file"), files["output_file"], allowed)
     template, read = None, [program]
     if fields.has("template"):
         if files["input_file"] is None:

@@ -328,6 +328,11 @@ def test_what_follows_a_number_does_not_matter(text, value):
             "a file in the folder of the study",
         ),
         ('[simulator]\ncommand = ["sh", "${x} ${load}"]\n', "responses"),
+        (
+            '[simulator]\ncommand = ["sh"]\ninput_file = "x"\noutput_file = "x"\n'
+            'responses = ["a"]\n',
+            "line 4: simulator.output_file is 'x', allowed: another name",
+        ),
     ],
 )
 def test_a_simulator_that_is_none_is_named_with_what_is_allowed(simulator, words, folder, capsys):
