@@ -112,7 +112,7 @@ class Decision:
         Levers without influence.
     gain : (float, float)
         Where 90 % of the reductions of the nominal drive's DTE lie, as estimates vary, arcsec.
-    doubts : dict of float
+    gain_changes : dict of float
         By name of an estimate, how far the gain changes over its tolerance, arcsec, largest first.
     """
 
@@ -125,7 +125,7 @@ class Decision:
     settings: dict[str, float]
     idle: tuple[str, ...]
     gain: tuple[float, float]
-    doubts: dict[str, float]
+    gain_changes: dict[str, float]
 
 
 def decide(
@@ -174,7 +174,7 @@ def decide(
     idle = tuple(
         name
         for name, tried in effects.items()
-        if max(abs(one.goal / before.goal - 1.0) for one in tried.values()) < LITTLE
+        if max(abs(design.goal / before.goal - 1.0) for design in tried.values()) < LITTLE
     )
     choices = [
         [(lever.name, setting) for setting in lever.settings]
@@ -190,9 +190,9 @@ def decide(
     settings = min(fit, key=lambda design: np.nan_to_num(outcome(design).goal, nan=np.inf))
     if outcome(settings).goal > (1.0 - LITTLE) * before.goal:
         settings = {}
-    gain, doubts = _doubts(page, figures, settings, found)
+    gain, gain_changes = _varied(page, figures, settings, found)
     return Decision(
-        page, figures, found, before, outcome(settings), effects, settings, idle, gain, doubts
+        page, figures, found, before, outcome(settings), effects, settings, idle, gain, gain_changes
     )
 
 
@@ -256,7 +256,7 @@ def _drives(drive: DriveModel) -> NDArray[np.float64]:
     return drives
 
 
-def _doubts(
+def _varied(
     page: CataloguePage,
     figures: dict[str, Entry],
     settings: Mapping[str, float],
@@ -265,8 +265,8 @@ def _doubts(
     """Return the interval of the gain, and by how much each estimate moves it."""
 
     def gain(entries: Mapping[str, Entry]) -> float:
-        pair = [_drive(page, entries, some, found) for some in ({}, settings)]
-        before, after = (one.dte_where_found(one.nominal[None])[0] for one in pair)
+        drives = [_drive(page, entries, design, found) for design in ({}, settings)]
+        before, after = (drive.dte_where_found(drive.nominal[None])[0] for drive in drives)
         return float(before - after)
 
     draws = [gain(drawn) for drawn in sampled(figures, DRAWS, np.random.default_rng(1))]

@@ -37,9 +37,9 @@ def write_decision(decision: Decision, notes: Sequence[str], out: Path) -> dict[
     document = decision_document(decision, notes)
     columns = ("lever", "setting", "mean_arcsec", "std_arcsec", "starting_torque_Nm", "efficiency")
     rows = [
-        (name, setting, one.mean, one.std, one.starting, one.efficiency)
+        (name, setting, result.mean, result.std, result.starting, result.efficiency)
         for name, tried in decision.effects.items()
-        for setting, one in tried.items()
+        for setting, result in tried.items()
     ]
     text = page(
         "pymoo_hdte.cli",
@@ -64,7 +64,7 @@ def decision_document(decision: Decision, notes: Sequence[str]) -> dict[str, Any
         "settings": decision.settings,
         "without_influence": list(decision.idle),
         "gain_interval90_arcsec": list(decision.gain),
-        "doubts_arcsec": decision.doubts,
+        "gain_changes_arcsec": decision.gain_changes,
         "formulas": {lever.name: lever.basis for lever in LEVERS},
     }
 
@@ -111,7 +111,7 @@ def sentences(decision: Decision) -> list[str]:
 def _to_measure(decision: Decision) -> str:
     """Say which figures decide whether the change pays."""
     width = max(abs(decision.before.mean - decision.after.mean), 1e-9)
-    weighty = [name for name, moved in decision.doubts.items() if moved > WEIGHTY * width][:2]
+    weighty = [name for name, moved in decision.gain_changes.items() if moved > WEIGHTY * width][:2]
     if weighty:
         first = f"Measure first: {' and '.join(weighty)}, on which the gain depends most."
     else:
@@ -152,8 +152,8 @@ def levers_figure(decision: Decision) -> Figure:
     axis = figure.subplots()
     places = np.arange(len(decision.effects))
     for place, (name, tried) in zip(places, decision.effects.items(), strict=True):
-        for setting, one in tried.items():
-            moved = 100.0 * (one.goal / decision.before.goal - 1.0)
+        for setting, result in tried.items():
+            moved = 100.0 * (result.goal / decision.before.goal - 1.0)
             if moved == 0.0:
                 continue
             axis.barh(place, moved, color=AFTER if moved < 0.0 else GREY, height=0.55)
