@@ -91,6 +91,28 @@ Examples
 (True, False)
 """
 
+COMPARED = (
+    "efficiency",
+    "no_load_running_torque",
+    "no_load_starting_torque",
+    "no_load_back_driving_torque",
+    "hysteresis_loss",
+    "lost_motion",
+    "transmission_accuracy",
+)
+"""Figures that `figures.predicted` has for a model."""
+_MAY_BE_ZERO = (
+    "load_inertia",
+    "hysteresis_loss",
+    "no_load_starting_torque",
+    "output_damping",
+    "load_friction",
+    "driven_friction",
+    "mesh_damping_share",
+    "wall_share",
+    "ring_share",
+    "preload_share",
+)
 SHARPNESS = 20.0
 """Corner between the straight pieces of a printed stiffness: off by 3 % at the corner itself."""
 ROOM_TEMPERATURE = 20.0 + ORIGINS["C"]
@@ -145,6 +167,12 @@ class Figure:
     limit : bool
         Whether the value is the largest that the maker allows ("< 1 arcmin").
 
+    Raises
+    ------
+    InvalidInput
+        For a value, speed, load or temperature that is not finite and above 0, but for what may be
+        missing in a drive, or an efficiency above 1.
+
     Examples
     --------
     >>> Figure("efficiency", 0.77, tolerance=0.04).limit
@@ -158,6 +186,16 @@ class Figure:
     temperature: float = ROOM_TEMPERATURE
     tolerance: float = 0.0
     limit: bool = False
+
+    def __post_init__(self) -> None:
+        most = 1.0 if self.name == "efficiency" else np.inf
+        if self.name in _MAY_BE_ZERO:
+            real_number(self.name, self.value, at_least=0.0)
+        else:
+            real_number(self.name, self.value, above=0.0, at_most=most)
+        for condition in ("speed", "load", "temperature"):
+            if (value := getattr(self, condition)) is not None:
+                real_number(f"{self.name}.{condition}", value, above=0.0)
 
 
 @dataclass(frozen=True)
@@ -216,8 +254,8 @@ class CataloguePage:
     Raises
     ------
     InvalidInput
-        For a value out of range, a figure that is entered twice for one condition, or a ratio that
-        no pair of tooth numbers with a difference of two gives.
+        For a value out of range, a figure that is entered twice for one condition or from which
+        nothing is made, or a ratio that no pair of tooth numbers with a difference of two gives.
 
     Examples
     --------
@@ -244,6 +282,9 @@ class CataloguePage:
                 "half a number of teeth: turns of the input per turn of the output, as printed"
             )
             raise InvalidInput("ratio", self.ratio, allowed)
+        if any(figure.name == "lost_motion" for figure in self.entered):
+            allowed = "below [[printed]]: it is compared with the model, which follows without it"
+            raise InvalidInput("catalogue.lost_motion", "entered", allowed)
         conditions = [(f.name, f.speed, f.load, f.temperature) for f in self.entered]
         for condition in conditions:
             if conditions.count(condition) > 1:
@@ -287,7 +328,7 @@ def page_from_fields(top: Fields) -> CataloguePage:
         if not table.has(name):
             continue
         if table.is_table(name):
-            value = table.quantity(name, quantity, at_least=0.0)
+            value = table.quantity(name, quantity)
             # What does not depend on temperature holds at all; the rest is printed for 20 C.
             entered.append(Figure(name, value, temperature=_printed_at(name, temperature)))
         else:
@@ -327,22 +368,26 @@ def _figure(row: Fields, name: str, temperature: float) -> Figure:
             conditions[condition] = row.quantity(condition, quantity)
     if row.has("temperature"):
         conditions["temperature"] = _temperature(row, "temperature")
-    value = row.quantity("value", FIGURES[name], at_least=0.0)
+    value = row.quantity("value", FIGURES[name])
     row.finish()
     return Figure(name, value, **conditions)
 
 
 def _temperature(table: Fields, name: str) -> float:
     raw = table.take(name, '{ value = ..., unit = "C" }')
-    if not isinstance(raw, Mapping) or set(raw) != {"value", "unit"} or raw["unit"] not in "CK":
+    if (
+        not isinstance(raw, Mapping)
+        or set(raw) != {"value", "unit"}
+        or raw["unit"] not in ("C", "K")
+    ):
         raise InvalidInput(name, raw, '{ value = ..., unit = "C" } or "K"')
     return real_number(name, raw["value"]) + ORIGINS.get(raw["unit"], 0.0)
 
 
 def _printed(row: Fields) -> Figure:
-    name = row.choice("figure", tuple(FIGURES))
+    name = row.choice("figure", COMPARED)
     tolerance = row.number("tolerance", at_least=0.0) if row.has("tolerance") else 0.0
-    limit = bool(row.take("limit", "true or false")) if row.has("limit") else False
+    limit = row.truth("limit") if row.has("limit") else False
     if not limit and tolerance == 0.0:
         raise InvalidInput("printed.tolerance", None, "above 0, or limit = true")
     return replace(_figure(row, name, ROOM_TEMPERATURE), tolerance=tolerance, limit=limit)
@@ -385,7 +430,7 @@ def complete(
     for name in FIGURES:
         figures = page.of(name)
         plain = [f for f in figures if f.speed is None and f.load is None]
-        if plain and name not in ("efficiency", "no_load_back_driving_torque", "lost_motion"):
+        if plain and name not in ("efficiency", "no_load_back_driving_torque"):
             enter(name, Entry(plain[0].value))
     for name, what in ASKED_FOR.items():
         if name not in entries:
@@ -446,13 +491,19 @@ def _enter_friction(
         enter("load_friction", Entry(share))
     back = page.of("no_load_back_driving_torque")
     if back and "driven_friction" not in entries:
-        enter("driven_friction", Entry(1.0 - page.ratio * start / back[0].value))
+        least = page.ratio * start
+        if back[0].value < least:
+            allowed = f"at least {least:.3g} N.m, ratio times starting torque"
+            raise InvalidInput("catalogue.no_load_back_driving_torque", back[0].value, allowed)
+        enter("driven_friction", Entry(1.0 - least / back[0].value))
 
 
 def sampled(
     entries: Mapping[str, Entry], n: int, rng: np.random.Generator
 ) -> Iterator[dict[str, Entry]]:
     """Yield n completed pages whose estimates are drawn within their tolerances.
+
+    A draw that no drive has, such as a running torque below the starting torque, is drawn again.
 
     Parameters
     ----------
@@ -464,12 +515,39 @@ def sampled(
     Yields
     ------
     dict of Entry
+
+    Raises
+    ------
+    InvalidInput
+        As `drive_of`, if no drive has the estimates themselves.
     """
-    for _ in range(n):
-        yield {
+    _require_consistent(entries)
+    drawn = 0
+    while drawn < n:
+        draw = {
             name: replace(entry, value=entry.value * (1.0 + entry.tolerance * rng.uniform(-1, 1)))
             for name, entry in entries.items()
         }
+        try:
+            _require_consistent(draw)
+        except InvalidInput:
+            continue
+        drawn += 1
+        yield draw
+
+
+def _require_consistent(entries: Mapping[str, Entry]) -> None:
+    """Raise `InvalidInput` for figures that no drive has together."""
+    value = {name: entry.value for name, entry in entries.items()}
+    start, running = value["no_load_starting_torque"], value["no_load_running_torque"]
+    if running <= start:
+        allowed = f"above the starting torque, {start:.3g} N.m"
+        raise InvalidInput("catalogue.no_load_running_torque", float(f"{running:.3g}"), allowed)
+    stiffnesses = (value["K1"], value["K2"], value["K3"])
+    if not stiffnesses[0] <= stiffnesses[1] <= stiffnesses[2]:
+        raise InvalidInput("catalogue.K1, K2, K3", stiffnesses, "rising")
+    if not 0.0 < value["T1"] < value["T2"]:
+        raise InvalidInput("catalogue.T1, T2", (value["T1"], value["T2"]), "above 0, and rising")
 
 
 def drive_of(
@@ -511,11 +589,9 @@ def drive_of(
     ('RT1 size 20, ratio 100', 100.0)
     """
     entries = complete(page) if entries is None else entries
+    _require_consistent(entries)
     value = {name: entry.value for name, entry in entries.items()}
     start, running = value["no_load_starting_torque"], value["no_load_running_torque"]
-    if running <= start:
-        allowed = f"above the starting torque, {start:.3g} N.m"
-        raise InvalidInput("catalogue.no_load_running_torque", float(f"{running:.3g}"), allowed)
     drag = (running - start) / value["rated_speed"]
     teeth = dict(zip(("flexspline", "circular_spline"), page.teeth, strict=True))
     sources = tuple(sources or page.error_sources or hs_20_100().error_sources)
@@ -566,10 +642,6 @@ def drive_of(
 
 def _effects(value: Mapping[str, float]) -> tuple[DriveEffect, ...]:
     first, second, third = (value[name] for name in ("K1", "K2", "K3"))
-    if not first <= second <= third:
-        raise InvalidInput("catalogue.K1, K2, K3", (first, second, third), "rising")
-    if not 0.0 < value["T1"] < value["T2"]:
-        raise InvalidInput("catalogue.T1, T2", (value["T1"], value["T2"]), "above 0, and rising")
     corner = value["T1"] / first
     upper = corner + (value["T2"] - value["T1"]) / second
     mesh: list[DriveEffect] = []
@@ -632,7 +704,7 @@ def loop_width(model: DriveModel, torque: float) -> float:
     """
     path = torque * np.array([1.0, 0.0, -1.0, 0.0])
     loop = quasi_static_torsion(model.coefficients(model.nominal[None]), path)[0]
-    return float(loop[1] - loop[3])
+    return float(abs(loop[1] - loop[3]))
 
 
 def _static_error(sheet: DataSheet, printed: float | None) -> tuple[float, float]:

@@ -148,10 +148,10 @@ def check_twist(sheet: DataSheet, field: str = "stiffness", cause: str = LOST_PO
     --------
     >>> check_twist(hs_20_100())
     """
-    stiffness = sheet.nominal.stiffness
-    if abs(sheet.load_torque) > LARGEST_TWIST * stiffness:
+    stiffness, load = sheet.nominal.stiffness, abs(sheet.load_torque)
+    if load > LARGEST_TWIST * stiffness:
         allowed = (
-            f"at least {sheet.load_torque / LARGEST_TWIST:.3g} N.m/rad, or the rated load of the "
+            f"at least {load / LARGEST_TWIST:.3g} N.m/rad, or the rated load of the "
             f"data sheet would twist the drive by more than {LARGEST_TWIST:g} rad; {cause}"
         )
         raise InvalidInput(field, float(f"{stiffness:.6g}"), allowed)

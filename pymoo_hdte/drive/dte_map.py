@@ -90,7 +90,10 @@ def torsional_mode(model: DriveModel) -> TorsionalMode:
     With an inertia that is not rigidly on the output, it is the least damped vibration, bearings
     included.
     """
-    coefficients = model.coefficients(model.nominal[None])
+    return _mode(model.coefficients(model.nominal[None]))
+
+
+def _mode(coefficients: Coefficients) -> TorsionalMode:
     if coefficients.is_loose:
         steady = replace(coefficients, laws=(), stiffness_depth=0.0)
         values = np.linalg.eigvals(state_matrix(steady, 0.0)[0])
@@ -210,7 +213,7 @@ class OperatingMap:
     def resonances(self) -> dict[float, NDArray[np.float64]]:
         """Return the input speed of the resonance of each excited order under each load, rad/s.
 
-        That of the two inertias against the `tangent` stiffness; empty where damping leaves none.
+        That of the `torsional_mode` with the `tangent` stiffness; empty where damping leaves none.
 
         Returns
         -------
@@ -220,9 +223,10 @@ class OperatingMap:
         if not torsional_mode(self.model).resonates:
             return {}
         coefficients = self.model.coefficients(self.model.nominal[None])
-        input_inertia = coefficients.input_inertia[0] * coefficients.ratio**2
-        compliance = 1.0 / input_inertia + 1.0 / np.ravel(coefficients.output_inertia)[0]
-        frequency = np.sqrt(self.tangent * compliance)
+        frequency = np.full(len(self.loads), np.nan)
+        for row in np.flatnonzero(np.isfinite(self.tangent)):
+            mode = _mode(replace(coefficients, stiffness=self.tangent[row : row + 1]))
+            frequency[row] = 2.0 * np.pi * mode.frequency
         orders = {order for order, _ in critical_speeds(self.model)}
         return {order: frequency / order for order in sorted(orders)}
 

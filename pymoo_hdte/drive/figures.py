@@ -212,7 +212,7 @@ def lost_motion(model: DriveModel) -> float:
     torque = LOST_MOTION_LOAD * model.sheet.load_torque
     path = torque * np.array([1.0, -1.0, 1.0])
     twist = quasi_static_torsion(model.coefficients(model.nominal[None]), path)[0]
-    return float(twist[2] - twist[1])
+    return float(abs(twist[2] - twist[1]))
 
 
 def predicted(model: DriveModel, figure: Figure) -> float:
@@ -221,7 +221,7 @@ def predicted(model: DriveModel, figure: Figure) -> float:
     Raises
     ------
     KeyError
-        For a figure that no model predicts, such as a peak torque.
+        For a figure that is not among `catalogue.COMPARED`, such as a peak torque.
     """
     speed = model.sheet.input_speed if figure.speed is None else figure.speed
     load = model.sheet.load_torque if figure.load is None else figure.load
@@ -267,7 +267,7 @@ class Comparison:
         """Whether the prediction itself is within the printed tolerance, or below the limit."""
         if self.figure.limit:
             return self.value <= self.figure.value
-        return abs(self.value / self.figure.value - 1.0) <= self.figure.tolerance
+        return abs(self.value - self.figure.value) <= self.figure.tolerance * self.figure.value
 
 
 def compared(

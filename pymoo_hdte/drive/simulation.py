@@ -145,7 +145,7 @@ def simulate_drive(
             allowed = f"at least {_CLUTCH_TIMES * late:.3g} s, {_CLUTCH_TIMES:g} times of a clutch"
             raise InvalidInput("settle", settle, allowed)
     memory = sum(law.states for law in memories(coefficients))
-    clutches, twists = len(coefficients.coupled), 0 if coefficients.shaft is None else 1
+    clutches, twists = len(coefficients.coupled), 0 if coefficients.loaded_shaft is None else 1
     start = np.array([start_up.angle(0.0), *np.zeros(3 + memory + clutches + 2 * twists)])
     # theta_d is of the order of arcseconds and its rate of the order of arcseconds times 100 1/s.
     twist, rate = 1e-4 * ARCSEC, 1e-2 * ARCSEC

@@ -9,7 +9,7 @@ from pymoo_hdte.drive import LoadInertia, harmonic_balance, preset, simulate_dri
 from pymoo_hdte.drive._effects import LoadShaft
 from pymoo_hdte.drive._solve.hill import hill_steady_state, transfer_function
 from pymoo_hdte.drive._solve.stability import floquet_multipliers
-from pymoo_hdte.drive.dte_map import torsional_mode
+from pymoo_hdte.drive.dte_map import operating_map, torsional_mode
 
 LOAD, COMPLIANCE, TIME = 0.05, 2e-5, 1e-4
 """kg.m2, rad/(N.m), s: a resonance of 1000 rad/s on a shaft twice as soft as the drive."""
@@ -55,6 +55,15 @@ def test_a_stiff_shaft_is_a_rigid_one():
     assert hill_steady_state(stiff).phasors == pytest.approx(expected, rel=1e-5)
 
 
+def test_a_shaft_that_nothing_turns_behind_changes_nothing():
+    bare = preset("published")
+    model = replace(bare, effects=(LoadShaft(COMPLIANCE, TIME),))
+    drives = [one.coefficients(one.nominal[None]) for one in (bare, model)]
+    expected, found = (floquet_multipliers(drive) for drive in drives)
+    assert found == pytest.approx(expected, rel=1e-12)
+    assert np.isfinite(simulate_drive(model, model.nominal).transmission_error).all()
+
+
 def test_vibrations_are_those_of_three_inertias():
     """Of a bare chain input, output, load; the input is referred to the output."""
     model = replace(preset("published"), effects=(LoadInertia(LOAD), LoadShaft(COMPLIANCE, 0.0)))
@@ -65,6 +74,8 @@ def test_vibrations_are_those_of_three_inertias():
     squares = np.sort(np.linalg.eigvals(springs / np.array(inertias)[:, None]).real)
     lowest = float(np.sqrt(squares[1])) / (2.0 * np.pi)
     assert torsional_mode(model).frequency == pytest.approx(lowest, rel=1e-3)
+    mapped = operating_map(model, np.array([drive.input_speed]), np.array([20.0]))
+    assert mapped.resonances()[2.0] == pytest.approx([np.pi * lowest], rel=1e-2)
     assert (np.abs(floquet_multipliers(drive)) < 1.0).all()
 
 

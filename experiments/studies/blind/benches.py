@@ -225,8 +225,8 @@ def write_table(comparisons: Sequence[Comparison], path: Path) -> None:
                     ideal.case.truth,
                     *(
                         part
-                        for each in (ideal, real)
-                        for part in (each.status, " ".join(each.chosen))
+                        for judged in (ideal, real)
+                        for part in (judged.status, " ".join(judged.chosen))
                     ),
                     " ".join(sorted(comparison.told)),
                 )

@@ -175,7 +175,7 @@ BENCH_FAULTS: dict[str, Callable[[BenchFault], str]] = {
     ),
     SPEED_WANDERS: lambda fault: "The set speed wanders.",
     SATURATED: lambda fault: (
-        f"The sensor of the {_channel(fault)} reads no more than {fault.value:.4g} {fault.unit}."
+        f"The sensor of the {_channel(fault)} saturates at {fault.value:.4g} {fault.unit}."
     ),
     COARSE: lambda fault: (
         f"The sensor of the {_channel(fault)} reads in steps of "

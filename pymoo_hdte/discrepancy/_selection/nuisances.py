@@ -29,9 +29,9 @@ def leading_nuisances(
     """Return a fit with the nuisances that explain most of what a set leaves; None without any.
 
     The first has to do better than each effect that has been fitted in its place and, beside a set,
-    than each that could be added to it. Others join it as long as they do better than effects to
-    first order. Gains count in units of what is left, as if that were noise (Birge, Physical Review
-    40, 1932), and each unknown costs its share of the BIC.
+    than each that could be added to it, or worse by less than names an effect. Others join it as
+    long as they do better than effects to first order. Gains count in units of what is left, as if
+    that were noise (Birge, Physical Review 40, 1932), and each unknown costs its share of the BIC.
 
     Parameters
     ----------

@@ -194,9 +194,14 @@ class Coefficients:
         return self.load_torque + self.output_damping * self.input_speed / self.ratio
 
     @property
+    def loaded_shaft(self) -> tuple[float, float] | None:
+        """The ``shaft``, in rad/(N.m) and s, if a load turns behind it: else it is rigid."""
+        return self.shaft if np.any(self.load_inertia) else None
+
+    @property
     def is_loose(self) -> bool:
         """Whether any inertia is not rigidly on the output."""
-        return bool(self.coupled) or self.shaft is not None
+        return bool(self.coupled) or self.loaded_shaft is not None
 
     @property
     def near_inertia(self) -> float | NDArray[np.float64]:
@@ -204,7 +209,7 @@ class Coefficients:
 
         A float, or of shape (n,) where one of the inertias is.
         """
-        if self.shaft is None:
+        if self.loaded_shaft is None:
             return self.output_inertia
         return self.output_inertia - np.asarray(self.load_inertia)
 
@@ -226,8 +231,8 @@ class Coefficients:
         total = np.zeros((), dtype=complex)
         for inertia, time in self.coupled:
             total = total + inertia / (1.0 + 1j * frequency * time)
-        if self.shaft is not None:
-            compliance, time = self.shaft
+        if self.loaded_shaft is not None:
+            compliance, time = self.loaded_shaft
             load = np.reshape(self.load_inertia, (-1, 1))
             twist = -load * frequency**2 * compliance / (1.0 + 1j * frequency * time)
             total = total - load * twist / (1.0 + twist)

@@ -108,9 +108,9 @@ def _phase(coefficients: Coefficients, period: float) -> float:
     depth = sum(law.depth for law in coefficients.stiffness_variations)
     stiffest = coefficients.stiffness * (1.0 + depth)
     square = np.max(stiffest * compliance, initial=0.0)
-    if coefficients.shaft is not None:
+    if coefficients.loaded_shaft is not None:
         mobility = 1.0 / np.asarray(coefficients.near_inertia) + 1.0 / coefficients.load_inertia
-        square = square + np.max(mobility) / coefficients.shaft[0]
+        square = square + np.max(mobility) / coefficients.loaded_shaft[0]
     fastest = np.sqrt(square)
     return float(fastest * period / coefficients.input_speed / _PHASE_PER_STEP)
 
@@ -180,15 +180,15 @@ def state_matrix(coefficients: Coefficients, input_angle: float) -> NDArray[np.f
     matrix[:, 2, 1] = 1.0
     for place, (inertia, time) in enumerate(coefficients.coupled, 3):
         matrix[:, 1, place] = inertia / time / inertia_near
-    if coefficients.shaft is not None:
-        compliance, time = coefficients.shaft
+    if coefficients.loaded_shaft is not None:
+        compliance, time = coefficients.loaded_shaft
         matrix[:, 1, -2] = 1.0 / compliance / inertia_near
         matrix[:, 1, -1] = time / compliance / inertia_near
     output = matrix[:, 0] / ratio - matrix[:, 1]
     for place, (_, time) in enumerate(coefficients.coupled, 3):
         matrix[:, place] = output
         matrix[:, place, place] -= 1.0 / time
-    if coefficients.shaft is not None:
+    if coefficients.loaded_shaft is not None:
         matrix[:, -2, -1] = 1.0
         matrix[:, -1] = output
         matrix[:, -1, -2] -= 1.0 / compliance / coefficients.load_inertia
@@ -198,4 +198,4 @@ def state_matrix(coefficients: Coefficients, input_angle: float) -> NDArray[np.f
 
 def _size(coefficients: Coefficients) -> int:
     """Return the number of states of `state_matrix`."""
-    return 3 + len(coefficients.coupled) + (0 if coefficients.shaft is None else 2)
+    return 3 + len(coefficients.coupled) + (0 if coefficients.loaded_shaft is None else 2)

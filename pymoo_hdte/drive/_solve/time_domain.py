@@ -82,7 +82,7 @@ def equations_of_motion(
     speed = coefficients.input_speed
     clutches = coefficients.coupled
     driven = inertia_out + sum(inertia for inertia, _ in clutches)
-    shaft, inertia_near = coefficients.shaft, coefficients.near_inertia
+    shaft, inertia_near = coefficients.loaded_shaft, coefficients.near_inertia
     accelerating = (inertia_in + driven / ratio**2) * speed
     holding = bearing_in * speed + coefficients.mean_mesh_torque / ratio
     lines = [

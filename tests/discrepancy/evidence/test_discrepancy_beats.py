@@ -10,11 +10,20 @@ from experiments.studies.virtual_rig.rig import run_campaign
 from experiments.studies.virtual_rig.runs import Condition
 from pymoo_hdte.discrepancy._evidence.order_lines.features import measure
 from pymoo_hdte.discrepancy._evidence.order_lines.parameters import base_parameters
-from pymoo_hdte.discrepancy._evidence.order_lines.prediction import Conditions, predict
+from pymoo_hdte.discrepancy._evidence.order_lines.prediction import (
+    Conditions,
+    coefficients_of,
+    predict,
+)
 from pymoo_hdte.discrepancy._plan.imagined import imagined_campaign, possible_tests
 from pymoo_hdte.discrepancy._plan.limits import PlanLimits
+from pymoo_hdte.drive import LawAtPort, harmonic_balance
 from pymoo_hdte.drive._effects import MeshStiffnessVariation
-from pymoo_hdte.units import REVOLUTION_PER_MINUTE
+from pymoo_hdte.drive._solve.free_angle import torus_of
+from pymoo_hdte.effects.gravity import Gravity
+from pymoo_hdte.effects.hysteresis import MaxwellSlip
+from pymoo_hdte.effects.ripple import COGGING_ORDERS, PeriodicTorque
+from pymoo_hdte.units import ARCSEC, REVOLUTION_PER_MINUTE
 
 DEPTH, PHASE, SECOND = 0.05, 0.7, 0.2
 QUIET = replace(RIG, angle_noise=1e-12, input_torque_noise=1e-9, output_torque_noise=1e-6,
@@ -106,3 +115,62 @@ def test_two_lines_of_the_input_beat_as_its_inertia_has_it(speed):
         # The load behind the gear adds a few per cent to the inertia.
         found = predicted.phasors[0, 0, 1, orders.index(beat)]
         assert found == pytest.approx(expected, rel=0.05)
+
+
+@pytest.mark.parametrize("analysed", [[], [24.0]])
+def test_what_a_record_folds_down_it_does_whatever_others_show(analysed):
+    """Two records of one motor: the rows of the first show order 24, those of the other fold it."""
+    orders = [1.0, 6.0, *analysed]
+    folded = np.zeros((2, len(COGGING_ORDERS), 2, 1 + len(orders)), dtype=complex)
+    folded[1, COGGING_ORDERS.index(24.0), :, 2] = 0.3, 0.3j
+    conditions = Conditions(
+        np.array([3.0, 200.0]),
+        np.zeros(2),
+        np.zeros(2),
+        np.zeros((2, 3, 1 + len(orders)), dtype=complex),
+        lead=np.zeros((2, len(orders)), dtype=complex),
+    )
+    values = {
+        one.name: np.array([one.start]) for one in base_parameters(BELIEVED, QUIET, PHASES, 0.0)
+    }
+    cogging = LawAtPort("cogging", "input", PeriodicTorque(24.0, 0.4, 2e-3))
+    without, present = (
+        predict(BELIEVED, QUIET, some, orders, values, (cogging,)).phasors[0]
+        for some in (conditions, replace(conditions, folded=folded))
+    )
+    shown = (present - without)[..., :2]
+    assert not shown[0].any()
+    # The motor takes the torque through its inertia, from which the drive is decoupled.
+    assert shown[1, 1, 1] == pytest.approx(0.3 * 2e-3 * np.exp(0.4j), rel=0.2)
+
+
+@pytest.mark.parametrize("slipping", [False, True])
+def test_a_weight_shakes_springs_that_slip_loose(slipping):
+    """The mean error moves by far more than any linear answer, against the whole balance."""
+    weight = LawAtPort("gravity", "load", Gravity(2.0, 0.3))
+    springs = LawAtPort("hysteresis", "mesh", MaxwellSlip(8.0, 4e-4))
+    present = (springs,) if slipping else ()
+    orders = [1.0 / BELIEVED.ratio, 2.0]
+    conditions = Conditions(
+        np.array([70.0]),
+        np.array([25.0]),
+        np.zeros(1),
+        np.zeros((1, 3, 3), dtype=complex),
+        lead=np.zeros((1, 2), dtype=complex),
+    )
+    starts = base_parameters(BELIEVED, QUIET, PHASES, 0.0)
+    values = {parameter.name: np.array([parameter.start]) for parameter in starts}
+    without, shaken = (
+        predict(BELIEVED, QUIET, conditions, orders, values, some).mean[0, 0, 0]
+        for some in (present, (*present, weight))
+    )
+    rows = [coefficients_of(BELIEVED, values, some, 1) for some in (present, (*present, weight))]
+    at = {
+        "input_speed": np.array([70.0]),
+        "load_torque": np.array([25.0]),
+        "torus": torus_of(rows[1]),
+    }
+    still = np.zeros((1, len(at["torus"].orders)), dtype=complex)
+    means = [harmonic_balance(row, lead=still, **at).transmission_error[0, 0].real for row in rows]
+    assert shaken - without == pytest.approx(means[1] - means[0], rel=0.05, abs=0.1 * ARCSEC)
+    assert (abs(shaken - without) > 2.0 * ARCSEC) == slipping

@@ -1,4 +1,4 @@
-"""Lines of a motor above all analysed orders, which averaged rows show at lower ones.
+"""Lines of a motor above those that the rows of a record show, seen at lower orders there.
 
 A row that is the mean of several samples lets through a part of what lies above the Nyquist order
 of the rows. It shows at an order that differs from record to record, so that no law of the drive
@@ -20,24 +20,23 @@ from pymoo_hdte.effects.unknowns import is_among
 Lines = NDArray[np.complex128]
 
 
-def beyond_orders(effects: Sequence[DriveEffect], orders: Sequence[float]) -> list[PeriodicTorque]:
-    """Return the lines of a motor above all analysed orders that averaging may fold down.
+def beyond_rows(effects: Sequence[DriveEffect], folded: Lines) -> list[PeriodicTorque]:
+    """Return the lines of a motor that the averaged rows of any record fold down.
 
     Parameters
     ----------
     effects : sequence of DriveEffect
-    orders : sequence of float
-        Analysed orders, cycles per input turn.
+    folded : ndarray of complex, shape (r, n_orders, 2, 1 + m)
+        As of `Conditions`.
     """
-    highest = max(orders, default=np.inf)
+    orders = [COGGING_ORDERS[place] for place in np.unique(np.nonzero(folded)[1])]
     laws = [
         effect.law for effect in effects if isinstance(effect, LawAtPort) and effect.port == "input"
     ]
     return [
         law
         for law in laws
-        if isinstance(law, PeriodicTorque) and law.drives and law.order > highest
-        if is_among(COGGING_ORDERS, law.order)
+        if isinstance(law, PeriodicTorque) and law.drives and is_among(orders, law.order)
     ]
 
 

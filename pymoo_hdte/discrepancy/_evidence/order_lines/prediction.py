@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pymoo_hdte.discrepancy._evidence.order_lines.bench import IDEAL, Bench
-from pymoo_hdte.discrepancy._evidence.order_lines.folded_lines import beyond_orders, folded_down
+from pymoo_hdte.discrepancy._evidence.order_lines.folded_lines import beyond_rows, folded_down
 from pymoo_hdte.discrepancy._evidence.order_lines.parameters import READING
 from pymoo_hdte.discrepancy._evidence.order_lines.steady_states import (
     PREDICTION,
@@ -153,7 +153,7 @@ def predict(
     bench : Bench
         Nuisances, whose unknowns are among the values.
     """
-    moves = partial(_moves, conditions)
+    moves = partial(_moves, conditions, _remembers((*believed.effects, *effects)))
     moving = tuple(effect for effect in effects if moves(effect))
     further = tuple(effect for effect in effects if not moves(effect))
     groups = bench.groups(believed.effects, values, moves)
@@ -176,22 +176,30 @@ def predict(
     return _in_order(parts, [group.rows for group in groups], len(conditions))
 
 
-def _moves(conditions: Conditions, effect: DriveEffect) -> bool:
+def _moves(conditions: Conditions, remembers: bool, effect: DriveEffect) -> bool:
     """Tell whether an effect is a part of the equations of motion as they are solved."""
     if type(effect).apply is DriveEffect.apply:
         return False
-    return conditions.lead is None or not _is_line_of_bench(effect)
+    return conditions.lead is None or not _is_line_of_bench(effect, remembers)
 
 
-def _is_line_of_bench(effect: DriveEffect) -> bool:
+def _remembers(effects: Sequence[DriveEffect]) -> bool:
+    """Tell whether a law has memory, all of which are at the mesh."""
+    return any(law.states for _, law in _at_ports(effects))
+
+
+def _is_line_of_bench(effect: DriveEffect, remembers: bool) -> bool:
     """Tell whether an effect is a torque of the bench that is one line whatever the motion.
 
     Such lines are small, so that the motion is linear in them or nearly so. A ripple of the drive
     that is looked for may be strong: one of .02 N.m moves the speed of an input by a fifth at 30
-    r/min, which makes errors of its order and others.
+    r/min, which makes errors of its order and others. Behind a mesh that remembers even a weak one
+    is more than a line: it shakes springs that slip loose, and so moves the mean.
     """
     port_and_law = effect.at_port()
     if port_and_law is None or port_and_law[0] not in effect_named(effect.name).nuisance_at:
+        return False
+    if remembers and port_and_law[0] != "input":
         return False
     return port_and_law[1].line(np.zeros(1)) is not None
 
@@ -278,7 +286,7 @@ def _predict_group(
     for places, further in parts:
         some = {name: values[name][places] for name in READING}
         readings = mean[places], phasors[places]
-        if conditions.folded is not None and (beyond := beyond_orders(further, orders)):
+        if conditions.folded is not None and (beyond := beyond_rows(further, conditions.folded)):
             rows = _cases(places, records)
             held_by = SpeedLoop(rig.proportional, rig.integral)
             folded = folded_down(
@@ -458,10 +466,10 @@ def _with_further(
     The last channel is the torque of the output, which turns what holds the sensor of its angle.
     """
     # All parts have the same effects, with numbers of their own.
-    most = len(_torque_lines_of(parts[0][1]))
+    most = len(_at_ports(parts[0][1]))
     of_lines, lines = np.empty(0), np.zeros((*channels.shape[:2], most), dtype=complex)
     for rows, further in parts if most else ():
-        laws = _torque_lines_of(further)
+        laws = _at_ports(further)
         added = torque_lines(
             coefficients.rows(rows), laws, balance.rows(rows), speed[rows], load[rows]
         )
@@ -479,7 +487,7 @@ def _with_further(
     return orders, channels
 
 
-def _torque_lines_of(effects: Sequence[DriveEffect]) -> list[tuple[str, Law]]:
+def _at_ports(effects: Sequence[DriveEffect]) -> list[tuple[str, Law]]:
     return [placed for effect in effects if (placed := effect.at_port()) is not None]
 
 

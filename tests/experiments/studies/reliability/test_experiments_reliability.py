@@ -162,7 +162,7 @@ def test_without_an_outcome_the_report_says_what_to_run(tmp_path, monkeypatch):
 
 
 def test_the_full_run_is_as_large_as_it_says():
-    assert sum(reliability.FULL.inputs.values()) == 10_000
+    assert sum(reliability.FULL.inputs.values()) >= 10_000
     assert set(reliability.FULL.inputs) == set(KINDS) == set(reliability.QUICK.inputs)
     assert sum(reliability.FULL.kills.values()) >= 300
 
