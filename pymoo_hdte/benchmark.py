@@ -8,7 +8,7 @@ from pymoo.core.problem import Problem
 from pymoo_hdte._comparing.indicators import Indicators, IndicatorsAgainst, front_among
 from pymoo_hdte._comparing.runs import FINAL_SIZE
 from pymoo_hdte.algorithms.spread import most_spread
-from pymoo_hdte.checks import InvalidInput, finite_array
+from pymoo_hdte.checks import InvalidInput, finite_array, whole_number
 from pymoo_hdte.problems import get_problem
 
 __all__ = ["score"]
@@ -28,13 +28,13 @@ def score(problem: Problem | str, F: ArrayLike, size: int = FINAL_SIZE) -> Indic
     F : array_like, shape (n, m)
         Objectives of feasible solutions, in the units of the problem.
     size : int
-        Most points that count.
+        Most points that count, at least 1.
 
     Raises
     ------
     InvalidInput
-        There is no problem of that name, the problem knows no front, or an objective is not
-        finite.
+        There is no problem of that name, the problem knows no front, an objective is not finite,
+        or ``size`` is no whole number of at least 1.
 
     Examples
     --------
@@ -46,5 +46,6 @@ def score(problem: Problem | str, F: ArrayLike, size: int = FINAL_SIZE) -> Indic
     front = problem.pareto_front()
     if front is None:
         raise InvalidInput("problem", problem.name(), "a problem with a front of its own")
+    size = whole_number("size", size, at_least=1)
     points = front_among(finite_array("F", F, (None, problem.n_obj)))
     return IndicatorsAgainst(front)(points[most_spread(points, size)])

@@ -101,8 +101,10 @@ def algorithm_named(name: str, population: int, problem: str) -> Algorithm:
         factory = _imported(OF_ALGORITHMS, name) if ":" in name else _pymoo_algorithm(name)
     if not callable(factory):
         raise InvalidInput(OF_ALGORITHMS, name, "a class or a function that makes an algorithm")
-    arguments = _arguments(factory, population, problem_named(problem).n_obj)
-    algorithm = _made(OF_ALGORITHMS, name, lambda: factory(**arguments))
+    n_obj = problem_named(problem).n_obj
+    algorithm = _made(
+        OF_ALGORITHMS, name, lambda: factory(**_arguments(factory, population, n_obj))
+    )
     if not isinstance(algorithm, Algorithm):
         raise InvalidInput(OF_ALGORITHMS, name, "something that makes a pymoo Algorithm")
     return algorithm
@@ -167,8 +169,8 @@ def _imported(option: str, name: str) -> Any:
     module_name, _, attribute = name.partition(":")
     try:
         module = import_module(module_name)
-    # A stranger's module may fail in any way.
-    except Exception as error:
+    # A stranger's module may fail in any way, or end the process.
+    except (Exception, SystemExit) as error:
         allowed = f"a module that can be imported ({type(error).__name__}: {error})"
         raise InvalidInput(option, name, allowed) from error
     if not hasattr(module, attribute):
@@ -180,7 +182,7 @@ def _made(option: str, name: str, make: Callable[[], Any]) -> Any:
     try:
         return make()
     # pymoo raises plain exceptions for unknown names, and a stranger's code any.
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         allowed = f"{_OF_PYMOO}, made without further arguments ({type(error).__name__}: {error})"
         raise InvalidInput(option, name, allowed) from error
 

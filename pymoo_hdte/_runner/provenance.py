@@ -13,21 +13,20 @@ from pathlib import Path
 
 import pymoo_hdte
 
-PACKAGES = ("numpy", "scipy", "finufft", "numba", "pymoo", "moocore", "chaospy", "matplotlib")
-"""Installed packages whose version can change a result."""
-EXTRAS = (
+PACKAGES = (
+    *("numpy", "scipy", "finufft", "numba", "pymoo", "moocore", "chaospy", "matplotlib"),
     *("jmetalpy", "pygmo", "coco-experiment", "comocma", "cma"),
     *("pysindy", "sysidentpy", "mujoco", "platypus-opt", "openturns", "scikit-learn", "emcee"),
 )
-"""Packages that can as well, where they are installed."""
+"""Packages whose version can change a result, where they are installed."""
 _COMPUTES = ("algorithms", "drive", "problems", "surrogate")
 """Rooms of the package from which the numbers of the paper's experiments come."""
 
 
 def environment() -> dict[str, str]:
     """Versions of what computes the results."""
-    versions = {package: version(package) for package in PACKAGES}
-    for package in EXTRAS:
+    versions = {}
+    for package in PACKAGES:
         with suppress(PackageNotFoundError):
             versions[package] = version(package)
     return {"python": platform.python_version(), "machine": platform.machine()} | versions

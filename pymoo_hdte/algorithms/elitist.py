@@ -249,19 +249,26 @@ class ElitistSwarm(Swarm):
 def averaged(members: Population, repeats: Population) -> dict[int, Individual]:
     """Give ``repeats`` the means of their members' evaluations and their own; return by member.
 
-    A repeat that is not finite is left out: its evaluation was lost.
+    A repeat that is not finite is left out: its evaluation was lost. That of a member may have been
+    as well; its repeat then takes its place as it is.
     """
     means = {}
     for member, repeat in zip(members, repeats, strict=False):
-        if np.isfinite(repeat.F).all():
+        if not _is_finite(repeat):
+            continue
+        means[id(member)] = repeat
+        if _is_finite(member):
             n = member.data.get(_EVALUATIONS, 1)
             for name in ("F", "G", "H"):
                 mean = (n * getattr(member, name) + getattr(repeat, name)) / (n + 1)
                 setattr(repeat, name, mean)
             repeat.CV = None  # pymoo computes it anew
             repeat.data[_EVALUATIONS] = n + 1
-            means[id(member)] = repeat
     return means
+
+
+def _is_finite(individual: Individual) -> bool:
+    return all(np.isfinite(getattr(individual, name)).all() for name in ("F", "G", "H"))
 
 
 def replaced(population: Population, means: dict[int, Individual]) -> Population:

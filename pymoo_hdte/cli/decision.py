@@ -36,8 +36,8 @@ DRAWS = 24
 SPREAD = 3.0
 """Standard deviations in the goal: mean + 3 std, which few drives exceed."""
 LITTLE = 1e-2
-"""Share of the goal below which a lever is said to have no influence: the scatter of the mean over
-`DRIVES` drives with the usual scatter is of that size."""
+"""Share of the goal below which a lever has no influence, and a change no gain: the scatter of the
+mean over `DRIVES` drives with the usual scatter is of that size."""
 
 
 @dataclass(frozen=True)
@@ -112,7 +112,7 @@ class Decision:
         Levers without influence.
     gain : (float, float)
         Where 90 % of the reductions of the nominal drive's DTE lie, as estimates vary, arcsec.
-    doubts : dict of float
+    gain_changes : dict of float
         By name of an estimate, how far the gain changes over its tolerance, arcsec, largest first.
     """
 
@@ -125,7 +125,7 @@ class Decision:
     settings: dict[str, float]
     idle: tuple[str, ...]
     gain: tuple[float, float]
-    doubts: dict[str, float]
+    gain_changes: dict[str, float]
 
 
 def decide(
@@ -134,7 +134,8 @@ def decide(
     """Choose settings of the levers for the least mean + 3 std of the DTE within limits.
 
     Each lever is tried alone; those without influence are left as they are. Of the others, all
-    combinations of their settings are tried that the limits allow.
+    combinations of their settings are tried that the limits allow. Where the best of them gains
+    less than `LITTLE`, nothing is changed.
 
     Parameters
     ----------
@@ -173,7 +174,7 @@ def decide(
     idle = tuple(
         name
         for name, tried in effects.items()
-        if max(abs(one.goal / before.goal - 1.0) for one in tried.values()) < LITTLE
+        if max(abs(design.goal / before.goal - 1.0) for design in tried.values()) < LITTLE
     )
     choices = [
         [(lever.name, setting) for setting in lever.settings]
@@ -185,11 +186,13 @@ def decide(
         {name: setting for name, setting in design if setting != unchanged[name]}
         for design in product(*choices)
     ]
-    fit = [one for one in designs if allowed(cost_of(page, figures, one), before, limits)]
-    settings = min(fit or [{}], key=lambda one: np.nan_to_num(outcome(one).goal, nan=np.inf))
-    gain, doubts = _doubts(page, figures, settings, found)
+    fit = [design for design in designs if allowed(cost_of(page, figures, design), before, limits)]
+    settings = min(fit, key=lambda design: np.nan_to_num(outcome(design).goal, nan=np.inf))
+    if outcome(settings).goal > (1.0 - LITTLE) * before.goal:
+        settings = {}
+    gain, gain_changes = _varied(page, figures, settings, found)
     return Decision(
-        page, figures, found, before, outcome(settings), effects, settings, idle, gain, doubts
+        page, figures, found, before, outcome(settings), effects, settings, idle, gain, gain_changes
     )
 
 
@@ -247,13 +250,13 @@ def _drives(drive: DriveModel) -> NDArray[np.float64]:
     """Return drives of a design: normal theta_s, cut off at 3 std, and uniform other values."""
     shares = scipy.stats.qmc.Sobol(5, scramble=False).random(2 * DRIVES)[DRIVES:]
     drives = drive.nominal * (1.0 + TOLERANCE * (2.0 * shares - 1.0))
-    deviation = scipy.stats.truncnorm.ppf(np.clip(shares[:, 0], 0.01, 0.99), -3.0, 3.0)
+    deviation = scipy.stats.truncnorm.ppf(shares[:, 0], -3.0, 3.0)
     error = drive.nominal[0] + drive.kinematic_error.std * deviation
     drives[:, 0] = np.maximum(error, 0.05 * drive.nominal[0])
     return drives
 
 
-def _doubts(
+def _varied(
     page: CataloguePage,
     figures: dict[str, Entry],
     settings: Mapping[str, float],
@@ -262,8 +265,8 @@ def _doubts(
     """Return the interval of the gain, and by how much each estimate moves it."""
 
     def gain(entries: Mapping[str, Entry]) -> float:
-        pair = [_drive(page, entries, some, found) for some in ({}, settings)]
-        before, after = (one.dte_where_found(one.nominal[None])[0] for one in pair)
+        drives = [_drive(page, entries, design, found) for design in ({}, settings)]
+        before, after = (drive.dte_where_found(drive.nominal[None])[0] for drive in drives)
         return float(before - after)
 
     draws = [gain(drawn) for drawn in sampled(figures, DRAWS, np.random.default_rng(1))]

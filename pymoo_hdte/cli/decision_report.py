@@ -30,8 +30,6 @@ _WORDS = {
 }
 WEIGHTY = 0.05
 """Share of the gain that an estimate must move to be worth a measurement; set by hand."""
-_NO_GAIN = 0.02
-"""Reduction of the goal, relative, below which nothing is recommended."""
 
 
 def write_decision(decision: Decision, notes: Sequence[str], out: Path) -> dict[str, Any]:
@@ -39,9 +37,9 @@ def write_decision(decision: Decision, notes: Sequence[str], out: Path) -> dict[
     document = decision_document(decision, notes)
     columns = ("lever", "setting", "mean_arcsec", "std_arcsec", "starting_torque_Nm", "efficiency")
     rows = [
-        (name, setting, one.mean, one.std, one.starting, one.efficiency)
+        (name, setting, result.mean, result.std, result.starting, result.efficiency)
         for name, tried in decision.effects.items()
-        for setting, one in tried.items()
+        for setting, result in tried.items()
     ]
     text = page(
         "pymoo_hdte.cli",
@@ -66,7 +64,7 @@ def decision_document(decision: Decision, notes: Sequence[str]) -> dict[str, Any
         "settings": decision.settings,
         "without_influence": list(decision.idle),
         "gain_interval90_arcsec": list(decision.gain),
-        "doubts_arcsec": decision.doubts,
+        "gain_changes_arcsec": decision.gain_changes,
         "formulas": {lever.name: lever.basis for lever in LEVERS},
     }
 
@@ -82,17 +80,14 @@ def setting_text(name: str, setting: float) -> str:
 def sentences(decision: Decision) -> list[str]:
     """Say what to change, what it brings, and what to measure to be sure."""
     before, after = decision.before, decision.after
-    gained = 1.0 - after.goal / before.goal
-    if not decision.settings or gained < _NO_GAIN:
-        what = "Change nothing: no setting within the limits brings 2 %."
+    if not decision.settings:
+        said = [f"Change nothing: no setting within the limits brings {100.0 * LITTLE:g} %."]
     else:
         changes = "; ".join(
             f"{_WORDS[name]} {setting_text(name, setting)}"
             for name, setting in decision.settings.items()
         )
-        what = f"Change: {changes}."
-    said = [what]
-    if decision.settings:
+        said = [f"Change: {changes}."]
         low, high = decision.gain
         said.append(
             f"The mean DTE goes from {before.mean:.1f} to {after.mean:.1f} arcsec, its standard "
@@ -106,7 +101,7 @@ def sentences(decision: Decision) -> list[str]:
             f"{number(100.0 * before.efficiency, 3)} to {number(100.0 * after.efficiency, 3)} %, "
             f"bending stress {change(100.0 * (after.stress - 1.0))}."
         )
-    said.append(_to_measure(decision))
+        said.append(_to_measure(decision))
     if decision.idle:
         names = ", ".join(_WORDS[name] for name in decision.idle)
         said.append(f"No influence (below {100.0 * LITTLE:g} %), so left: {names}.")
@@ -116,7 +111,7 @@ def sentences(decision: Decision) -> list[str]:
 def _to_measure(decision: Decision) -> str:
     """Say which figures decide whether the change pays."""
     width = max(abs(decision.before.mean - decision.after.mean), 1e-9)
-    weighty = [name for name, moved in decision.doubts.items() if moved > WEIGHTY * width][:2]
+    weighty = [name for name, moved in decision.gain_changes.items() if moved > WEIGHTY * width][:2]
     if weighty:
         first = f"Measure first: {' and '.join(weighty)}, on which the gain depends most."
     else:
@@ -157,8 +152,8 @@ def levers_figure(decision: Decision) -> Figure:
     axis = figure.subplots()
     places = np.arange(len(decision.effects))
     for place, (name, tried) in zip(places, decision.effects.items(), strict=True):
-        for setting, one in tried.items():
-            moved = 100.0 * (one.goal / decision.before.goal - 1.0)
+        for setting, result in tried.items():
+            moved = 100.0 * (result.goal / decision.before.goal - 1.0)
             if moved == 0.0:
                 continue
             axis.barh(place, moved, color=AFTER if moved < 0.0 else GREY, height=0.55)

@@ -85,9 +85,9 @@ def write_first_study(path: Path) -> tuple[Path, ...]:
     Raises
     ------
     InvalidInput
-        If one of them is there, or the study's name does not end in .toml.
+        If the study's name does not end in .toml.
     OSError
-        If they cannot be written.
+        If one of them is there, or they cannot be written.
     """
     if path.suffix != ".toml":
         raise InvalidInput("STUDY", str(path), "a file name that ends in .toml")

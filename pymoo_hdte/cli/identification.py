@@ -162,8 +162,8 @@ def measured_figures(
 def _over_prototypes(runs: Mapping[RunKey, float]) -> MeasuredFigure:
     prototypes = sorted({prototype for prototype, _ in runs})
     means = [
-        np.mean([value for (prototype, _), value in runs.items() if prototype == one])
-        for one in prototypes
+        np.mean([value for (measured, _), value in runs.items() if measured == prototype])
+        for prototype in prototypes
     ]
     scatter = float(np.std(means, ddof=1)) if len(means) > 1 else np.nan
     return MeasuredFigure(float(np.mean(means)), len(means), scatter)

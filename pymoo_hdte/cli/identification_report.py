@@ -82,7 +82,9 @@ def write_identification_report(
 
 
 def _of_page(figures: Mapping[str, MeasuredFigure]) -> str:
-    said = ", ".join(f"{name} {figure_text(name, one.value)}" for name, one in figures.items())
+    said = ", ".join(
+        f"{name} {figure_text(name, figure.value)}" for name, figure in figures.items()
+    )
     return f"Figures of the page: {said}." if said else "No figure of the page was measured."
 
 

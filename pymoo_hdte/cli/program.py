@@ -16,13 +16,19 @@ from pathlib import Path
 from string import Template
 
 from pymoo_hdte.checks import InvalidInput
+from pymoo_hdte.problems._simulator.children import SCRATCH
 
 LARGEST_OUTPUT = 2**24
 """Bytes of an output that are read; a program that writes more has failed."""
 _LARGEST_PROGRAM = 2**28
 """Bytes of a file by which a program is told from others."""
 _STANDARD_OUTPUT, _STANDARD_ERROR = "stdout.txt", "stderr.txt"
-_NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eEdD][-+]?\d+)?|[-+]?(?:nan|inf)", re.IGNORECASE)
+_NUMBER = re.compile(
+    r"[-+]?(?:(?:\d++(?:\.\d*+|(?!,\d))|\.\d++)(?:[ed][-+]?\d++)?+(?![-+.]\d)"
+    r"|(?:nan|inf(?:inity)?)\b)",
+    re.IGNORECASE,
+)
+"""Never the beginning of one: of 2,5, of 1.5.2, or of Fortran's 0.12-102 for 0.12E-102."""
 _LINE = re.compile(r"\s*([A-Za-z_]\w*)\s*[=:,\s]\s*(\S+)\s*")
 _SAFELY = os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)
 """A link is not followed, and a pipe not waited for."""
@@ -70,7 +76,9 @@ class Program:
 
     def __call__(self, **inputs: float) -> dict[str, float]:
         """Make one run; return the responses by name."""
-        with tempfile.TemporaryDirectory(prefix="pymoo-hdte-run-") as name:
+        # A process that is killed over the time limit does not remove the folder itself.
+        parent = os.environ.get(SCRATCH)
+        with tempfile.TemporaryDirectory(prefix="pymoo-hdte-run-", dir=parent) as name:
             folder = Path(name)
             values = {key: repr(float(value)) for key, value in inputs.items()}
             words = values | {"study": self.study}

@@ -37,9 +37,9 @@ def _add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _run(options: argparse.Namespace, say: Say) -> Outcome:
-    from pymoo_hdte.cli.first_study import write_first_study
-
     if options.example:
+        from pymoo_hdte.cli.first_study import write_first_study
+
         first, simulator = write_first_study(options.study)
         sentences = [
             f"Wrote {first} and its simulator {simulator}.",
@@ -63,7 +63,10 @@ def _run(options: argparse.Namespace, say: Say) -> Outcome:
         except KeyboardInterrupt:
             kept = f"finished runs are kept in {runs}; the same command goes on from there"
             raise KeyboardInterrupt(kept) from None
-        said = [str(entry.message) for entry in noted if entry.category is RuntimeWarning]
+        # A simulator may warn in every run.
+        kinds = RuntimeWarning, UserWarning
+        messages = [str(entry.message) for entry in noted if entry.category in kinds]
+        said = list(dict.fromkeys(messages))
         say("writing the report")
         document = write_robust_report(study.title, problem, result, said, options.out)
         return outcome_of(document, options.out)

@@ -84,10 +84,8 @@ def _sentences(
     elif problem.n_obj == 1:
         first = f"The best design: {values}."
     else:
-        first = (
-            f"The front has {len(designs)} designs."
-            f" The one nearest to the best of all objectives: {values}."
-        )
+        count = "1 design" if len(designs) == 1 else f"{len(designs)} designs"
+        first = f"The front has {count}. The one nearest to the best of all objectives: {values}."
     worst = 100.0 * max(problem.response_errors.values())
     second = (
         f"{problem.n_runs} runs of the simulator; the estimated error of mean and standard"

@@ -19,7 +19,7 @@ from pymoo.core.algorithm import Algorithm
 from pymoo_hdte._io.budget import LARGEST_TOML
 from pymoo_hdte._io.fields import Fields
 from pymoo_hdte._io.toml import toml_with_lines
-from pymoo_hdte.checks import Complaints, InvalidInput, SeveralComplaints, real_number, whole_number
+from pymoo_hdte.checks import Complaints, InvalidInput, SeveralComplaints, real_number
 from pymoo_hdte.cli.own_effects import on_one_line
 from pymoo_hdte.cli.program import Program, digest_of, program_at
 from pymoo_hdte.problems import (
@@ -46,8 +46,11 @@ _FUNCTION = re.compile(r"([A-Za-z_]\w*(?:\.[A-Za-z_]\w*)*):([A-Za-z_]\w*)", re.A
 _RESERVED = ("input_file", "output_file", "study")
 _FILE = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]*")
 _MOST_WORKERS = 256
-ALGORITHMS = ("ElitistSwarm", "CompactSwarm", "NSGA2", "SMSEMOA", "GA", "DE")
-"""Algorithms of this package and of pymoo, by name; the last two have a single objective."""
+ALGORITHMS = {
+    "several": ("ElitistSwarm", "CompactSwarm", "NSGA2", "SMSEMOA"),
+    "one": ("DE", "GA"),
+}
+"""Algorithms of this package and of pymoo by the number of objectives, the default first."""
 _DISTRIBUTIONS: dict[str, tuple[str, ...]] = {
     "normal": ("mean", "std"),
     "uniform": ("lower", "upper"),
@@ -124,14 +127,12 @@ def _study(fields: Fields, folder: Path) -> RobustStudy:
     complaints = Complaints()
     parts: dict[str, Any] = {}
     title = fields.text("title") if fields.has("title") else "Robust design"
-    for name, part in (
-        ("inputs", _inputs),
-        ("goals", _goals),
-        ("settings", _settings),
-        ("search", _search),
-    ):
+    for name, part in (("inputs", _inputs), ("goals", _goals), ("settings", _settings)):
         with complaints.noted():
             parts[name] = part(fields)
+    with complaints.noted():
+        goals = parts.get("goals", {"objectives": ()})
+        parts["search"] = _search(fields, len(goals["objectives"]))
     with complaints.noted():
         names = _names_of(parts["inputs"]) if "inputs" in parts else None
         simulator, running = _simulator(fields.table("simulator"), folder, names)
@@ -227,6 +228,10 @@ def _program(fields: Fields, folder: Path, names: tuple[str, ...] | None) -> Pro
     for name in files:
         if fields.has(name):
             files[name] = _file_name(fields.name_of(name), fields.text(name))
+    if files["input_file"] is not None and files["input_file"] == files["output_file"]:
+        # What was written for the program would be taken for what it answers.
+        allowed = "another name than that of the input_file"
+        raise InvalidInput(fields.name_of("output_file"), files["output_file"], allowed)
     template, read = None, [program]
     if fields.has("template"):
         if files["input_file"] is None:
@@ -354,6 +359,9 @@ def _inputs(fields: Fields) -> dict[str, Any]:
         for table in fields.tables("scenarios"):
             with complaints.noted():
                 names, scenarios = _scenarios(table)
+                if names in noise:
+                    allowed = "other names than of the scenarios before"
+                    raise InvalidInput(table.name_of("names"), list(names), allowed)
                 noise[names] = scenarios
     complaints.finish()
     return {"designs": designs, "noise": noise}
@@ -504,9 +512,12 @@ def _statistic(fields: Fields, place: str) -> Statistic:
         for name in ("above", "below"):
             if fields.has(name):
                 given[name] = fields.number(name)
-        for name, joined in (("any_of", Event.__or__), ("all_of", Event.__and__)):
-            if fields.has(name):
-                given["event"] = _event(fields, name, joined)
+        joined = {"any_of": Event.__or__, "all_of": Event.__and__}
+        several = [name for name in joined if fields.has(name)]
+        if len(several) > 1:
+            raise InvalidInput(place, several, "either any_of or all_of")
+        for name in several:
+            given["event"] = _event(fields, name, joined[name])
     with _at(place):
         return kind(**given)
 
@@ -550,18 +561,17 @@ def _settings(fields: Fields) -> dict[str, Any]:
     return given
 
 
-def _search(fields: Fields) -> tuple[Algorithm, int, int]:
-    if not fields.has("search"):
-        return _algorithm("ElitistSwarm", None), 100, 1
-    table = fields.table("search")
-    name = "ElitistSwarm"
-    if table.has("algorithm"):
-        name = table.choice("algorithm", ALGORITHMS)
+def _search(fields: Fields, n_objectives: int) -> tuple[Algorithm, int, int]:
+    table = fields.table("search") if fields.has("search") else Fields({}, "search")
+    several, single = ALGORITHMS["several"], ALGORITHMS["one"]
+    # Where the objectives are at fault, any name will do.
+    names = single if n_objectives == 1 else several if n_objectives else (*several, *single)
+    name = table.choice("algorithm", names) if table.has("algorithm") else names[0]
     population = table.whole("population", 4) if table.has("population") else None
     generations = table.whole("generations", 1) if table.has("generations") else 100
     seed = table.whole("seed", 0) if table.has("seed") else 1
     table.finish()
-    return _algorithm(name, population), whole_number("generations", generations, 1), seed
+    return _algorithm(name, population), generations, seed
 
 
 def _algorithm(name: str, population: int | None) -> Algorithm:

@@ -33,7 +33,7 @@ FASTEST = 2.0
 """Highest speed of the map, as a multiple of the condition's."""
 SPEEDS = 80
 MAP_SPEEDS, MAP_LOADS = 40, 17
-"""Grid of the operating map; the number of loads is odd, so that no load is among them."""
+"""Grid of the operating map; the number of loads is odd, so that zero is among them."""
 SETTLE = 1.5
 """Time before the record begins, s."""
 TURNS_TO_SETTLE = 0.02

@@ -182,8 +182,8 @@ def _of_map(mapped: OperatingMap) -> str:
         f"{list(DIRECTIONS)[place]} at {speed:.0f} r/min and "
         f"{number(mapped.loads[row], 3)} N.m"
     )
-    driving = (mapped.loads < 0.0)[None, :, None]
-    pushed = np.mean(mapped.motor_torque[np.broadcast_to(driving, mapped.dte.shape)] > 0.0)
+    torques = mapped.motor_torque[:, mapped.loads < 0.0]
+    pushed = np.mean(torques[np.isfinite(torques)] > 0.0)
     return (
         f"{said}; {100.0 * pushed:.0f} % of the conditions with a driving load still need a motor."
     )

@@ -17,6 +17,7 @@ from swarm_problems import Parabolas, assert_clean_front, digest, run
 
 from experiments.studies.suites.limits import NoisyZDT1
 from pymoo_hdte.algorithms import AMPMOPSO, MOPSO, CompactSwarm, ElitistSwarm
+from pymoo_hdte.algorithms.elitist import averaged, replaced
 from pymoo_hdte.algorithms.moves import Difference
 from pymoo_hdte.checks import InvalidInput
 
@@ -280,6 +281,22 @@ def test_what_is_evaluated_again_has_the_mean_of_all_its_evaluations(make):
     # What a history has is as it was.
     early = result.history[3].opt
     assert max(particle.data.get("n_evaluations", 1) for particle in early) <= 4
+
+
+@pytest.mark.parametrize("lost", ["F", "G"])
+def test_of_a_lost_evaluation_and_a_sound_one_the_sound_one_stays(lost):
+    first, second = Draws(), Draws()
+    X = np.full((1, 2), 0.7)
+    groups = [Evaluator().eval(problem, Population.new(X=X)) for problem in (first, second)]
+    for members, repeats in (groups, groups[::-1]):
+        members, repeats = (Population([p.copy(deep=True) for p in g]) for g in (members, repeats))
+        sound = repeats[0].get("F").copy()
+        members[0].set(lost, np.full_like(members[0].get(lost), np.nan))
+        (kept,) = replaced(members, averaged(members, repeats))
+        np.testing.assert_array_equal(kept.F, sound)
+        # The other way round the member stays as it is.
+        members[0].set(lost, np.full_like(members[0].get(lost), np.nan))
+        assert averaged(repeats, members) == {}
 
 
 def test_evaluating_again_needs_a_share():

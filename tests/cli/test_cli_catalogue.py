@@ -13,7 +13,7 @@ from places import DOCS
 
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.cli import command_line as cli
-from pymoo_hdte.cli import decision
+from pymoo_hdte.cli import decision, decision_report
 from pymoo_hdte.cli.drive_arguments import exceeded, read_drive
 from pymoo_hdte.cli.example_records import TRUTH
 from pymoo_hdte.discrepancy import read_drive_model
@@ -137,6 +137,20 @@ def test_what_has_no_influence_is_said_and_not_chosen(monkeypatch):
     assert made.after.starting == pytest.approx(1.125 * made.before.starting, rel=1e-3)
     tight = decision.Limits(starting_torque=1.1)
     assert decision.decide(PAGE, limits=tight).settings == {}
+
+
+def test_a_change_that_brings_nothing_is_not_recommended(monkeypatch):
+    """A lever that matters, but whose better setting is all but the unchanged one."""
+    (preload,) = (lever for lever in LEVERS if lever.name == "preload")
+    levers = (replace(preload, settings=(0.75, 1.0, 1.001)),)
+    monkeypatch.setattr(decision, "LEVERS", levers)
+    monkeypatch.setattr(decision, "DRIVES", 8)
+    monkeypatch.setattr(decision, "DRAWS", 3)
+    made = decision.decide(PAGE)
+    assert made.effects["preload"][1.001].goal < made.before.goal
+    assert made.idle == ()
+    assert (made.settings, made.after) == ({}, made.before)
+    assert len(decision_report.sentences(made)) == 1
 
 
 OF_DRIVES = ("example", "identify", "simulate", "discrepancy", "decide", "optimise", "plan")

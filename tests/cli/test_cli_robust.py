@@ -8,6 +8,7 @@ import shlex
 import signal
 import subprocess
 import sys
+import tempfile
 import time
 from contextlib import closing
 from functools import partial
@@ -53,6 +54,17 @@ population = 12
 generations = 8
 """
 OF_FUNCTION = '[simulator]\nfunction = "steps_of_a_test:staircase"\n'
+CASES = """
+[[scenarios]]
+names = ["a", "b"]
+rows = [[1, 2], [3, 4]]
+"""
+TWO_EVENTS = """[[constraint]]
+statistic = "failure_probability"
+any_of = [{ response = "cost", above = 3 }]
+all_of = [{ response = "height", below = 1 }]
+at_most = 0.1
+[search]"""
 STAIRCASE = """
 def staircase(x, load):
     return {"cost": x * load, "height": load * x**2}
@@ -268,6 +280,32 @@ def test_numbers_of_an_output(text, value):
 
 
 @pytest.mark.parametrize(
+    "text",
+    ["a = 2,5", "a = 1,234.5", "a = 0.1234-102", "a = 1.5.2", "a = 1e5-3", "a = information"],
+)
+def test_half_a_number_is_none(text):
+    for mark in ("a =", None):
+        with pytest.raises(RuntimeError, match="no a: "):
+            responses_in(text, [("a", mark)])
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("2.5e8Pa", 2.5e8),
+        ("3.", 3.0),
+        ("4; 5", 4.0),
+        ("1.0,2.0", 1.0),
+        ("5 %", 5.0),
+        ("7e2.", 7e2),
+        ("-Infinity", -np.inf),
+    ],
+)
+def test_what_follows_a_number_does_not_matter(text, value):
+    assert responses_in(f"a = {text}", [("a", "a =")]) == {"a": value}
+
+
+@pytest.mark.parametrize(
     ("simulator", "words"),
     [
         ('[simulator]\nfunction = "no_such_module_here:f"\n', "ModuleNotFoundError"),
@@ -290,6 +328,11 @@ def test_numbers_of_an_output(text, value):
             "a file in the folder of the study",
         ),
         ('[simulator]\ncommand = ["sh", "${x} ${load}"]\n', "responses"),
+        (
+            '[simulator]\ncommand = ["sh"]\ninput_file = "x"\noutput_file = "x"\n'
+            'responses = ["a"]\n',
+            "line 4: simulator.output_file is 'x', allowed: another name",
+        ),
     ],
 )
 def test_a_simulator_that_is_none_is_named_with_what_is_allowed(simulator, words, folder, capsys):
@@ -315,6 +358,17 @@ def test_a_simulator_that_is_none_is_named_with_what_is_allowed(simulator, words
         (INPUTS, GOALS.replace("at_least", "at_best"), "either at_most or at_least"),
         (INPUTS, GOALS + 'algorithm = "NSGA4"\n', "one of 'ElitistSwarm'"),
         (INPUTS, GOALS.replace('"cost"', '"costs"', 1), "one of .'cost', 'height'"),
+        (INPUTS + 2 * CASES, GOALS, r"scenarios\[1\].names .* other names than"),
+        (
+            INPUTS,
+            GOALS + 'algorithm = "GA"\n',
+            "search.algorithm is 'GA', allowed: one of 'Eli",
+        ),
+        (
+            INPUTS,
+            GOALS.replace("[search]", TWO_EVENTS),
+            "constraint.1. is .*either any_of or all_of",
+        ),
     ],
 )
 def test_a_mistake_in_the_study_is_named_with_its_line(inputs, goals, words, folder, capsys):
@@ -413,6 +467,34 @@ def test_where_no_design_meets_the_constraints_the_nearest_is_told(folder, capsy
     assert document["design"]["x"] == pytest.approx(2.0, abs=0.02)
 
 
+ONE_GOAL = GOALS.replace('[[objective]]\nstatistic = "std"\nresponse = "cost"\n', "")
+
+
+def test_a_single_objective_has_its_own_algorithm(folder, capsys):
+    written(folder, goals=ONE_GOAL)
+    assert robust("study.toml", "--out", "report", "--json") == 0
+    document = json.loads(capsys.readouterr().out)
+    # As where the front begins: the mean height is 3 (x^2 + 0.05^2), at least 4.5.
+    assert document["design"]["x"] == pytest.approx(np.sqrt(1.5 - 0.05**2), abs=2e-3)
+    assert len(document["objectives"]) == document["front"] == 1
+
+
+def test_algorithms_of_several_objectives_are_refused_before_a_run(folder):
+    path = written(folder, goals=ONE_GOAL + 'algorithm = "CompactSwarm"\n')
+    with pytest.raises(InvalidInput, match="one of 'DE', 'GA'"):
+        studied(path)
+
+
+@pytest.mark.filterwarnings("default:rough")
+@pytest.mark.parametrize("category", ["RuntimeWarning", "UserWarning"])
+def test_a_warning_of_every_run_is_told_once(category, folder, capsys):
+    warned = STAIRCASE.replace("return", f"warnings.warn('rough', {category})\n    return")
+    (folder / "steps_of_a_test.py").write_text("import warnings\n" + warned)
+    written(folder)
+    assert robust("study.toml", "--out", "report", "--json") == 0
+    assert json.loads(capsys.readouterr().out)["limits"] == ["rough"]
+
+
 def test_a_simulator_that_always_fails_is_the_mistake(folder, capsys):
     (folder / "steps_of_a_test.py").write_text("def staircase(x, load):\n    return 1 / 0\n")
     written(folder)
@@ -420,7 +502,11 @@ def test_a_simulator_that_always_fails_is_the_mistake(folder, capsys):
     assert "ZeroDivisionError" in capsys.readouterr().err
 
 
-def test_a_program_that_hangs_is_ended_with_its_run(folder):
+def test_a_program_that_hangs_is_ended_with_its_run_and_leaves_no_folder(folder, monkeypatch):
+    temporary = folder / "temporary"
+    temporary.mkdir()
+    monkeypatch.setenv("TMPDIR", str(temporary))
+    monkeypatch.setattr(tempfile, "tempdir", str(temporary))
     (folder / "solve.py").write_text(
         f"import time\ntime.sleep(1.0)\nopen({str(folder / 'late')!r}, 'w').close()\n"
     )
@@ -429,7 +515,9 @@ def test_a_program_that_hangs_is_ended_with_its_run(folder):
     with closing(workers):
         workers.start("run", partial(study.simulator, x=1.0, load=2.0))
         _, gave = workers.next()
-    assert gave.kind == TOO_LONG
+        assert gave.kind == TOO_LONG
+        assert not [*temporary.glob("**/stdout.txt")]
+    assert not [*temporary.iterdir()]
     time.sleep(1.0)
     assert not (folder / "late").exists()
 

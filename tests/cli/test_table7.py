@@ -1,11 +1,14 @@
 """The command ``table7``: its files, going on after an end, and what it refuses."""
 
 import json
+import sys
+from importlib.metadata import PackageNotFoundError
 
 import pytest
 
 from pymoo_hdte._comparing.named import OpenRun
 from pymoo_hdte._interrupts import INTERRUPTED
+from pymoo_hdte._runner import provenance
 from pymoo_hdte.cli.command_line import MISTAKE, main
 
 SMALL = ["--evaluations", "60", "--pop", "20", "--seeds", "2", "--workers", "1"]
@@ -57,6 +60,20 @@ def test_an_interrupt_keeps_what_is_finished(tmp_path, monkeypatch, capsys):
     assert len([*(tmp_path / "out").rglob("zdt1_*.csv")]) == 1
 
 
+def test_versions_are_told_where_a_package_has_no_wheel(monkeypatch):
+    """On some processors there is no finufft."""
+
+    def version(package, whole=provenance.version):
+        if package == "finufft":
+            raise PackageNotFoundError(package)
+        return whole(package)
+
+    everywhere = provenance.environment()
+    monkeypatch.setattr(provenance, "version", version)
+    expected = {name: value for name, value in everywhere.items() if name != "finufft"}
+    assert provenance.environment() == expected
+
+
 def test_a_folder_with_anything_else_is_refused(tmp_path, capsys):
     (tmp_path / "thesis.tex").write_text("precious")
     assert table7(tmp_path) == MISTAKE
@@ -68,3 +85,23 @@ def test_a_wrong_name_makes_no_folder(tmp_path, capsys):
     assert main(["table7", "--problems", "zdt99", "--out", str(tmp_path / "out")]) == MISTAKE
     assert "zdt99" in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("option", "name", "words"),
+    [
+        ("--algorithms", "builtins:dict", "no signature found"),
+        ("--algorithms", "ends_of_a_test:end", "SystemExit: 3"),
+        ("--algorithms", "ends_when_it_is_read:MyAlgorithm", "SystemExit: 4"),
+        ("--problems", "ends_when_it_is_read:MyProblem", "SystemExit: 4"),
+    ],
+)
+def test_modules_that_fail_in_any_way_are_named(option, name, words, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "path", [*sys.path])
+    (tmp_path / "ends_of_a_test.py").write_text("def end():\n    raise SystemExit(3)\n")
+    (tmp_path / "ends_when_it_is_read.py").write_text("raise SystemExit(4)\n")
+    assert main(["table7", option, name, "--out", str(tmp_path / "out")]) == MISTAKE
+    printed = capsys.readouterr().err
+    assert f"{option} is {name!r}" in printed
+    assert words in printed

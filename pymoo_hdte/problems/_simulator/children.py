@@ -6,9 +6,11 @@ import atexit
 import os
 import pickle
 import re
+import shutil
 import signal
 import subprocess
 import sys
+import tempfile
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
@@ -22,6 +24,8 @@ from pymoo_hdte.problems._simulator.child import receive, send
 RAISED, NOT_A_NUMBER = "raised", "not a number"
 TOO_LONG, LOST = "over the time limit", "worker lost"
 """Kinds of failures of evaluations that give no result."""
+SCRATCH = "PYMOO_HDTE_SCRATCH"
+"""Variable of a process that names a folder, which is removed when the process has ended."""
 
 
 @dataclass(frozen=True)
@@ -74,7 +78,8 @@ class Children:
     def __init__(self) -> None:
         self._lock = RLock()
         self._idle: list[subprocess.Popen[bytes]] = []
-        self._subprocesses: set[subprocess.Popen[bytes]] = set()
+        # With the folder of each, since one that is killed removes nothing.
+        self._subprocesses: dict[subprocess.Popen[bytes], str] = {}
         self._process = os.getpid()
         self.round = 0
 
@@ -138,13 +143,15 @@ class Children:
                 self._drop(child)
             # Of a group of its own: programs that the simulator starts end with it, and Ctrl-C in
             # the terminal does not reach it.
+            scratch = tempfile.mkdtemp(prefix="pymoo-hdte-")
             child = subprocess.Popen(
                 [sys.executable, "-P", str(Path(__file__).with_name("child.py"))],
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 start_new_session=True,
+                env=os.environ | {SCRATCH: scratch},
             )
-            self._subprocesses.add(child)
+            self._subprocesses[child] = scratch
         assert child.stdin is not None
         # If it was ended meanwhile, the call will notice.
         with suppress(OSError):
@@ -153,13 +160,15 @@ class Children:
 
     def _drop(self, child: subprocess.Popen[bytes]) -> None:
         with self._lock:
-            self._subprocesses.discard(child)
+            scratch = self._subprocesses.pop(child, None)
         _kill(child)
         for stream in (child.stdin, child.stdout):
             # What could not be sent to a process that is gone.
             with suppress(OSError):
                 stream.close()  # type: ignore[union-attr]
         child.wait()
+        if scratch is not None:
+            shutil.rmtree(scratch, ignore_errors=True)
 
     def end(self) -> None:
         """End all processes; calls under way or still to begin in this round count as lost."""
@@ -168,7 +177,7 @@ class Children:
         with self._lock:
             self.round += 1
             idle, self._idle = self._idle, []
-            busy = self._subprocesses - set(idle)
+            busy = set(self._subprocesses) - set(idle)
         for child in busy:
             _kill(child)
         for child in idle:

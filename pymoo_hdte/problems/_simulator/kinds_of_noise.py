@@ -134,7 +134,8 @@ def whole_numbers(field: str, given: Any) -> Scenarios | None:
     Raises
     ------
     InvalidInput
-        If it has more than `MOST_VALUES` values, or its probabilities do not sum to 1.
+        If it has more than `MOST_VALUES` values or others than whole numbers, or its probabilities
+        do not sum to 1.
     """
     if isinstance(given, type) or hasattr(given, "freeze"):
         return None
@@ -153,6 +154,9 @@ def whole_numbers(field: str, given: Any) -> Scenarios | None:
         # Not the density, which of chaospy.DiscreteUniform does not sum to 1.
         below = np.ravel(given.cdf(np.arange(first - 1.0, last + 1.0)))
         weights = np.diff(below)
+        if of_scipy and np.any(given.cdf(np.nextafter(values, -np.inf)) > below[:-1] + BEYOND):
+            # Something lies between a number and the one before it.
+            raise InvalidInput(field, given, allowed)
     except InvalidInput:
         raise
     except Exception as error:  # Libraries raise anything for numbers that do not fit.

@@ -403,7 +403,7 @@ def test_the_versions_are_those_of_all_that_computes_a_result():
     bystanders |= {"mujoco-core", "mujoco-studio"}
     # They carry calls to workers.
     bystanders |= {"distributed", "cloudpickle"}
-    named = {name.lower() for name in (*provenance.PACKAGES, *provenance.EXTRAS)}
+    named = {name.lower() for name in provenance.PACKAGES}
     assert {name.lower() for name in found - bystanders} <= named
 
 

@@ -94,6 +94,18 @@ def test_whole_numbers_have_the_moments_of_their_distribution(distribution, same
     np.testing.assert_allclose(problem.evaluate(X), exact, 3e-6)
 
 
+@pytest.mark.parametrize(
+    "distribution",
+    [
+        scipy.stats.binom(4, 0.3, loc=0.5),
+        scipy.stats.rv_discrete(values=([0, 1.5, 4], [0.2, 0.3, 0.5]))(),
+    ],
+)
+def test_values_between_whole_numbers_are_not_rounded(distribution):
+    with pytest.raises(InvalidInput, match=r"noise\['count'\].* of at most 10000 whole numbers"):
+        made(lambda x, count: x + count, {"count": distribution})
+
+
 def test_tails_over_scenarios_are_those_of_the_mixture():
     values, weights = np.array([0.0, 1.0, 3.0]), np.array([0.7, 0.2, 0.1])
     goals = Quantile(0.99), FailureProbability(above=6.0), WorstCase(), CVaR(0.9)
