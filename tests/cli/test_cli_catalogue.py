@@ -7,7 +7,6 @@ import shlex
 import shutil
 from dataclasses import replace
 
-import numpy as np
 import pytest
 from places import DOCS
 
