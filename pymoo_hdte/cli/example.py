@@ -10,7 +10,13 @@ from pymoo_hdte.cli.command import Command, Outcome, Say
 _DETAILS = """example:
   pymoo-hdte example my_gear
   pymoo-hdte identify my_gear/bench --datasheet my_gear/gear.toml --out my_gear/identified
-  pymoo-hdte simulate my_gear/gear.toml --map --out my_gear/map
+  pymoo-hdte simulate my_gear/identified/identified_drive.toml --map --out my_gear/map
+  pymoo-hdte plan my_gear/identified/identified_drive.toml --limits my_gear/limits.toml --out \\
+    my_gear/plan
+  pymoo-hdte discrepancy my_gear/campaign --believed my_gear/identified/identified_drive.toml \\
+    --out my_gear/verdict
+  pymoo-hdte decide my_gear/identified/identified_drive.toml --found \\
+    my_gear/verdict/revised_model.toml --out my_gear/decision
 
 FOLDER, which must be new or empty, gets gear.toml (a catalogue page of size 14, 20 or 25 to put
 your figures into), limits.toml (what a rig can do, for plan), bench (for identify) and campaign
