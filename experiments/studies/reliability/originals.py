@@ -182,7 +182,7 @@ statistic = "failure_probability"
 any_of = [{ response = "mass", above = 3 }, { response = "stress", below = 1 }]
 at_most = 0.01
 [search]
-algorithm = "NSGA2"
+algorithm = "DE"
 population = 20
 """
 TEMPLATE = "w = ${width}, p = ${load}\nt = ${heat}, n = ${speed}, m = ${torque}\n"
