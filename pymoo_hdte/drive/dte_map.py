@@ -11,10 +11,10 @@ import scipy
 from numpy.typing import NDArray
 
 from pymoo_hdte.drive._solve.coefficients import Coefficients
-from pymoo_hdte.drive._solve.free_angle import harmonic_balance
+from pymoo_hdte.drive._solve.free_angle import continued_from_nearest, harmonic_balance
 from pymoo_hdte.drive._solve.order_spectrum import OrderSpectrum
 from pymoo_hdte.drive._solve.stability import state_matrix
-from pymoo_hdte.drive._solve.steady_motion import BY_CASE, SteadyMotion
+from pymoo_hdte.drive._solve.steady_motion import SteadyMotion
 from pymoo_hdte.drive.figures import power_share
 from pymoo_hdte.drive.model import DriveModel
 from pymoo_hdte.units import ARCSEC, REVOLUTION_PER_MINUTE
@@ -292,20 +292,8 @@ def _near_what_was_found(
     It ends when a round finds none.
     """
     places = np.column_stack([speed / np.abs(speed).max(), load / max(np.abs(load).max(), 1e-300)])
-    while (~motion.converged).any() and motion.converged.any():
-        lost, known = np.flatnonzero(~motion.converged), np.flatnonzero(motion.converged)
-        nearest = known[scipy.spatial.cKDTree(places[known]).query(places[lost])[1]]
-        again = harmonic_balance(
-            rows.rows(lost),
-            input_speed=speed[lost],
-            load_torque=load[lost],
-            torus=motion.torus,
-            start=motion.rows(nearest),
-        )
-        if not again.converged.any():
-            break
-        values = {name: getattr(motion, name).copy() for name in BY_CASE}
-        for name, whole in values.items():
-            whole[lost[again.converged]] = getattr(again, name)[again.converged]
-        motion = SteadyMotion(motion.torus, **values)
-    return motion
+    while True:
+        before = motion.converged.sum()
+        motion = continued_from_nearest(rows, motion, places, input_speed=speed, load_torque=load)
+        if motion.converged.sum() == before:
+            return motion

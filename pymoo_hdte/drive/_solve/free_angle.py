@@ -169,8 +169,7 @@ def _systems(start: SteadyMotion | None, rows: slice, count: int) -> list[Linear
 def continued_from_neighbours(coefficients: Coefficients, motion: SteadyMotion) -> SteadyMotion:
     """Return the motion of n designs with lost ones solved again from their nearest neighbours.
 
-    A design whose iteration failed from rest, as at a kink of a law or near a resonance, is started
-    from the steady state of the design that differs least from it. What fails again stays marked.
+    Those are the designs that differ least; see `continued_from_nearest`.
 
     Parameters
     ----------
@@ -179,15 +178,46 @@ def continued_from_neighbours(coefficients: Coefficients, motion: SteadyMotion) 
     motion : SteadyMotion
         What `harmonic_balance` found for them.
     """
-    lost, converged_rows = np.flatnonzero(~motion.converged), np.flatnonzero(motion.converged)
-    if not (lost.size and converged_rows.size):
-        return motion
     sizes = np.abs(coefficients.error_phasors).sum(axis=1)
     parts = (coefficients.stiffness, coefficients.input_inertia, coefficients.damping, sizes)
     places = np.log(np.maximum(np.column_stack(parts), 1e-300))
-    nearest = converged_rows[scipy.spatial.cKDTree(places[converged_rows]).query(places[lost])[1]]
+    return continued_from_nearest(coefficients, motion, places)
+
+
+def continued_from_nearest(
+    coefficients: Coefficients,
+    motion: SteadyMotion,
+    places: Values,
+    *,
+    input_speed: Values | None = None,
+    load_torque: Values | None = None,
+) -> SteadyMotion:
+    """Return the motion of n cases with lost ones solved again from the nearest that was found.
+
+    A case whose iteration failed from rest, as at a kink of a law or near a resonance, is started
+    from the steady state of the nearest one. What fails again stays marked.
+
+    Parameters
+    ----------
+    coefficients : Coefficients
+        Coefficients of n cases.
+    motion : SteadyMotion
+        What `harmonic_balance` found for them.
+    places : ndarray, shape (n, k)
+        Where each case is, in units in which distances compare.
+    input_speed, load_torque : ndarray, shape (n,), optional
+        As `harmonic_balance` had them.
+    """
+    lost, converged = np.flatnonzero(~motion.converged), np.flatnonzero(motion.converged)
+    if not (lost.size and converged.size):
+        return motion
+    nearest = converged[scipy.spatial.cKDTree(places[converged]).query(places[lost])[1]]
     again = harmonic_balance(
-        coefficients.rows(lost), torus=motion.torus, start=motion.rows(nearest)
+        coefficients.rows(lost),
+        input_speed=None if input_speed is None else input_speed[lost],
+        load_torque=None if load_torque is None else load_torque[lost],
+        torus=motion.torus,
+        start=motion.rows(nearest),
     )
     solved = lost[again.converged]
     values = {name: getattr(motion, name).copy() for name in BY_CASE}
