@@ -97,6 +97,31 @@ def toml_with_lines(path: Path) -> Iterator[Fields]:
         complaints.finish()
 
 
+@contextmanager
+def named_by_file(path: Path, places: Mapping[str, str] | None = None) -> Iterator[None]:
+    """Have errors within that do not name a file name this one.
+
+    Parameters
+    ----------
+    path : Path
+    places : mapping of str, optional
+        Where the file has fields that are named otherwise.
+
+    Raises
+    ------
+    InvalidInput
+        Whatever is raised inside the block.
+    """
+    try:
+        yield
+    except InvalidInput as error:
+        if error.field.startswith(f"{path.name}."):
+            raise
+        known = (places or {}).get(error.field)
+        place = f"{path.name}.{known}" if known else f"{path.name}: {error.field}"
+        raise InvalidInput(place, error.value, error.allowed) from None
+
+
 def _with_line(error: InvalidInput, path: Path, text: str) -> InvalidInput:
     """Return an error with the line of its field; an error about something else as it is."""
     if not error.field.startswith(f"{path.name}."):

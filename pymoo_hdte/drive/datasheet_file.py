@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from pymoo_hdte._io.fields import Fields
-from pymoo_hdte._io.toml import toml_with_lines
+from pymoo_hdte._io.toml import named_by_file, toml_with_lines
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.drive.datasheet import (
     LARGEST_TWIST,
@@ -23,7 +23,7 @@ from pymoo_hdte.drive.datasheet import (
 from pymoo_hdte.effects.quantities import with_unit
 
 Arrangement = tuple[str, str | None]
-_PLACES = {
+PLACES = {
     "circular_spline_teeth": "teeth.circular_spline",
     "pressure_angle": "mesh.pressure_angle",
     "stiffness": "nominal.stiffness",
@@ -61,18 +61,11 @@ def load_datasheet(path: str | Path) -> DataSheet:
     >>> load_datasheet("my_drive.toml").ratio
     80.0
     """
-    file = Path(path).name
-    with toml_with_lines(Path(path)) as top:
-        try:
-            sheet = datasheet_from_fields(top)
-            check_twist(sheet)
-        except InvalidInput as error:
-            if error.field.startswith(f"{file}."):
-                raise
-            # What the data sheet itself refuses is named as it stands in the file.
-            known = _PLACES.get(error.field)
-            place = f"{file}.{known}" if known else f"{file}: {error.field}"
-            raise InvalidInput(place, error.value, error.allowed) from None
+    path = Path(path)
+    # What the data sheet itself refuses is named as it stands in the file.
+    with toml_with_lines(path) as top, named_by_file(path, PLACES):
+        sheet = datasheet_from_fields(top)
+        check_twist(sheet)
     return sheet
 
 

@@ -5,10 +5,11 @@ from __future__ import annotations
 from importlib.resources import files
 from pathlib import Path
 
-from pymoo_hdte._io.toml import read_toml, toml_with_lines
+from pymoo_hdte._io.fields import Fields
+from pymoo_hdte._io.toml import named_by_file, read_toml, toml_with_lines
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.drive.catalogue import CataloguePage, drive_of, page_from_fields
-from pymoo_hdte.drive.datasheet_file import check_twist, datasheet_from_fields
+from pymoo_hdte.drive.datasheet_file import PLACES, check_twist, datasheet_from_fields
 from pymoo_hdte.drive.model import DriveModel
 from pymoo_hdte.drive.model_values import values_of
 
@@ -76,15 +77,14 @@ def load_page(path: str | Path) -> CataloguePage:
     >>> page.teeth
     (200, 202)
     """
-    file = Path(path).name
-    with toml_with_lines(Path(path)) as top:
-        try:
-            page = page_from_fields(top)
-            top.finish()
-        except InvalidInput as error:
-            if error.field.startswith(f"{file}."):
-                raise
-            raise InvalidInput(f"{file}: {error.field}", error.value, error.allowed) from None
+    path = Path(path)
+    with toml_with_lines(path) as top, named_by_file(path):
+        return _page(top)
+
+
+def _page(top: Fields) -> CataloguePage:
+    page = page_from_fields(top)
+    top.finish()
     return page
 
 
@@ -113,16 +113,13 @@ def load_drive(path: str | Path) -> DriveModel:
     >>> load_drive(built_in_page(20)).sheet.ratio
     100.0
     """
-    file = Path(path).name
-    if read_toml(Path(path)).has("catalogue"):
-        try:
-            return drive_of(load_page(path))
-        except InvalidInput as error:
-            if error.field.startswith(file):
-                raise
-            raise InvalidInput(f"{file}: {error.field}", error.value, error.allowed) from None
-    with toml_with_lines(Path(path)) as top:
-        fields = top.table("model")
-        sheet = datasheet_from_fields(top)
-        check_twist(sheet)
-        return DriveModel(**values_of(fields, sheet))
+    path = Path(path)
+    with toml_with_lines(path) as top:
+        if top.has("catalogue"):
+            with named_by_file(path):
+                return drive_of(_page(top))
+        with named_by_file(path, PLACES):
+            fields = top.table("model")
+            sheet = datasheet_from_fields(top)
+            check_twist(sheet)
+            return DriveModel(**values_of(fields, sheet))
