@@ -186,7 +186,11 @@ def decide(
         {name: setting for name, setting in design if setting != unchanged[name]}
         for design in product(*choices)
     ]
-    fit = [design for design in designs if allowed(cost_of(page, figures, design), before, limits)]
+    fit = [
+        design
+        for design in designs
+        if allowed(_cost(changed_drive(page, figures, design), design), before, limits)
+    ]
     settings = min(fit, key=lambda design: np.nan_to_num(outcome(design).goal, nan=np.inf))
     if outcome(settings).goal > (1.0 - LITTLE) * before.goal:
         settings = {}
@@ -211,13 +215,7 @@ def found_effects(revised: DriveModel, page: CataloguePage) -> tuple[DriveEffect
     return tuple(effect for effect in revised.effects if place_of(effect) not in known)
 
 
-def _drive(
-    page: CataloguePage,
-    figures: Mapping[str, Entry],
-    settings: Mapping[str, float],
-    found: tuple[DriveEffect, ...],
-) -> DriveModel:
-    drive = changed_drive(page, figures, settings)
+def _with(drive: DriveModel, found: tuple[DriveEffect, ...]) -> DriveModel:
     return replace(drive, effects=(*drive.effects, *found))
 
 
@@ -227,19 +225,16 @@ def _outcome(
     settings: Mapping[str, float],
     found: tuple[DriveEffect, ...],
 ) -> Outcome:
-    drive = _drive(page, figures, settings, found)
+    plain = changed_drive(page, figures, settings)
+    cost, drive = _cost(plain, settings), _with(plain, found)
     dte = drive.dte_where_found(_drives(drive))
-    cost = cost_of(page, figures, settings)
     return Outcome(
         cost.starting, cost.efficiency, cost.stress, float(dte.mean()), float(dte.std(ddof=1))
     )
 
 
-def cost_of(
-    page: CataloguePage, figures: Mapping[str, Entry], settings: Mapping[str, float]
-) -> Cost:
-    """Return what settings of the levers cost under the rated condition."""
-    drive = changed_drive(page, figures, settings)
+def _cost(drive: DriveModel, settings: Mapping[str, float]) -> Cost:
+    """Return what settings of the levers cost in a drive that has them, at its rated condition."""
     condition = drive.sheet.input_speed, drive.sheet.load_torque
     return Cost(
         starting_torque(drive), float(efficiency(drive, *condition)[0]), bending_stress(settings)
@@ -265,7 +260,7 @@ def _varied(
     """Return the interval of the gain, and by how much each estimate moves it."""
 
     def gain(entries: Mapping[str, Entry]) -> float:
-        drives = [_drive(page, entries, design, found) for design in ({}, settings)]
+        drives = [_with(changed_drive(page, entries, design), found) for design in ({}, settings)]
         before, after = (drive.dte_where_found(drive.nominal[None])[0] for drive in drives)
         return float(before - after)
 

@@ -230,8 +230,10 @@ def changed_drive(
         if lever.name in settings:
             now, parts = lever.formula(now, parts, settings[lever.name])
     if "transmission_accuracy" in now and parts != before:
-        sheets = [drive_of(page, figures, sources=some).sheet for some in (before, parts)]
-        old, new = (accuracy_of_parts(sheet)[0] for sheet in sheets)
+        sheet = drive_of(page, figures, sources=before).sheet
+        old, new = (
+            accuracy_of_parts(replace(sheet, error_sources=some))[0] for some in (before, parts)
+        )
         now = _times(now, {"transmission_accuracy": new / old})
     return drive_of(page, now, sources=parts)
 
