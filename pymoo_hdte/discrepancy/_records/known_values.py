@@ -79,16 +79,30 @@ def of_equal_numbers(
         Indices of the vectors of a group, and the effects with its numbers.
     """
     columns = {name: values[name] for name in known_values(effects) if name in values}
+    every = np.arange(len(next(iter(values.values()))))
+    return [
+        (rows, with_known_values(effects, numbers)) for rows, numbers in equal_rows(columns, every)
+    ]
+
+
+def equal_rows(
+    columns: Mapping[str, NDArray[np.float64]], rows: NDArray[np.int_]
+) -> list[tuple[NDArray[np.int_], dict[str, float]]]:
+    """Return places among rows at which all columns are equal, with their values there.
+
+    Parameters
+    ----------
+    columns : mapping of str to ndarray, shape (v,)
+    rows : ndarray of int, shape (k,)
+        Those that are grouped; without columns all are equal.
+    """
     if not columns:
-        return [(np.arange(len(next(iter(values.values())))), tuple(effects))]
-    table = np.column_stack(list(columns.values()))
+        return [(np.arange(len(rows)), {})]
+    table = np.column_stack([column[rows] for column in columns.values()])
     numbers, group = np.unique(table, axis=0, return_inverse=True)
     return [
-        (
-            np.flatnonzero(group.ravel() == place),
-            with_known_values(effects, dict(zip(columns, row, strict=True))),
-        )
-        for place, row in enumerate(numbers)
+        (np.flatnonzero(group.ravel() == place), dict(zip(columns, row, strict=True)))
+        for place, row in enumerate(numbers.tolist())
     ]
 
 

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pymoo_hdte.discrepancy._records.known_values import of_equal_numbers
+from pymoo_hdte.discrepancy._records.known_values import equal_rows, of_equal_numbers
 from pymoo_hdte.discrepancy._selection.candidate import Candidate
 from pymoo_hdte.discrepancy._selection.caveats import strength_is_certain
 from pymoo_hdte.discrepancy._selection.fitting import Fit
@@ -135,18 +135,8 @@ class Bench:
         self, values: Mapping[str, Values], rows: NDArray[np.int_]
     ) -> list[tuple[NDArray[np.int_], tuple[DriveEffect, ...]]]:
         """Return places among rows that share all values of the bench, with its effects there."""
-        names = self.unknowns
-        if not names:
-            return [(np.arange(len(rows)), ())]
-        table = np.column_stack([values[name][rows] for name in names])
-        numbers, group = np.unique(table, axis=0, return_inverse=True)
-        return [
-            (
-                np.flatnonzero(group.ravel() == place),
-                self.effects(dict(zip(names, row.tolist(), strict=True))),
-            )
-            for place, row in enumerate(numbers)
-        ]
+        own = {name: values[name] for name in self.unknowns}
+        return [(places, self.effects(numbers)) for places, numbers in equal_rows(own, rows)]
 
 
 IDEAL = Bench()

@@ -263,10 +263,11 @@ def _predict_group(
         coefficients, speed, load, at_brake,
     )  # fmt: skip
     lines = _lines(predicted, channels, orders, believed.ratio, conditions)
+    under_load = coefficients.at_loads(load)
     response = None
     if lead is not None:
-        response = lead_response(coefficients.at_loads(load), balance.slopes, speed, orders)
-        if rig.output_torque_at == "brake":
+        response = lead_response(under_load, balance.slopes, speed, orders)
+        if at_brake:
             response = response.without_load()
         _follow_lead(lines, response, lead, balance, coefficients.input_inertia)
         if conditions.unsteady is not None:
@@ -290,7 +291,7 @@ def _predict_group(
             rows = _cases(places, records)
             held_by = SpeedLoop(rig.proportional, rig.integral)
             folded = folded_down(
-                coefficients.at_loads(load).rows(rows), balance.rows(rows), speed[rows], held_by,
+                under_load.rows(rows), balance.rows(rows), speed[rows], held_by,
                 beyond, conditions.folded, at_brake,
             )  # fmt: skip
             for reading, added in zip(readings, folded, strict=True):
@@ -391,7 +392,7 @@ def _in_order(
     order = np.argsort(np.concatenate(places))
     mean = np.concatenate([part.mean for part in parts])[order]
     phasors = np.concatenate([part.phasors for part in parts])[order]
-    cases = [np.add.outer(records * rows, np.arange(records)).ravel() for rows in places]
+    cases = [_cases(rows, records) for rows in places]
     balance = merged([part.balance for part in parts], cases)
     responses = [part.response for part in parts if part.response is not None]
     rows = np.argsort(np.concatenate(cases))
