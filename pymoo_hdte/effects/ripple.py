@@ -173,7 +173,7 @@ def _cogging(sizes: Sizes) -> list[Guess]:
     seen = (*sizes.seen, *sizes.clear)
     families = list[Family]()
     # Several motors may differ in lines only that no record could show.
-    for lines in [sizes.motor] if sizes.motor else dict.fromkeys(cogging_of(*m) for m in _MOTORS):
+    for lines in [sizes.motor] if sizes.motor else _MOTORS:
         could_show = [order for order in lines if _could_show(sizes, order)]
         if sizes.motor:
             could_show = [order for order in could_show if is_among(seen, order)]
@@ -207,13 +207,15 @@ def cogging_of(slots: int, poles: int) -> tuple[float, ...]:
 
 
 _MOTORS = tuple(
-    (slots, poles)
-    for slots in range(6, 25, 3)
-    for poles in range(4, 29, 2)
-    if poles != slots and 2 * slots <= 3 * poles <= 4 * slots
+    dict.fromkeys(
+        cogging_of(slots, poles)
+        for slots in range(6, 25, 3)
+        for poles in range(4, 29, 2)
+        if poles != slots and 2 * slots <= 3 * poles <= 4 * slots
+    )
 )
-"""Slots and poles of motors with concentrated windings, of which nearly all of the flux is used."""
-COGGING_ORDERS = tuple(sorted({order for motor in _MOTORS for order in cogging_of(*motor)}))
+"""Orders of each motor with concentrated windings of which nearly all of the flux is used."""
+COGGING_ORDERS = tuple(sorted({order for lines in _MOTORS for order in lines}))
 """Orders at which any of these motors cogs."""
 
 
@@ -226,8 +228,7 @@ def orders_beside(seen: Sequence[float], motor: tuple[float, ...] = ()) -> set[f
     motor : tuple of float
         As of `Sizes`.
     """
-    motors = [cogging_of(*motor) for motor in _MOTORS]
-    beside = [lines for lines in motors if any(is_among(seen, line) for line in lines)]
+    beside = [lines for lines in _MOTORS if any(is_among(seen, line) for line in lines)]
     return set(motor) if motor else {order for lines in beside for order in lines}
 
 
