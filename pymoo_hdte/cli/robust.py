@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import sys
 import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -53,7 +54,7 @@ def _run(options: argparse.Namespace, say: Say) -> Outcome:
     with FOLDER.held(options.out), read_study(options.study) as study:
         runs = options.study.with_name(f"{options.study.stem}_runs.jsonl")
         # As `say`: progress is for a terminal that is not to be quiet.
-        shown = not options.quiet and _is_terminal()
+        shown = not options.quiet and sys.stderr.isatty()
         try:
             with orderly(), warnings.catch_warnings(record=True) as noted:
                 warnings.simplefilter("always", RuntimeWarning)
@@ -70,12 +71,6 @@ def _run(options: argparse.Namespace, say: Say) -> Outcome:
         say("writing the report")
         document = write_robust_report(study.title, problem, result, said, options.out)
         return outcome_of(document, options.out)
-
-
-def _is_terminal() -> bool:
-    import sys
-
-    return sys.stderr.isatty()
 
 
 def _problem(study: RobustStudy, runs: Path, progress: bool) -> Any:

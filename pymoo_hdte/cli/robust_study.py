@@ -241,8 +241,9 @@ def _program(fields: Fields, folder: Path, names: tuple[str, ...] | None) -> Pro
         template = _text_of_template(fields.name_of("template"), file)
         read.append(file)
     marks = _responses(fields)
+    given_files = [name for name, file in files.items() if file is not None]
     used = set()
-    allowed_names = None if names is None else {*names, "study", *filter(_is_given(files), files)}
+    allowed_names = None if names is None else {*names, "study", *given_files}
     texts = [(f"{where}[{place}]", part) for place, part in enumerate(parts)]
     texts += [] if template is None else [(fields.name_of("template"), template)]
     for place, text in texts:
@@ -274,10 +275,6 @@ def _program(fields: Fields, folder: Path, names: tuple[str, ...] | None) -> Pro
         template,
         digest_of(read),
     )
-
-
-def _is_given(files: Mapping[str, str | None]) -> Callable[[str], bool]:
-    return lambda name: files[name] is not None
 
 
 def _file_name(field_name: str, given: str) -> str:

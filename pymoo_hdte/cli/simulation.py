@@ -20,6 +20,7 @@ from pymoo_hdte.drive import (
     simulate_drive,
     starting_torque,
 )
+from pymoo_hdte.drive._solve.time_domain import memories
 from pymoo_hdte.drive.dte_map import (
     SpeedLoadMap,
     TorsionalMode,
@@ -127,7 +128,7 @@ def simulate_condition(
             model,
             model.nominal,
             settle=max(SETTLE, TURNS_TO_SETTLE * turn),
-            rtol=WITH_MEMORY if _remembers(model) else 1e-8,
+            rtol=WITH_MEMORY if memories(model.coefficients(model.nominal[None])) else 1e-8,
         ),
         steady=float(spectrum.peak_to_peak(model.sheet.ratio)[0] / ARCSEC),
         lines={
@@ -143,11 +144,6 @@ def simulate_condition(
         printed=() if page is None else tuple(compared(page)),
         map=_map(model, fastest) if with_map else None,
     )
-
-
-def _remembers(model: DriveModel) -> bool:
-    laws = (effect.at_port() for effect in model.effects)
-    return any(law is not None and law[1].states for law in laws)
 
 
 def _map(model: DriveModel, fastest: float) -> OperatingMap:

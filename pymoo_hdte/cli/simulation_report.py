@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 from pymoo_hdte._io.csv_table import csv_text
 from pymoo_hdte._reports.figures import AFTER, BEFORE, GREY, svg, svg_uri
@@ -303,6 +304,7 @@ def map_figure(mapped: OperatingMap) -> Figure:
         ("torque ripple [N.m]", mapped.ripple, "viridis"),
         ("efficiency", mapped.efficiency, "cividis"),
     )
+    resonances = mapped.resonances()
     for column, (label, values, colours) in enumerate(parts):
         low, high = (0.0, 1.0) if label == "efficiency" else np.nanquantile(values, [0.0, 0.98])
         for place, direction in enumerate(DIRECTIONS):
@@ -312,7 +314,8 @@ def map_figure(mapped: OperatingMap) -> Figure:
                 shading="nearest", rasterized=True,
             )  # fmt: skip
             axis.set_title(f"{label}, {direction}", fontsize=10)
-            _draw_resonances(axis, mapped, label != "efficiency")
+            if label != "efficiency":
+                _draw_resonances(axis, mapped, resonances)
         figure.colorbar(mesh, ax=axes[:, column], extend="max" if high != 1.0 else "neither")
     for axis in axes[:, 0]:
         axis.set_ylabel("load against the motion [N.m]")
@@ -321,12 +324,12 @@ def map_figure(mapped: OperatingMap) -> Figure:
     return figure
 
 
-def _draw_resonances(axis: Axes, mapped: OperatingMap, shown: bool) -> None:
+def _draw_resonances(
+    axis: Axes, mapped: OperatingMap, resonances: Mapping[float, NDArray[np.float64]]
+) -> None:
     """Draw the speed of each resonance over the load, named at the top."""
-    if not shown:
-        return
     fastest = mapped.speeds[-1] / REVOLUTION_PER_MINUTE
-    for order, at in mapped.resonances().items():
+    for order, at in resonances.items():
         speeds = at / REVOLUTION_PER_MINUTE
         if speeds.min() > fastest or order % 1.0:
             continue
