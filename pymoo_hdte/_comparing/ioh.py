@@ -39,7 +39,8 @@ def ioh_files(comparisons: Sequence[Comparison], setting: Setting) -> Iterator[t
         for algorithm in comparison.algorithms:
             folder = file_name(algorithm)
             data = f"data_{function}/IOHprofiler_f{number}_DIM{n_var}.dat"
-            runs = [_from_the_first(*pair) for pair in _pairs(comparison, algorithm)]
+            n_obj = len(comparison.objectives)
+            runs = [_from_the_first(trace, n_obj) for trace in comparison.traces(algorithm)]
             yield f"{folder}/{data}", "".join(map(_table, runs))
             described = {
                 "version": FORM,
@@ -49,7 +50,7 @@ def ioh_files(comparisons: Sequence[Comparison], setting: Setting) -> Iterator[t
                 "maximization": False,
                 "algorithm": {"name": algorithm, "info": f"pymoo_hdte {__version__}"},
                 "experiment_attributes": _attributes(comparison, setting),
-                "attributes": _columns(len(comparison.objectives)),
+                "attributes": _columns(n_obj),
                 "scenarios": [
                     {
                         "dimension": n_var,
@@ -63,11 +64,6 @@ def ioh_files(comparisons: Sequence[Comparison], setting: Setting) -> Iterator[t
             }
             text = json.dumps(described, indent=1, ensure_ascii=False, allow_nan=False)
             yield f"{folder}/IOHprofiler_{function}.json", f"{text}\n"
-
-
-def _pairs(comparison: Comparison, algorithm: str) -> Iterator[tuple[NDArray[np.float64], int]]:
-    for trace in comparison.traces(algorithm):
-        yield trace, len(comparison.objectives)
 
 
 def _from_the_first(trace: NDArray[np.float64], n_obj: int) -> NDArray[np.float64]:

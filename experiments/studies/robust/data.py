@@ -163,13 +163,17 @@ class Outcome:
         names = {function for function, _, _ in self.curves}
         return [function.name for function in FUNCTIONS if function.name in names]
 
+    def stops_of(self, function: str) -> list[dict[str, float]]:
+        """Return where ours stopped on a function, of all seeds that were run."""
+        return [stop for (name, _), stop in self.stops.items() if name == function]
+
     def needed(self, function: str, method: str, column: int = 1) -> int | None:
         """Return the least runs that a method needs by its best way, None if above the budget.
 
         Ours is the median of its seeds, as far as they were run.
         """
         if method == OURS and column == 1:
-            seeds = [stop["needed"] for (name, _), stop in self.stops.items() if name == function]
+            seeds = [stop["needed"] for stop in self.stops_of(function)]
             looked_at = [count for count in seeds if not np.isnan(count)]
             if looked_at:
                 median = float(np.median(looked_at))

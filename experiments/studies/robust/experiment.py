@@ -252,7 +252,7 @@ def stops_table(outcome: Outcome) -> Table:
     """Say where ours stops by itself, with the worst of the seeds."""
     rows: list[tuple[Cell, ...]] = []
     for name in outcome.functions():
-        stops = [outcome.stops[name, seed] for seed in SEEDS if (name, seed) in outcome.stops]
+        stops = outcome.stops_of(name)
         if not stops:
             continue
         stopped = [stop for stop in stops if np.isfinite(stop["runs"])]
@@ -299,8 +299,7 @@ def _cover_finding(outcome: Outcome) -> Finding:
     """Judge the band of every function, of all seeds together."""
     shares = {}
     for name in outcome.functions():
-        stops = [outcome.stops[name, seed] for seed in SEEDS if (name, seed) in outcome.stops]
-        if stops:
+        if stops := outcome.stops_of(name):
             shares[name] = min(float(np.mean([stop[key] for stop in stops])) for key in _COVERED)
     honest = [name for name, share in shares.items() if share >= WANTED_COVERED]
     best = sorted({name for (name, _), stop in outcome.stops.items() if np.isnan(stop["runs"])})
