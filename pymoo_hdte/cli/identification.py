@@ -160,13 +160,10 @@ def measured_figures(
 
 
 def _over_prototypes(runs: Mapping[RunKey, float]) -> MeasuredFigure:
-    prototypes = sorted({prototype for prototype, _ in runs})
-    means = [
-        np.mean([value for (measured, _), value in runs.items() if measured == prototype])
-        for prototype in prototypes
-    ]
-    scatter = float(np.std(means, ddof=1)) if len(means) > 1 else np.nan
-    return MeasuredFigure(float(np.mean(means)), len(means), scatter)
+    if len({prototype for prototype, _ in runs}) < 2:
+        return MeasuredFigure(float(np.mean(list(runs.values()))), 1, np.nan)
+    between = series(runs).between
+    return MeasuredFigure(between.mean, between.n, between.std)
 
 
 def identify_drive(folder: Path) -> Identification:
