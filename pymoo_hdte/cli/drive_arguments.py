@@ -92,7 +92,7 @@ def exceeded(page: CataloguePage, speed: float, load: float) -> tuple[str, ...]:
         f"{figure.name.replace('_', ' ')}, {figure_text(figure.name, figure.value)}"
         for figure in page.entered
         if figure.name.split("_")[0] in ("average", "repeated", "momentary", "largest")
-        and given[FIGURES[figure.name]] > figure.value
+        and given[FIGURES[figure.name].quantity] > figure.value
     ]
     return (f"This is above what is printed as the {'; '.join(above)}.",) if above else ()
 

@@ -98,7 +98,7 @@ def filled_in(page: Path, figures: Mapping[str, MeasuredFigure], source: str) ->
     """
     table = tomllib.loads(page.read_text(encoding="utf-8"))
     for name, figure in figures.items():
-        table["catalogue"][name] = with_unit(figure.value, FIGURES[name])
+        table["catalogue"][name] = with_unit(figure.value, FIGURES[name].quantity)
     table["source"] = f"{table['source']}; {', '.join(figures)} identified from {source}"
     text = toml_text(table)
     drive_of(page_from_fields(Fields(tomllib.loads(text), DRIVE_FILE)))

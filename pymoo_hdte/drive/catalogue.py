@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -19,7 +19,7 @@ import numpy as np
 import scipy
 
 from pymoo_hdte._io.fields import Fields
-from pymoo_hdte.checks import InvalidInput, real_number
+from pymoo_hdte.checks import InvalidInput, one_of, real_number
 from pymoo_hdte.drive._effects import DampingReference, DriveEffect, LawAtPort, LoadInertia
 from pymoo_hdte.drive._solve.quasi_static import quasi_static_torsion
 from pymoo_hdte.drive.datasheet import MEMBERS, DataSheet, ErrorSource, Mesh, Nominal
@@ -34,85 +34,84 @@ from pymoo_hdte.effects.load_friction import LoadFriction
 from pymoo_hdte.effects.stiffness import HardeningStiffness, SoftWindup
 from pymoo_hdte.units import ORIGINS, UNITS
 
-FIGURES: Mapping[str, str] = {
-    "rated_speed": "speed",
-    "average_speed": "speed",
-    "largest_speed": "speed",
-    "rated_torque": "torque",
-    "average_torque": "torque",
-    "repeated_peak_torque": "torque",
-    "momentary_peak_torque": "torque",
-    "input_inertia": "inertia",
-    "output_inertia": "inertia",
-    "load_inertia": "inertia",
-    "K1": "stiffness",
-    "K2": "stiffness",
-    "K3": "stiffness",
-    "T1": "torque",
-    "T2": "torque",
-    "hysteresis_loss": "angle",
-    "lost_motion": "angle",
-    "transmission_accuracy": "angle",
-    "no_load_running_torque": "torque",
-    "no_load_starting_torque": "torque",
-    "no_load_back_driving_torque": "torque",
-    "efficiency": "share",
-    "output_damping": "damping",
-    "load_friction": "share",
-    "driven_friction": "share",
-    "mesh_damping_share": "share",
-    "wall_share": "share",
-    "ring_share": "share",
-    "preload_share": "share",
+
+class FigureKind(NamedTuple):
+    """What holds for a figure of every page.
+
+    Attributes
+    ----------
+    quantity : str
+        Among `units.UNITS`.
+    asked_for : str
+        What to enter, for a figure that nothing replaces.
+    may_be_zero, compared, of_temperature : bool
+        Whether a drive may lack it, whether `figures.predicted` has it for a model, and whether
+        makers print it for one temperature.
+    """
+
+    quantity: str
+    asked_for: str = ""
+    may_be_zero: bool = False
+    compared: bool = False
+    of_temperature: bool = False
+
+
+_SHARE = FigureKind("share", may_be_zero=True)
+_NO_LOAD = FigureKind("torque", compared=True, of_temperature=True)
+
+FIGURES: Mapping[str, FigureKind] = {
+    "rated_speed": FigureKind(
+        "speed", "the input speed for which the rated torque is printed, mostly 2000 r/min"
+    ),
+    "average_speed": FigureKind("speed"),
+    "largest_speed": FigureKind("speed"),
+    "rated_torque": FigureKind("torque", "printed beside size and ratio"),
+    "average_torque": FigureKind("torque"),
+    "repeated_peak_torque": FigureKind("torque"),
+    "momentary_peak_torque": FigureKind("torque"),
+    "input_inertia": FigureKind(
+        "inertia",
+        "of all that turns with the input: the printed moment of inertia of the gear and the rotor "
+        "of the motor",
+    ),
+    "output_inertia": FigureKind("inertia"),
+    "load_inertia": FigureKind(
+        "inertia",
+        "of what the output moves; no page has it, and the resonances depend on it. 0 for nothing",
+        may_be_zero=True,
+    ),
+    "K1": FigureKind("stiffness"),
+    "K2": FigureKind("stiffness"),
+    "K3": FigureKind(
+        "stiffness",
+        "the torsional stiffness at high torque; catalogues print it in 10^4 N.m/rad, in the head "
+        "of the column, or in N.m/arcmin",
+    ),
+    "T1": FigureKind("torque"),
+    "T2": FigureKind("torque"),
+    "hysteresis_loss": FigureKind("angle", may_be_zero=True, compared=True),
+    "lost_motion": FigureKind("angle", compared=True),
+    "transmission_accuracy": FigureKind("angle", compared=True),
+    "no_load_running_torque": _NO_LOAD,
+    "no_load_starting_torque": _NO_LOAD._replace(may_be_zero=True),
+    "no_load_back_driving_torque": _NO_LOAD,
+    "efficiency": FigureKind("share", compared=True, of_temperature=True),
+    "output_damping": FigureKind("damping", may_be_zero=True),
+    "load_friction": _SHARE,
+    "driven_friction": _SHARE,
+    "mesh_damping_share": _SHARE,
+    "wall_share": _SHARE,
+    "ring_share": _SHARE,
+    "preload_share": _SHARE,
 }
-"""The figures of a page, with the quantity, among `units.UNITS`, of each.
+"""The figures of a page.
 
 Examples
 --------
->>> FIGURES["K1"]
+>>> FIGURES["K1"].quantity
 'stiffness'
 """
 
-ASKED_FOR: Mapping[str, str] = {
-    "rated_speed": "the input speed for which the rated torque is printed, mostly 2000 r/min",
-    "rated_torque": "printed beside size and ratio",
-    "K3": "the torsional stiffness at high torque; catalogues print it in 10^4 N.m/rad, in the "
-    "head of the column, or in N.m/arcmin",
-    "input_inertia": "of all that turns with the input: the printed moment of inertia of the gear "
-    "and the rotor of the motor",
-    "load_inertia": "of what the output moves; no page has it, and the resonances depend on it. 0 "
-    "for nothing",
-}
-"""Figures that nothing replaces, with what to enter.
-
-Examples
---------
->>> "K3" in ASKED_FOR, "K2" in ASKED_FOR
-(True, False)
-"""
-
-COMPARED = (
-    "efficiency",
-    "no_load_running_torque",
-    "no_load_starting_torque",
-    "no_load_back_driving_torque",
-    "hysteresis_loss",
-    "lost_motion",
-    "transmission_accuracy",
-)
-"""Figures that `figures.predicted` has for a model."""
-_MAY_BE_ZERO = (
-    "load_inertia",
-    "hysteresis_loss",
-    "no_load_starting_torque",
-    "output_damping",
-    "load_friction",
-    "driven_friction",
-    "mesh_damping_share",
-    "wall_share",
-    "ring_share",
-    "preload_share",
-)
 SHARPNESS = 20.0
 """Corner between the straight pieces of a printed stiffness: off by 3 % at the corner itself."""
 ROOM_TEMPERATURE = 20.0 + ORIGINS["C"]
@@ -142,8 +141,9 @@ def figure_text(name: str, value: float) -> str:
     >>> figure_text("K3", 2.9e4), figure_text("efficiency", 0.77)
     ('29000 N.m/rad', '77 %')
     """
-    unit = _SHOWN[FIGURES[name]]
-    number = value / UNITS[FIGURES[name]][unit]
+    quantity = FIGURES[name].quantity
+    unit = _SHOWN[quantity]
+    number = value / UNITS[quantity][unit]
     digits = f"{number:.3g}"
     return f"{float(digits):.15g} {unit}" if abs(number) >= 1e-3 else f"{digits} {unit}"
 
@@ -170,8 +170,8 @@ class Figure:
     Raises
     ------
     InvalidInput
-        For a value, speed, load or temperature that is not finite and above 0, but for what may be
-        missing in a drive, or an efficiency above 1.
+        For a name not among `FIGURES`, a value, speed, load or temperature that is not finite and
+        above 0, but for what may be missing in a drive, or an efficiency above 1.
 
     Examples
     --------
@@ -188,8 +188,9 @@ class Figure:
     limit: bool = False
 
     def __post_init__(self) -> None:
+        one_of("name", self.name, FIGURES)
         most = 1.0 if self.name == "efficiency" else np.inf
-        if self.name in _MAY_BE_ZERO:
+        if FIGURES[self.name].may_be_zero:
             real_number(self.name, self.value, at_least=0.0)
         else:
             real_number(self.name, self.value, above=0.0, at_most=most)
@@ -324,11 +325,11 @@ def page_from_fields(top: Fields) -> CataloguePage:
     )
     ratio = table.number("ratio", above=1.0)
     held = table.choice("held", MEMBERS) if table.has("held") else "circular_spline"
-    for name, quantity in FIGURES.items():
+    for name, kind in FIGURES.items():
         if not table.has(name):
             continue
         if table.is_table(name):
-            value = table.quantity(name, quantity)
+            value = table.quantity(name, kind.quantity)
             # What does not depend on temperature holds at all; the rest is printed for 20 C.
             entered.append(Figure(name, value, temperature=_printed_at(name, temperature)))
         else:
@@ -348,16 +349,8 @@ def page_from_fields(top: Fields) -> CataloguePage:
     )
 
 
-_OF_TEMPERATURE = (
-    "no_load_running_torque",
-    "no_load_starting_torque",
-    "no_load_back_driving_torque",
-    "efficiency",
-)
-
-
 def _printed_at(name: str, temperature: float) -> float:
-    return ROOM_TEMPERATURE if name in _OF_TEMPERATURE else temperature
+    return ROOM_TEMPERATURE if FIGURES[name].of_temperature else temperature
 
 
 def _figure(row: Fields, name: str, temperature: float) -> Figure:
@@ -368,7 +361,7 @@ def _figure(row: Fields, name: str, temperature: float) -> Figure:
             conditions[condition] = row.quantity(condition, quantity)
     if row.has("temperature"):
         conditions["temperature"] = _temperature(row, "temperature")
-    value = row.quantity("value", FIGURES[name])
+    value = row.quantity("value", FIGURES[name].quantity)
     row.finish()
     return Figure(name, value, **conditions)
 
@@ -385,7 +378,7 @@ def _temperature(table: Fields, name: str) -> float:
 
 
 def _printed(row: Fields) -> Figure:
-    name = row.choice("figure", COMPARED)
+    name = row.choice("figure", [name for name, kind in FIGURES.items() if kind.compared])
     tolerance = row.number("tolerance", at_least=0.0) if row.has("tolerance") else 0.0
     limit = row.truth("limit") if row.has("limit") else False
     if not limit and tolerance == 0.0:
@@ -432,10 +425,12 @@ def complete(
         plain = [f for f in figures if f.speed is None and f.load is None]
         if plain and name not in ("efficiency", "no_load_back_driving_torque"):
             enter(name, Entry(plain[0].value))
-    for name, what in ASKED_FOR.items():
-        if name not in entries:
-            raise InvalidInput(f"catalogue.{name}", None, f"a figure; it is missing: {what}")
+    for name, kind in FIGURES.items():
+        if kind.asked_for and name not in entries:
+            allowed = f"a figure; it is missing: {kind.asked_for}"
+            raise InvalidInput(f"catalogue.{name}", None, allowed)
     _enter_friction(page, entries, enter)
+    elsewhere = abs(page.temperature - ROOM_TEMPERATURE) > 0.5
     for name, rule in estimates.items():
         if name in entries:
             continue
@@ -446,7 +441,7 @@ def complete(
                 f"{rule.ratios[1]:g} only"
             )
             raise InvalidInput(f"catalogue.{name}", None, allowed)
-        if name in _OF_TEMPERATURE and abs(page.temperature - ROOM_TEMPERATURE) > 0.5:
+        if elsewhere and FIGURES.get(name, _SHARE).of_temperature:
             allowed = (
                 f"a figure for {page.temperature - ORIGINS['C']:.0f} C, the temperature of the "
                 "page: grease is stiffer in the cold, and no rule says by how much"

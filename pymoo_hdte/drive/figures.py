@@ -221,7 +221,7 @@ def predicted(model: DriveModel, figure: Figure) -> float:
     Raises
     ------
     KeyError
-        For a figure that is not among `catalogue.COMPARED`, such as a peak torque.
+        For a figure that is not compared, such as a peak torque.
     """
     speed = model.sheet.input_speed if figure.speed is None else figure.speed
     load = model.sheet.load_torque if figure.load is None else figure.load
