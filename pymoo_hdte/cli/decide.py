@@ -30,11 +30,11 @@ def _run(options: argparse.Namespace, say: Say) -> Outcome:
     from pymoo_hdte.checks import InvalidInput
     from pymoo_hdte.cli.decision import decide, found_effects
     from pymoo_hdte.cli.decision_report import FOLDER, write_decision
-    from pymoo_hdte.cli.drive_arguments import catalogue_page, remarks_on_estimates
+    from pymoo_hdte.cli.drive_arguments import read_description, remarks_on_estimates
     from pymoo_hdte.discrepancy import read_drive_model
 
     with FOLDER.held(options.out):
-        page = catalogue_page(options.gear)
+        page = read_description(options.gear).page
         if page is None:
             raise InvalidInput("GEAR.toml", options.gear, "a file with [catalogue]")
         found = (
@@ -42,7 +42,7 @@ def _run(options: argparse.Namespace, say: Say) -> Outcome:
         )
         say("trying what can be changed")
         decision = decide(page, found)
-        notes = remarks_on_estimates(options.gear)
+        notes = remarks_on_estimates(page)
         return outcome_of(write_decision(decision, notes, options.out), options.out)
 
 

@@ -103,6 +103,8 @@ class Decision:
     figures : dict of Entry
     found : tuple of DriveEffect
         Effects that a verdict adds to the page.
+    drives : (DriveModel, DriveModel)
+        Before and after the change, with what was found.
     before, after : Outcome
     effects : dict of (dict of Outcome)
         By lever and setting, the other levers unchanged.
@@ -119,6 +121,7 @@ class Decision:
     page: CataloguePage
     figures: dict[str, Entry]
     found: tuple[DriveEffect, ...]
+    drives: tuple[DriveModel, DriveModel]
     before: Outcome
     after: Outcome
     effects: dict[str, dict[float, Outcome]]
@@ -194,9 +197,18 @@ def decide(
     settings = min(fit, key=lambda design: np.nan_to_num(outcome(design).goal, nan=np.inf))
     if outcome(settings).goal > (1.0 - LITTLE) * before.goal:
         settings = {}
-    gain, gain_changes = _varied(page, figures, settings, found)
+    drives = _changed(page, figures, {}, found), _changed(page, figures, settings, found)
     return Decision(
-        page, figures, found, before, outcome(settings), effects, settings, idle, gain, gain_changes
+        page,
+        figures,
+        found,
+        drives,
+        before,
+        outcome(settings),
+        effects,
+        settings,
+        idle,
+        *_varied(page, figures, settings, found),
     )
 
 
@@ -209,13 +221,25 @@ def allowed(outcome: Cost, before: Cost, limits: Limits) -> bool:
     )
 
 
+def nominal_dte(drive: DriveModel) -> float:
+    """Return the DTE of the nominal drive at its rated condition, arcsec; NaN if there is none."""
+    return float(drive.dte_where_found(drive.nominal[None])[0])
+
+
 def found_effects(revised: DriveModel, page: CataloguePage) -> tuple[DriveEffect, ...]:
     """Return the effects of a revised model that the drive of a page lacks."""
     known = {place_of(effect) for effect in drive_of(page).effects}
     return tuple(effect for effect in revised.effects if place_of(effect) not in known)
 
 
-def _with(drive: DriveModel, found: tuple[DriveEffect, ...]) -> DriveModel:
+def _changed(
+    page: CataloguePage,
+    figures: Mapping[str, Entry],
+    settings: Mapping[str, float],
+    found: tuple[DriveEffect, ...],
+) -> DriveModel:
+    """Return the drive after changes, with what was found."""
+    drive = changed_drive(page, figures, settings)
     return replace(drive, effects=(*drive.effects, *found))
 
 
@@ -225,8 +249,8 @@ def _outcome(
     settings: Mapping[str, float],
     found: tuple[DriveEffect, ...],
 ) -> Outcome:
-    plain = changed_drive(page, figures, settings)
-    cost, drive = _cost(plain, settings), _with(plain, found)
+    cost = _cost(changed_drive(page, figures, settings), settings)
+    drive = _changed(page, figures, settings, found)
     dte = drive.dte_where_found(_drives(drive))
     return Outcome(
         cost.starting, cost.efficiency, cost.stress, float(dte.mean()), float(dte.std(ddof=1))
@@ -260,9 +284,9 @@ def _varied(
     """Return the interval of the gain, and by how much each estimate moves it."""
 
     def gain(entries: Mapping[str, Entry]) -> float:
-        drives = [_with(changed_drive(page, entries, design), found) for design in ({}, settings)]
-        before, after = (drive.dte_where_found(drive.nominal[None])[0] for drive in drives)
-        return float(before - after)
+        drives = (_changed(page, entries, design, found) for design in ({}, settings))
+        before, after = map(nominal_dte, drives)
+        return before - after
 
     draws = [gain(drawn) for drawn in sampled(figures, DRAWS, np.random.default_rng(1))]
     low, high = np.nanquantile(draws, [0.05, 0.95])

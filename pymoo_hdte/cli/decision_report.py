@@ -15,7 +15,9 @@ from pymoo_hdte._reports.figures import AFTER, GREY, data_uri
 from pymoo_hdte._reports.folder import ReportFolder
 from pymoo_hdte._reports.html import change, number, page
 from pymoo_hdte.cli.command import heading
-from pymoo_hdte.cli.decision import LITTLE, SPREAD, Decision, Limits
+from pymoo_hdte.cli.decision import LITTLE, SPREAD, Decision, Limits, nominal_dte
+from pymoo_hdte.cli.drive_arguments import near_resonances
+from pymoo_hdte.drive import drive_of
 from pymoo_hdte.drive.catalogue import figure_text
 from pymoo_hdte.drive.levers import LEVERS, SHARES
 
@@ -119,19 +121,35 @@ def _to_measure(decision: Decision) -> str:
             f"No estimate moves the gain by {100.0 * WEIGHTY:g} % of it. What is to be measured "
             "is the DTE itself, before and after the first change."
         )
-    if decision.found:
-        names = ", ".join(dict.fromkeys(effect.name for effect in decision.found))
-        first += (
-            f" What the verdict found ({names}) has its fitted values here; their intervals are "
-            "not in that of the gain."
-        )
     return first
+
+
+def _of_found(decision: Decision) -> str:
+    """Say what the effects that the page lacks do to the DTE that ``simulate`` gives for it."""
+    names = ", ".join(dict.fromkeys(effect.name for effect in decision.found))
+    plain, found = nominal_dte(drive_of(decision.page)), nominal_dte(decision.drives[0])
+    return (
+        f"What the verdict found ({names}) takes the DTE of the nominal drive from {plain:.1f} "
+        f"arcsec, which simulate gives for the page, to {found:.1f}. It has its fitted values "
+        "here; their intervals are not in that of the gain."
+    )
+
+
+def _resonances(decision: Decision) -> list[str]:
+    """Say what lies near the rated speed, before and after the change."""
+    before, after = (near_resonances(drive) for drive in decision.drives)
+    if before == after:
+        return list(before)
+    said = [f"Before the change, {sentence}" for sentence in before]
+    return said + [f"After the change, {sentence}" for sentence in after]
 
 
 def limits(decision: Decision, notes: Sequence[str]) -> list[str]:
     """Say what a reader should know before acting on it."""
     bounds = Limits()
     return [
+        *([_of_found(decision)] if decision.found else ()),
+        *_resonances(decision),
         *notes,
         "Assumed for the levers, and varied in the interval of the gain: "
         + ", ".join(

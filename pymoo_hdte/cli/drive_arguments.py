@@ -5,14 +5,18 @@ from __future__ import annotations
 import argparse
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from pymoo_hdte.checks import InvalidInput
 
 if TYPE_CHECKING:
     from pymoo_hdte.drive import CataloguePage, DataSheet, DriveModel
+    from pymoo_hdte.drive.drive_file import DescribedDrive
 
 BUILT_IN_SHEET = "hs_20_100"
+RESONANCE_MARGIN = 0.15
+"""Relative distance of speed and resonance, within which an undamped vibration has at least three
+times its static size: 1 / |1 - 1.15^2| = 3.1, and 1 / (1 - .85^2) = 3.6."""
 
 DRIVE_DETAILS = """DATASHEET is a TOML file: a catalogue page (write one with: pymoo-hdte example),
 or teeth, rated condition and nominal values; or the word hs_20_100 for the drive of the paper.
@@ -28,8 +32,25 @@ def add_drive_arguments(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def read_drive(options: argparse.Namespace) -> tuple[DriveModel, tuple[str, ...]]:
-    """Return the drive that the options name, with remarks on it in sentences.
+class NamedDrive(NamedTuple):
+    """The drive that a command's options name.
+
+    Attributes
+    ----------
+    model : DriveModel
+    page : CataloguePage or None
+        None where the drive, or its model, is described otherwise.
+    remarks : tuple of str
+        Sentences on what is assumed.
+    """
+
+    model: DriveModel
+    page: CataloguePage | None
+    remarks: tuple[str, ...]
+
+
+def read_drive(options: argparse.Namespace) -> NamedDrive:
+    """Return the drive that the options name.
 
     Raises
     ------
@@ -40,47 +61,56 @@ def read_drive(options: argparse.Namespace) -> tuple[DriveModel, tuple[str, ...]
     """
     from pymoo_hdte.drive import PRESETS, hs_20_100, load_model, preset
 
-    if (own_model := _whole_drive(options.datasheet)) is not None:
-        if options.model is None:
-            return own_model, remarks_on_estimates(options.datasheet)
-        sheet = own_model.sheet
-        if options.model not in PRESETS:
-            return load_model(Path(options.model), sheet), ()
+    sheet, described, page = read_description(options.datasheet)
+    if described is not None and options.model is None:
+        return NamedDrive(described, page, () if page is None else remarks_on_estimates(page))
+    if described is not None and options.model in PRESETS:
         allowed = f"none, as {Path(options.datasheet).name} has its own model, or a TOML file"
         raise InvalidInput("--model", options.model, allowed)
     options.model = "calibrated" if options.model is None else options.model
-    sheet = read_sheet(options.datasheet)
-    unsaid = _of_the_held_member(options.datasheet, sheet)
+    unsaid = () if described is not None else _of_the_held_member(options.datasheet, sheet)
     if options.model not in PRESETS:
-        return load_model(Path(options.model), sheet), unsaid
+        return NamedDrive(load_model(Path(options.model), sheet), None, unsaid)
     model, own = replace(preset(options.model), sheet=sheet), hs_20_100()
-    if _make(sheet) == _make(own):
-        return model, unsaid
-    return model, (
-        *unsaid,
-        f"Effects, order lines and scatter of theta_s are those of the model {model.name!r}, made "
-        f"for the {own.name}; they need not hold for {sheet.name}. Measure them, or give --model.",
+    if _make(sheet) != _make(own):
+        unsaid += (
+            f"Effects, order lines and scatter of theta_s are those of the model {model.name!r}, "
+            f"made for the {own.name}; they need not hold for {sheet.name}. Measure them, or give "
+            "--model.",
+        )
+    return NamedDrive(model, None, unsaid)
+
+
+def read_description(named: str) -> DescribedDrive:
+    """Return what that file, or `BUILT_IN_SHEET`, says of a drive; errors as `read_drive`."""
+    from pymoo_hdte.drive import hs_20_100
+    from pymoo_hdte.drive.drive_file import DescribedDrive, describe_drive
+
+    if named == BUILT_IN_SHEET:
+        return DescribedDrive(hs_20_100(), None, None)
+    if not named or not Path(named).exists():
+        raise InvalidInput("DATASHEET", named, f"a TOML file that is there, or {BUILT_IN_SHEET}")
+    return describe_drive(named)
+
+
+def near_resonances(model: DriveModel) -> tuple[str, ...]:
+    """Say which resonances lie near the rated speed of a model."""
+    from pymoo_hdte.drive.dte_map import critical_speeds
+    from pymoo_hdte.units import REVOLUTION_PER_MINUTE
+
+    rated = model.sheet.input_speed / REVOLUTION_PER_MINUTE
+    orders = [
+        f"{order:g}"
+        for order, speed in critical_speeds(model)
+        if abs(rated / speed - 1.0) < RESONANCE_MARGIN
+    ]
+    if not orders:
+        return ()
+    where = "resonances of orders" if orders[1:] else "resonance of order"
+    return (
+        f"{rated:.0f} r/min is within {100.0 * RESONANCE_MARGIN:g} % of the {where} "
+        f"{' and '.join(orders)}: the DTE depends strongly on damping and inertia.",
     )
-
-
-def _whole_drive(named: str) -> DriveModel | None:
-    """Return the drive of a file that holds more than a data sheet."""
-    from pymoo_hdte.drive import load_drive
-    from pymoo_hdte.drive.drive_file import holds_model
-
-    if named == BUILT_IN_SHEET or not named or not Path(named).exists():
-        return None
-    return load_drive(named) if holds_model(named) else None
-
-
-def catalogue_page(named: str) -> CataloguePage | None:
-    """Return the catalogue page of a file; None for a drive that is described otherwise."""
-    from pymoo_hdte._io.toml import read_toml
-    from pymoo_hdte.drive import load_page
-
-    if named == BUILT_IN_SHEET or not read_toml(Path(named)).has("catalogue"):
-        return None
-    return load_page(named)
 
 
 def exceeded(page: CataloguePage, speed: float, load: float) -> tuple[str, ...]:
@@ -97,14 +127,11 @@ def exceeded(page: CataloguePage, speed: float, load: float) -> tuple[str, ...]:
     return (f"This is above what is printed as the {'; '.join(above)}.",) if above else ()
 
 
-def remarks_on_estimates(named: str) -> tuple[str, ...]:
+def remarks_on_estimates(page: CataloguePage) -> tuple[str, ...]:
     """Say which figures of a catalogue page are estimated, and how far they may be off."""
     from pymoo_hdte.drive import complete
     from pymoo_hdte.drive.catalogue import figure_text
 
-    page = catalogue_page(named)
-    if page is None:
-        return ()
     estimated = [
         f"{name} {figure_text(name, entry.value)} (± {100.0 * entry.tolerance:.0f} %)"
         for name, entry in complete(page).items()
@@ -133,16 +160,3 @@ def _make(sheet: DataSheet) -> tuple[object, ...]:
     """Return the fields that identify the drive a preset was made for."""
     teeth = sheet.flexspline_teeth, sheet.circular_spline_teeth
     return sheet.name, *teeth, sheet.nominal.static_error
-
-
-def read_sheet(named: str) -> DataSheet:
-    """Return the data sheet of that file, or `BUILT_IN_SHEET`; errors as `read_drive`."""
-    from pymoo_hdte.drive import hs_20_100, load_datasheet
-
-    if named == BUILT_IN_SHEET:
-        return hs_20_100()
-    if (whole := _whole_drive(named)) is not None:
-        return whole.sheet
-    if not named or not Path(named).exists():
-        raise InvalidInput("DATASHEET", named, f"a TOML file that is there, or {BUILT_IN_SHEET}")
-    return load_datasheet(Path(named))

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 
 from pymoo_hdte.cli.command import Command, Outcome, Say, outcome_of
-from pymoo_hdte.cli.drive_arguments import BUILT_IN_SHEET, catalogue_page, read_sheet
+from pymoo_hdte.cli.drive_arguments import BUILT_IN_SHEET, read_description
 
 _DETAILS = """example:
   pymoo-hdte identify bench/series-1 --out reports/series-1
@@ -40,10 +40,10 @@ def _run(options: argparse.Namespace, say: Say) -> Outcome:
     )
 
     with FOLDER.held(options.out):
-        sheet = read_sheet(options.datasheet) if options.datasheet is not None else None
-        page = None
-        if options.datasheet is not None and catalogue_page(options.datasheet) is not None:
-            page = Path(options.datasheet)
+        sheet, page = None, None
+        if options.datasheet is not None:
+            described = read_description(options.datasheet)
+            sheet, page = described.sheet, Path(options.datasheet) if described.page else None
         say("reading the records and fitting")
         identification = identify_drive(options.records)
         if sheet is not None:

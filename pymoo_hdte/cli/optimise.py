@@ -75,7 +75,7 @@ def _run(options: argparse.Namespace, say: Say) -> Outcome:
             designs=whole_number("--designs", options.designs, LEAST_DESIGNS),
             seed=whole_number("--seed", options.seed, 0),
         )
-        model, notes = read_drive(options)
+        model, _, notes = read_drive(options)
         say("searching the front on the drive model")
         # Without a terminal, or if quiet, there is no bar.
         silent = True if options.quiet else None

@@ -41,13 +41,13 @@ def _add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def _run(options: argparse.Namespace, say: Say) -> Outcome:
     from pymoo_hdte.checks import real_number
-    from pymoo_hdte.cli.drive_arguments import catalogue_page, exceeded
+    from pymoo_hdte.cli.drive_arguments import exceeded
     from pymoo_hdte.cli.simulation import simulate_condition
     from pymoo_hdte.cli.simulation_report import FOLDER, write_simulation_report
     from pymoo_hdte.units import REVOLUTION_PER_MINUTE
 
     with FOLDER.held(options.out):
-        model, notes = read_drive(options)
+        model, page, notes = read_drive(options)
         speed, load = model.sheet.input_speed, model.sheet.load_torque
         if options.speed is not None:
             given = real_number("--speed", options.speed, above=0.0, at_most=FASTEST_INPUT)
@@ -55,8 +55,8 @@ def _run(options: argparse.Namespace, say: Say) -> Outcome:
         if options.load is not None:
             load = real_number("--load", options.load, at_least=-LARGEST_LOAD, at_most=LARGEST_LOAD)
         say("integrating the equations of motion, and the steady state over all speeds")
-        page = None if options.model is not None else catalogue_page(options.datasheet)
-        notes = (*notes, *exceeded(page, speed, load)) if page is not None else notes
+        if page is not None:
+            notes += exceeded(page, speed, load)
         simulation = simulate_condition(model.at(speed, load), options.map, page)
         return outcome_of(write_simulation_report(simulation, notes, options.out), options.out)
 

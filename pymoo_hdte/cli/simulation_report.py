@@ -16,6 +16,7 @@ from pymoo_hdte._reports.figures import AFTER, BEFORE, GREY, svg, svg_uri
 from pymoo_hdte._reports.folder import ReportFolder
 from pymoo_hdte._reports.html import change, number, page
 from pymoo_hdte.cli.command import heading
+from pymoo_hdte.cli.drive_arguments import near_resonances
 from pymoo_hdte.cli.simulation import FASTEST, Simulation
 from pymoo_hdte.drive import OperatingMap
 from pymoo_hdte.drive.catalogue import figure_text
@@ -30,8 +31,6 @@ FOLDER = ReportFolder(
     "simulation.json", (TURN_FILE, LINES_FILE, SPEEDS_FILE), (MAP_FILE, MAP_PICTURE)
 )
 
-_RESONANCE_MARGIN = 0.15
-"""Distance of speed and resonance, relative, below which the report mentions it."""
 _APART = 0.01
 """Share by which the two solvers may differ before the report mentions it."""
 _SMALL = 1e-3
@@ -192,19 +191,7 @@ def _of_map(mapped: OperatingMap) -> str:
 
 def limits(simulation: Simulation, notes: Sequence[str]) -> list[str]:
     """Say what a reader should know before quoting the result; ``notes`` are of the drive."""
-    said = list(notes)
-    nearby_orders = [
-        o
-        for o, speed in simulation.resonances
-        if abs(simulation.speed / speed - 1.0) < _RESONANCE_MARGIN
-    ]
-    if nearby_orders:
-        where = "resonances of orders" if nearby_orders[1:] else "resonance of order"
-        orders = " and ".join(f"{order:g}" for order in nearby_orders)
-        said.append(
-            f"This speed is within {100.0 * _RESONANCE_MARGIN:g} % of the {where} {orders}: the "
-            "DTE depends strongly on damping and inertia."
-        )
+    said = [*notes, *near_resonances(simulation.model)]
     if abs(simulation.difference) > _APART:
         said.append(
             "The integration in time differs from the steady state by "

@@ -4,26 +4,57 @@ from __future__ import annotations
 
 from importlib.resources import files
 from pathlib import Path
+from typing import NamedTuple
 
 from pymoo_hdte._io.fields import Fields
-from pymoo_hdte._io.toml import named_by_file, read_toml, toml_with_lines
+from pymoo_hdte._io.toml import named_by_file, toml_with_lines
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.drive.catalogue import CataloguePage, drive_of, page_from_fields
+from pymoo_hdte.drive.datasheet import DataSheet
 from pymoo_hdte.drive.datasheet_file import PLACES, check_twist, datasheet_from_fields
 from pymoo_hdte.drive.model import DriveModel
 from pymoo_hdte.drive.model_values import values_of
 
 
-def holds_model(path: str | Path) -> bool:
-    """Return whether a TOML file describes a whole drive, not its data sheet alone.
+class DescribedDrive(NamedTuple):
+    """What a TOML file says of a drive.
+
+    Attributes
+    ----------
+    sheet : DataSheet
+    model : DriveModel or None
+        None where the file is a data sheet alone.
+    page : CataloguePage or None
+        None where the drive is described otherwise.
+    """
+
+    sheet: DataSheet
+    model: DriveModel | None
+    page: CataloguePage | None
+
+
+def describe_drive(path: str | Path) -> DescribedDrive:
+    """Read a catalogue page, or a data sheet with or without its model.
 
     Raises
     ------
     InvalidInput, OSError
         As `load_drive`.
     """
-    top = read_toml(Path(path))
-    return top.has("catalogue") or top.has("model")
+    path = Path(path)
+    with toml_with_lines(path) as top:
+        if top.has("catalogue"):
+            with named_by_file(path):
+                page = _page(top)
+                model = drive_of(page)
+            return DescribedDrive(model.sheet, model, page)
+        # What the data sheet itself refuses is named as it stands in the file.
+        with named_by_file(path, PLACES):
+            fields = top.table("model") if top.has("model") else None
+            sheet = datasheet_from_fields(top)
+            check_twist(sheet)
+            described = None if fields is None else DriveModel(**values_of(fields, sheet))
+            return DescribedDrive(sheet, described, None)
 
 
 BUILT_IN_SIZES = (14, 20, 25)
@@ -113,13 +144,7 @@ def load_drive(path: str | Path) -> DriveModel:
     >>> load_drive(built_in_page(20)).sheet.ratio
     100.0
     """
-    path = Path(path)
-    with toml_with_lines(path) as top:
-        if top.has("catalogue"):
-            with named_by_file(path):
-                return drive_of(_page(top))
-        with named_by_file(path, PLACES):
-            fields = top.table("model")
-            sheet = datasheet_from_fields(top)
-            check_twist(sheet)
-            return DriveModel(**values_of(fields, sheet))
+    model = describe_drive(path).model
+    if model is None:
+        raise InvalidInput(f"{Path(path).name}: model", None, "a table, or [catalogue]")
+    return model

@@ -13,13 +13,14 @@ from places import DOCS
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.cli import command_line as cli
 from pymoo_hdte.cli import decision, decision_report
-from pymoo_hdte.cli.drive_arguments import exceeded, read_drive
+from pymoo_hdte.cli.drive_arguments import exceeded, near_resonances, read_drive
 from pymoo_hdte.cli.example_records import TRUTH, VARIATION
 from pymoo_hdte.discrepancy import read_drive_model
 from pymoo_hdte.drive import (
     ESTIMATES,
     built_in_page,
     complete,
+    drive_of,
     load_drive,
     load_page,
     preset,
@@ -152,6 +153,21 @@ def test_a_change_that_brings_nothing_is_not_recommended(monkeypatch):
     assert len(decision_report.sentences(made)) == 1
 
 
+def test_a_decision_near_a_resonance_says_so_and_tells_the_dte_from_that_of_the_page(monkeypatch):
+    """The gear of size 20 runs at 2000 r/min, and order 2 meets its torsion at 2218 r/min."""
+    monkeypatch.setattr(decision, "LEVERS", ())
+    monkeypatch.setattr(decision, "DRIVES", 8)
+    monkeypatch.setattr(decision, "DRAWS", 1)
+    made = decision.decide(PAGE, (VARIATION,))
+    (remark,) = near_resonances(drive_of(PAGE))
+    remarks = decision_report.limits(made, ())
+    assert remark in remarks
+    plain, found = (decision.nominal_dte(drive) for drive in (drive_of(PAGE), made.drives[0]))
+    assert found > 1.5 * plain
+    assert f"{plain:.1f} arcsec" in remarks[0]
+    assert f"{found:.1f}" in remarks[0]
+
+
 OF_DRIVES = ("example", "identify", "simulate", "discrepancy", "decide", "optimise", "plan")
 
 
@@ -197,7 +213,7 @@ def test_every_command_reads_the_same_drive_from_the_page(gear):
     expected = load_drive(gear / "gear.toml")
     assert read_drive_model(gear / "gear.toml") == expected
     options = cli._parser().parse_args(["optimise", str(gear / "gear.toml"), "--out", "x"])
-    model, remarks = read_drive(options)
+    model, _, remarks = read_drive(options)
     assert model == expected
     estimated = [name for name, entry in complete(PAGE).items() if entry.estimated]
     assert all(name in remarks[0] for name in estimated)

@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from pymoo_hdte._io.fields import Fields
+from pymoo_hdte._io.toml import read_toml
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy._records.believed import MECHANICAL, BelievedDrive
 from pymoo_hdte.drive import (
@@ -24,7 +25,6 @@ from pymoo_hdte.drive import (
     load_drive,
     load_model,
 )
-from pymoo_hdte.drive.drive_file import holds_model
 
 LEAST = 1e-12
 """Value that replaces zero in a data sheet, which refuses zero, SI."""
@@ -65,7 +65,7 @@ def read_drive_model(path: str | Path, sheet: str | Path | None = None) -> Drive
     'my_drive'
     """
     path = Path(path)
-    if sheet is None and path.is_file() and holds_model(path):
+    if sheet is None and path.is_file() and _holds_drive(path):
         return load_drive(path)
     sheet = path.with_name(f"{path.stem}{SHEET_SUFFIX}{path.suffix}") if sheet is None else sheet
     # Where neither file exists, the error is about the model's.
@@ -76,6 +76,12 @@ def read_drive_model(path: str | Path, sheet: str | Path | None = None) -> Drive
         if error.field.startswith((path.name, Path(sheet).name, str(path), str(sheet))):
             raise
         raise InvalidInput(f"{path.name}: {error.field}", error.value, error.allowed) from None
+
+
+def _holds_drive(path: Path) -> bool:
+    """Return whether a file describes a whole drive, not its model alone."""
+    top = read_toml(path)
+    return top.has("catalogue") or top.has("model")
 
 
 def believed_of_model(
