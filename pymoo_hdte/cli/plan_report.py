@@ -35,8 +35,8 @@ def write_plan(plan: Plan, model: str, out: Path) -> dict[str, Any]:
     ]
     document = heading("plan", sentences, plan.missed) | {"model": model} | content
     del document["not_reached"]
-    words = {"use": _USE, "in_words": in_words, "chance": _chance}
-    rows = {"weakest": weakest(document), "document": document, **words}
+    words = {"use": _USE, "in_words": in_words, "chance": _chance, "braking": braking}
+    rows = {"weakest": weakest(document), "document": document, "timed": timed(document), **words}
     FOLDER.write(out, page("pymoo_hdte.cli", "plan.html.j2", **rows), document,
                  {PLAN_FILE: toml_text(document)})  # fmt: skip
     return document
@@ -69,18 +69,29 @@ def weakest(document: dict[str, Any]) -> list[dict[str, Any]]:
     return rows
 
 
+def timed(document: dict[str, Any]) -> bool:
+    """Return whether the tests have times: a session in which nothing drifts has none."""
+    return any(test.get("elapsed_s") for test in document["test"])
+
+
+def braking(test: dict[str, Any]) -> float:
+    """Return the load against the motion of a running test, N.m; negative where it drives."""
+    return test["load_torque_Nm"] if test["direction"] == "forward" else -test["load_torque_Nm"]
+
+
 def plan_table(document: dict[str, Any], out: Path) -> list[str]:
     """Return the lines for the terminal: tests, powers, and what is not reached."""
-    lines = [*document["sentences"], "", f"{'role':9} {'r/min':>8} {'N.m':>8} {'s':>7}  test"]
+    start = f" {'s':>7}" if timed(document) else ""
+    lines = [*document["sentences"], "", f"{'role':9} {'r/min':>8} {'N.m':>8}{start}  test"]
     for test in document["test"]:
         if test["test"] == "running":
-            condition = f"{test['input_speed_rpm']:8.5g} {test['load_torque_Nm']:8.4g}"
-            lines.append(
-                f"{test['role']:9} {condition} {test['elapsed_s']:7.5g}  {test['direction']}"
-            )
+            speed, load = abs(test["input_speed_rpm"]), braking(test)
+            time = start and f" {test['elapsed_s']:7.5g}"
+            what = f"{time}  {test['direction']}{', the load drives' if load < 0.0 else ''}"
+            lines.append(f"{test['role']:9} {speed:8.5g} {load:8.4g}{what}")
         else:
-            torque = test["largest_torque_Nm"]
-            lines.append(f"{test['role']:9} {'':8} {torque:8.4g} {'':7}  torsion sweep")
+            torque, time = test["largest_torque_Nm"], " " * len(start)
+            lines.append(f"{test['role']:9} {'':8} {torque:8.4g}{time}  torsion sweep")
     widest = max((len(effect["effect"]) for effect in document["effect"]), default=6)
     lines += ["", f"{'effect':{widest}}  {'shown':>13}  {'apart':>13}  from"]
     for row in weakest(document):

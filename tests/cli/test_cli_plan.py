@@ -8,6 +8,7 @@ import pytest
 from places import DOCS
 
 from pymoo_hdte.cli.command_line import main
+from pymoo_hdte.cli.plan_report import braking
 from pymoo_hdte.discrepancy._plan import changes
 from pymoo_hdte.drive import hs_20_100, preset
 from pymoo_hdte.drive.toml_text import model_toml, sheet_toml
@@ -49,6 +50,12 @@ def test_the_documented_limits_give_a_plan(files, capsys):
     first = {path.name: path.read_bytes() for path in out.iterdir()}
     assert main([*arguments, "--quiet"]) == 0
     assert {path.name: path.read_bytes() for path in out.iterdir()} == first
+
+
+def test_a_load_that_brakes_is_positive_in_both_directions():
+    test = {"test": "running", "load_torque_Nm": -52.0}
+    assert braking(test | {"direction": "reverse"}) == 52.0
+    assert braking(test | {"direction": "forward"}) == -52.0
 
 
 def test_a_wrong_limit_is_one_line(files, capsys):
