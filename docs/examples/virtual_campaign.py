@@ -18,8 +18,7 @@ from pymoo_hdte.units import ARCSEC
 # Python looks for modules in the folder of this script, not in that of the repository.
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
-from experiments.studies.virtual_rig.hidden_forms import draw_effect
-from experiments.studies.virtual_rig.rig import draw_rig, run_campaign
+from experiments.studies.virtual_rig.rig import draw_rig, run_campaign, torque_ripple
 
 BELIEVED = BelievedDrive(
     ratio=101.0,
@@ -51,7 +50,7 @@ if __name__ == "__main__":
     if folder.exists() and any(folder.iterdir()):
         sys.exit(f"{folder} is not empty")
     rng = np.random.default_rng(1)
-    hidden = draw_effect("torque_ripple", BELIEVED, rng)
+    hidden = torque_ripple(rng)
     campaign = run_campaign(draw_rig(BELIEVED, (hidden,), rng), BELIEVED, RIG, rng)
     write_campaign(campaign, folder)
     ripple, order = (hidden.parameters[name] for name in ("ripple", "ripple_order"))

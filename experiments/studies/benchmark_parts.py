@@ -15,8 +15,7 @@ from threadpoolctl import threadpool_limits
 
 from experiments.studies.blind.cases import BELIEVED, RIG
 from experiments.studies.timing import Ratio, best_time
-from experiments.studies.virtual_rig.hidden_forms import draw_effect
-from experiments.studies.virtual_rig.rig import draw_rig, run_campaign
+from experiments.studies.virtual_rig.rig import draw_rig, run_campaign, torque_ripple
 from pymoo_hdte._comparing.runs import robust_problem
 from pymoo_hdte.algorithms.crowding import least_crowded
 from pymoo_hdte.algorithms.spread import most_spread
@@ -180,7 +179,7 @@ def _sorting() -> Iterator[Ratio]:
 
 def _discrepancy() -> Ratio:
     rng = np.random.default_rng(5)
-    rig = draw_rig(BELIEVED, (draw_effect("torque_ripple", BELIEVED, rng),), rng)
+    rig = draw_rig(BELIEVED, (torque_ripple(rng),), rng)
     begin = time.perf_counter()
     campaign = run_campaign(rig, BELIEVED, RIG, rng)
     recorded = time.perf_counter() - begin

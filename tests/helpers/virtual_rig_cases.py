@@ -3,8 +3,7 @@
 from dataclasses import replace
 
 from experiments.studies.blind.cases import BELIEVED, RIG
-from experiments.studies.virtual_rig.hidden_forms import HiddenEffect
-from experiments.studies.virtual_rig.rig import TrueRig
+from experiments.studies.virtual_rig.rig import HiddenEffect, TrueRig
 from experiments.studies.virtual_rig.runs import Condition
 
 __all__ = ["BELIEVED", "FAST", "PHASES", "RIG", "SHORT", "effect", "true_rig"]
@@ -19,6 +18,6 @@ def true_rig(*effects: HiddenEffect, **changes: float | tuple[float, ...]) -> Tr
     return TrueRig(replace(BELIEVED, **changes), PHASES, effects)
 
 
-def effect(port: str, **parameters: float | tuple[float, ...]) -> HiddenEffect:
+def effect(port: str, **parameters: float) -> HiddenEffect:
     """Return a planted effect."""
-    return HiddenEffect("planted", port, parameters)
+    return HiddenEffect(port, parameters)

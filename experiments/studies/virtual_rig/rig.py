@@ -1,4 +1,4 @@
-"""A virtual rig with hidden effects: truth for blind campaigns, independent of the library's laws.
+"""A virtual rig with hidden effects, independent of the library's laws: campaigns for tests.
 
 Every record moves the static error a little: the sine and the cosine part of each of m lines and
 the constant get normal errors of repeatability / sqrt(m), so that the varying part has the
@@ -13,9 +13,8 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.studies.virtual_rig.hidden_forms import HiddenEffect
 from experiments.studies.virtual_rig.integrator import Mechanics, quasi_static_torsion
-from experiments.studies.virtual_rig.laws import Mesh, Side, angle_wave
+from experiments.studies.virtual_rig.laws import Mesh, Side
 from experiments.studies.virtual_rig.runs import Condition, simulate_run
 from pymoo_hdte.checks import InvalidInput, one_of, real_number
 from pymoo_hdte.discrepancy._records.campaign import (
@@ -63,6 +62,35 @@ _Part = TypeVar("_Part", Side, Mesh)
 
 
 @dataclass(frozen=True)
+class HiddenEffect:
+    """One hidden effect.
+
+    Attributes
+    ----------
+    port : str
+        "input", "output" or "mesh".
+    parameters : dict
+        Fields of `laws.Side` (input, output) or `laws.Mesh` and their values, SI.
+    """
+
+    port: str
+    parameters: dict[str, Any]
+
+
+def torque_ripple(rng: np.random.Generator) -> HiddenEffect:
+    """Draw a motor torque of 0.005 to 0.025 N.m at a whole order from 2 to 8."""
+    return HiddenEffect(
+        "input",
+        {
+            "ripple": rng.uniform(0.005, 0.025),
+            "ripple_order": float(rng.integers(2, 9)),
+            "ripple_phase": rng.uniform(0.0, 2.0 * np.pi),
+            "ripple_second": rng.uniform(0.0, 2.0 * np.pi),
+        },
+    )
+
+
+@dataclass(frozen=True)
 class TrueRig:
     """The true drive on the rig.
 
@@ -90,11 +118,11 @@ class TrueRig:
             raise InvalidInput("error_phases", self.error_phases, allowed)
         fields: dict[tuple[str, str], object] = {}
         for effect in self.effects:
-            one_of("port", effect.port, ("input", "output", "mesh", "sensor"))
+            one_of("port", effect.port, ("input", "output", "mesh"))
             for field, value in effect.parameters.items():
                 if fields.setdefault((effect.port, field), value) != value:
                     raise InvalidInput(
-                        f"{field} of {effect.name}", value, "one value from all effects of a port"
+                        f"{field} of {effect.port}", value, "one value from all effects of a port"
                     )
 
     def mechanics(self, rig: Rig) -> Mechanics:
@@ -117,23 +145,10 @@ class TrueRig:
             self._with_effects(mesh, "mesh"),
         )
 
-    @property
-    def encoder(self) -> OutputEncoder:
-        """The output encoder with its errors."""
-        encoder = OutputEncoder()
-        for effect in self.effects:
-            if effect.port == "sensor":
-                encoder = replace(encoder, **effect.parameters)  # type: ignore[arg-type]
-        return encoder
-
     def _with_effects(self, part: _Part, port: str) -> _Part:
         for effect in self.effects:
             if effect.port == port:
-                values: dict[str, Any] = {
-                    name: np.array(value) if isinstance(value, tuple) else value
-                    for name, value in effect.parameters.items()
-                }
-                part = part._replace(**values)
+                part = part._replace(**effect.parameters)
         return part
 
 
@@ -168,7 +183,6 @@ def run_campaign(
     rig: Rig,
     rng: np.random.Generator,
     conditions: tuple[Condition, ...] = DEFAULT_CONDITIONS,
-    title: str = "virtual rig",
 ) -> Campaign:
     """Run and record a session: the conditions in random order, and a torsion sweep.
 
@@ -181,7 +195,6 @@ def run_campaign(
         Its speed loop needs an integral part, or the mean speed would be free.
     rng : numpy.random.Generator
     conditions : tuple of Condition
-    title : str
 
     Returns
     -------
@@ -203,7 +216,7 @@ def run_campaign(
         for condition, start in zip(conditions, elapsed, strict=True)
     )
     torsion = _torsion_record(true_rig, rig, errors, rng)
-    return Campaign(title, "HS-20-100", believed, rig, running, (torsion,))
+    return Campaign("virtual rig", "HS-20-100", believed, rig, running, (torsion,))
 
 
 def _run(
@@ -219,11 +232,10 @@ def _run(
     setting = LOAD_SETTING * rng.standard_normal()
     load = condition.load_torque + (setting if condition.load_torque != 0.0 else 0.0)
     start = rng.uniform(0.0, 2.0 * np.pi * mechanics.ratio)
-    samples = simulate_run(mechanics, condition, load, start, elapsed)
+    samples = simulate_run(mechanics, condition, load, start)
     if rig.output_torque_at == "brake":
         samples[3] = load
     raw_time = condition.raw_interval * np.arange(float(samples.shape[1]))
-    samples[1] = true_rig.encoder.reading(samples[1], elapsed + raw_time)
     averaged = condition.samples_averaged
     channels = measure(samples, mechanics.ratio, rig, errors, averaged, rng)
     return RunningRecord(
@@ -270,62 +282,11 @@ def _torsion_record(
     mechanics = true_rig.mechanics(rig)
     time = np.arange(round(SWEEP_LEG * (len(SWEEP) - 1) * SWEEP_RATE)) / SWEEP_RATE
     torque = np.interp(time, SWEEP_LEG * np.arange(len(SWEEP)), SWEEP)
-    slip = np.zeros(len(mechanics.mesh.slip_limit))
-    torsion = quasi_static_torsion(mechanics.mesh, 0.0, torque, _breakaway(mechanics.output), slip)
-    # The drift of these three minutes is left out: the encoder was zeroed just before.
-    encoder = replace(true_rig.encoder, drift=0.0)
-    still = np.zeros_like(time)
-    angle = encoder.reading(-torsion, still) - encoder.reading(still, still)
+    angle = -quasi_static_torsion(mechanics.mesh, 0.0, torque, mechanics.output.coulomb)
     angle += rig.torsion_angle_noise * rng.standard_normal(len(time))
     reading = (1.0 + errors.output_gain) * torque + errors.output_zero
     reading += rig.output_torque_noise * rng.standard_normal(len(time))
     return TorsionRecord("torsion_locked_input", "train", SWEEP_RATE, time, angle, reading)
-
-
-def _breakaway(output: Side) -> float:
-    """Return the dry friction that a slow turn of the output from angle zero meets, N.m."""
-    wave: float = angle_wave(
-        output.periodic_order, 0.0, output.periodic_phase, output.periodic_second
-    )
-    return max(output.coulomb + output.stribeck + output.periodic * wave, 0.0)
-
-
-@dataclass(frozen=True)
-class OutputEncoder:
-    """Errors that the output encoder adds to the angle; none by default.
-
-    Attributes
-    ----------
-    eccentricity, eccentricity_phase, eccentricity_second : float
-        e (cos(theta_out + phase) + 0.2 cos(2 theta_out + second)), rad.
-    drift, drift_time : float
-        Drift over the session, rad and s: four fifths of it as 1 - exp(-t / drift_time), the rest
-        three times as fast.
-    interpolation, interpolation_lines, interpolation_phase : float
-        Amplitude of the interpolation error, rad, and its periods in one turn.
-    """
-
-    eccentricity: float = 0.0
-    eccentricity_phase: float = 0.0
-    eccentricity_second: float = 0.0
-    drift: float = 0.0
-    drift_time: float = 1.0
-    interpolation: float = 0.0
-    interpolation_lines: float = 1.0
-    interpolation_phase: float = 0.0
-
-    def reading(
-        self, angle: NDArray[np.float64], clock: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
-        """Return what is read at the true ``angle`` (rad) at ``clock`` (s)."""
-        once = np.cos(angle + self.eccentricity_phase)
-        twice = np.cos(2.0 * angle + self.eccentricity_second)
-        fine = np.sin(self.interpolation_lines * angle + self.interpolation_phase)
-        ages = clock / self.drift_time
-        drifted = self.drift * -(0.8 * np.expm1(-ages) + 0.2 * np.expm1(-3.0 * ages))
-        return (
-            angle + self.eccentricity * (once + 0.2 * twice) + self.interpolation * fine + drifted
-        )
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,7 @@ from pymoo_hdte.units import REVOLUTION_PER_MINUTE
 SETTLING = 18.0
 """Time constants of the slowest mode before the first sample; leaves 2e-8 of the start."""
 SETTLING_TURNS = 2.0
-"""Input turns before the first sample, in which laws with memory of the path settle."""
+"""Input turns before the first sample, at least."""
 STABLE_STEP = 1.0
 """Largest product of a step and the fastest eigenvalue; the method is stable up to 2.7."""
 ACCURATE_STEP = 2.5e-4
@@ -78,12 +78,11 @@ class Condition:
 
 
 def simulate_run(
-    rig: Mechanics, condition: Condition, load_torque: float, start_angle: float, clock: float
+    rig: Mechanics, condition: Condition, load_torque: float, start_angle: float
 ) -> NDArray[np.float64]:
     """Return the raw samples of one output turn in steady state, before any sensor.
 
-    Where the lines are slow the torsional modes need only be stable, and a compliant sensor is
-    rigid: its error is the square of line over sensor frequency, below 1e-3.
+    Where the lines are slow the torsional modes need only be stable.
 
     Parameters
     ----------
@@ -93,8 +92,6 @@ def simulate_run(
         True load, N.m.
     start_angle : float
         Input angle at the first sample, rad.
-    clock : float
-        Time within the session at the first sample, s.
 
     Returns
     -------
@@ -103,8 +100,6 @@ def simulate_run(
     """
     speed, interval = condition.input_speed, condition.raw_interval
     slow = HIGHEST_ORDER * abs(speed) * interval < SLOW
-    if slow:
-        rig = rig._replace(output=rig.output._replace(sensor_stiffness=0.0))
     modes = linear_modes(rig)
     fastest = float(np.abs(modes).max())
     limit = STABLE_STEP / fastest if slow else min(STABLE_STEP / fastest, ACCURATE_STEP)
@@ -113,14 +108,13 @@ def simulate_run(
     )
     n_settle = math.ceil(settling / interval)
     rows = math.floor(condition.duration(rig.ratio) * condition.sample_rate + 1e-6)
-    motor = load_torque / rig.ratio + friction(rig.input, speed, start_angle, clock)
-    course = Course(speed, start_angle, load_torque, clock, motor)
-    state, slip = _start(rig, course, start_angle - speed * interval * n_settle)
+    motor = load_torque / rig.ratio + friction(rig.input, speed)
+    course = Course(speed, start_angle, load_torque, motor)
+    state = _start(rig, course, start_angle - speed * interval * n_settle)
     return integrate(
         rig,
         course,
         state,
-        slip,
         interval,
         math.ceil(interval / limit - 1e-9),
         n_settle,
@@ -128,40 +122,26 @@ def simulate_run(
     )
 
 
-def _start(
-    rig: Mechanics, course: Course, angle: float
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return state and slip torques of the drive slowly loaded at ``angle``, then set going."""
-    slip = np.zeros(len(rig.mesh.slip_limit))
+def _start(rig: Mechanics, course: Course, angle: float) -> NDArray[np.float64]:
+    """Return the state of the drive slowly loaded at ``angle``, then set going."""
     load = np.array([course.load_torque])
-    torsion = quasi_static_torsion(rig.mesh, angle, load, 0.0, slip)[0]
+    torsion = quasi_static_torsion(rig.mesh, angle, load, 0.0)[0]
     value, slope = static_error(rig.mesh, angle)
     state = np.zeros(N_STATES)
     state[2], state[3] = value + torsion, slope * course.speed
-    if rig.output.sensor_stiffness > 0.0:
-        state[4] = course.load_torque / rig.output.sensor_stiffness
-    return state, slip
+    return state
 
 
 def linear_modes(rig: Mechanics) -> NDArray[np.complex128]:
     """Return the eigenvalues of the linear rig about its steady state, 1/s."""
     mesh, ratio = rig.mesh, rig.ratio
-    damping = mesh.damping * mesh.damping_factor
-    torque = np.array([0.0, 0.0, mesh.stiffness + mesh.slip_stiffness.sum(), damping, 0.0, 0.0])
-    motor = np.array([rig.integral, rig.proportional + rig.input.damping, 0.0, 0.0, 0.0, 0.0])
+    torque = np.array([0.0, 0.0, mesh.stiffness, mesh.damping])
+    motor = np.array([rig.integral, rig.proportional + rig.input.damping, 0.0, 0.0])
     acceleration = -(motor + torque / ratio) / rig.input.inertia
-    friction_torque = rig.output.damping * np.array([0.0, 1.0 / ratio, 0.0, -1.0, 0.0, 0.0])
-    load_inertia = rig.load_inertia + rig.output.extra_inertia
+    friction_torque = rig.output.damping * np.array([0.0, 1.0 / ratio, 0.0, -1.0])
+    inertia = rig.output.inertia + rig.load_inertia
     system = np.zeros((N_STATES, N_STATES))
-    system[0, 1] = system[2, 3] = system[4, 5] = 1.0
+    system[0, 1] = system[2, 3] = 1.0
     system[1] = acceleration
-    stiffness = rig.output.sensor_stiffness
-    if stiffness == 0.0:
-        inertia = rig.output.inertia + load_inertia
-        system[3] = acceleration / ratio - (torque - friction_torque) / inertia
-        return np.linalg.eigvals(system[:4, :4]).astype(np.complex128)
-    sensor = np.array([0.0, 0.0, 0.0, 0.0, stiffness, rig.output.sensor_damping])
-    output = (torque - friction_torque - sensor) / rig.output.inertia
-    system[3] = acceleration / ratio - output
-    system[5] = output - sensor / load_inertia
+    system[3] = acceleration / ratio - (torque - friction_torque) / inertia
     return np.linalg.eigvals(system).astype(np.complex128)

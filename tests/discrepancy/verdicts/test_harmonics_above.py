@@ -22,7 +22,7 @@ from pymoo_hdte.discrepancy._verdicts.drive import examine_drive
 from pymoo_hdte.discrepancy._verdicts.stated_sensors import beyond_limits
 
 sys.path.insert(0, str(DOCS / "examples"))
-from virtual_campaign import BELIEVED, RIG, draw_effect
+from virtual_campaign import BELIEVED, RIG, torque_ripple
 
 SEEDS = (1, 2, 6)
 """Of the example in the README, and further ones: ripples of order 7, 2 and 5."""
@@ -39,7 +39,7 @@ def misses(entry, truth):
 def test_a_ripple_and_the_drive_are_as_they_were_made(seed):
     """With its second harmonic above all lines the ripple was 15 half-widths off, for 97 %."""
     rng = np.random.default_rng(seed)
-    hidden = draw_effect("torque_ripple", BELIEVED, rng)
+    hidden = torque_ripple(rng)
     rig = draw_rig(BELIEVED, (hidden,), rng)
     found = examine_drive(run_campaign(rig, BELIEVED, RIG, rng))
     verdict = found.verdict

@@ -32,8 +32,7 @@ from experiments.studies.blind.rig.session import (
 )
 from experiments.studies.blind.rig.visible import LEAST, features, means, orders_seen, response
 from experiments.studies.blind.truth import one_name
-from experiments.studies.virtual_rig.hidden_forms import HiddenEffect
-from experiments.studies.virtual_rig.rig import TrueRig
+from experiments.studies.virtual_rig.rig import HiddenEffect, TrueRig
 from experiments.studies.virtual_rig.runs import Condition as TheirCondition
 from experiments.studies.virtual_rig.runs import simulate_run
 from pymoo_hdte.discrepancy import read_campaign
@@ -112,9 +111,9 @@ def test_two_benches_that_were_written_apart_move_alike(share):
         error_amplitudes=MACHINE.amplitudes,
         **{name: getattr(MACHINE, name) for name in UNCERTAIN},
     )
-    other = TrueRig(believed, MACHINE.phases, (HiddenEffect("", "input", {"reaction": share}),))
+    other = TrueRig(believed, MACHINE.phases, (HiddenEffect("input", {"reaction": share}),))
     same = TheirCondition(2000.0, 40.0, 1000.0, 1, "train")
-    theirs = simulate_run(other.mechanics(RIG), same, 40.0, 0.3, 0.0)
+    theirs = simulate_run(other.mechanics(RIG), same, 40.0, 0.3)
     machine = replace(MACHINE, elements=(element(el.REACTION, share),))
     ours = run(machine, RATED, 40.0, 0.3, 0.0)
     # Their motor begins without the friction of the output's bearing, so that the input lags.
