@@ -17,8 +17,6 @@ from experiments.paper.node_faults import (
     fault_effects,
     faults_figure,
     faults_table,
-    noise_effects,
-    noise_table,
     on_the_first_page,
 )
 from experiments.published_values import TABLE_5
@@ -95,7 +93,6 @@ def run(context: Context) -> Result:
     box = robust_problem(MODELS[0]).surrogate.box
     cubes = [box.to_cube(latin_hypercube(box, N_TEST, seed)) for seed in _seeds(SCATTER)]
     errors = {(trial.model, trial.order): trial.predicted - trial.actual for trial in stated}
-    noise = noise_effects(errors, cubes)
     faults = fault_effects({name: errors[name, HIGH] for name in MODELS}, cubes)
     return Result(
         title="Table 5: accuracy of the Chebyshev surrogate",
@@ -105,7 +102,6 @@ def run(context: Context) -> Result:
         tables=(
             _table("accuracy", stated, tuple(_findings(stated))),
             _table("band", [t for t in trials if t.interval == BAND], (_interval_finding(trials),)),
-            noise_table(noise),
             faults_table(faults),
         ),
         first_page={WITHIN_PAPER: on_the_first_page(faults)},

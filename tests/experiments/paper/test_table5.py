@@ -4,8 +4,6 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from numpy.polynomial.legendre import leggauss
-from scipy.interpolate import lagrange
 
 from experiments.paper import node_faults, table5
 from experiments.paper.node_faults import (
@@ -17,8 +15,6 @@ from experiments.paper.node_faults import (
     cardinal_functions,
     fault_effects,
     least_rmse_below,
-    noise_effects,
-    noise_share,
 )
 from experiments.published_values import TABLE_5
 from experiments.runner.registry import Context
@@ -26,7 +22,6 @@ from pymoo_hdte._comparing.runs import robust_problem
 from pymoo_hdte._runner.campaign import Campaign
 from pymoo_hdte._runner.result import WITHIN_PAPER
 from pymoo_hdte.surrogate import Box, ChebyshevSurrogate, latin_hypercube
-from pymoo_hdte.surrogate.tensor import chebyshev_nodes
 from pymoo_hdte.units import ARCSEC
 
 CUBE = Box(("a", "b", "c", "d", "e"), -np.ones(5), np.ones(5))
@@ -34,28 +29,6 @@ CUBE = Box(("a", "b", "c", "d", "e"), -np.ones(5), np.ones(5))
 
 def cubes(n, points=200):
     return [latin_hypercube(CUBE, points, seed) for seed in range(n)]
-
-
-@pytest.mark.parametrize("order", [1, 2, 3, 4, 7])
-def test_the_share_of_noise_is_the_mean_of_the_squared_lagrange_polynomials(order):
-    nodes = chebyshev_nodes(order + 1)
-    x, weights = leggauss(order + 2)
-    squares = [np.polyval(lagrange(nodes, unit), x) ** 2 for unit in np.eye(order + 1)]
-    one_variable = np.sum(squares, axis=0) @ weights / 2.0
-    assert noise_share(order, 1) == pytest.approx(one_variable, rel=1e-10)
-    assert noise_share(order) == pytest.approx(one_variable**5, rel=1e-10)
-
-
-@pytest.mark.parametrize("order", TABLE_5)
-def test_simulated_noise_has_that_share(order):
-    random_state = np.random.default_rng(order)
-    variances = []
-    for points in cubes(40, 100):
-        noise = random_state.standard_normal((order + 1) ** 5)
-        surrogate = ChebyshevSurrogate.fit(lambda nodes, n=noise: n, CUBE, order)
-        variances.append(np.mean(surrogate(points) ** 2))
-    error = np.std(variances, ddof=1) / np.sqrt(len(variances))
-    assert abs(np.mean(variances) - noise_share(order)) < 4.0 * error
 
 
 def test_a_cardinal_function_is_what_one_faulty_run_adds_to_the_surrogate():
@@ -95,18 +68,6 @@ def test_no_noise_makes_the_higher_order_as_much_worse_as_printed():
     printed = TABLE_5[LOW].rmse_arcsec / TABLE_5[HIGH].rmse_arcsec
     assert np.mean(ratios) >= bound
     assert min(ratios) > printed
-
-
-def test_noise_adds_its_share_to_the_mean_square_of_the_error():
-    points = cubes(10)
-    errors = {
-        ("smooth", order): np.full((len(points), len(points[0])), 1.0 / order) for order in TABLE_5
-    }
-    for effect in noise_effects(errors, points):
-        for order, rmse in effect.simulated.items():
-            expected = np.sqrt(1.0 / order**2 + noise_share(order) * effect.noise_arcsec**2)
-            assert effect.closed_form[order] == pytest.approx(expected)
-            assert rmse == pytest.approx(expected, rel=0.02)
 
 
 def test_every_explanation_gives_the_printed_rmse():
