@@ -105,6 +105,11 @@ class Candidate:
         return self.name, self.port
 
     @property
+    def is_value(self) -> bool:
+        """Whether it is a value of the base, released or under the name of an effect."""
+        return self.releases is not None or bool(self.effect and self.effect.covers)
+
+    @property
     def places(self) -> frozenset[Place]:
         """Places of its effects in a drive model; each place takes one effect of a name."""
         return frozenset(place_of(effect) for effect in self.build(self.starts[0]))

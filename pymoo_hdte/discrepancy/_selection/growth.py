@@ -126,7 +126,7 @@ class Weighed:
             self.score.ln,
             self.outside,
             self.worst_chance,
-            bool(named) and all(map(_is_value, named)),
+            bool(named) and all(candidate.is_value for candidate in named),
         )
 
 
@@ -154,6 +154,7 @@ class Growth:
     _extended: set[frozenset[str]] = field(default_factory=set)
     _complete: set[frozenset[str]] = field(default_factory=set)
     _signatures: dict[str, Screened] = field(default_factory=dict)
+    _outside: dict[Weighed, Weighed] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self.counts = Counter(candidate.name for candidate in self.candidates)
@@ -197,9 +198,17 @@ class Growth:
     def decide(self) -> tuple[Decision, list[Weighed]]:
         """Return what is said, and all sets with and without something outside of the library."""
         ranked = self.ranked
+        best = ranked[0]
+        # Far behind the likeliest set only one without some of its members may gain by that.
+        near = [
+            weighed
+            for weighed in ranked
+            if weighed.weight >= best.weight - WINDOW
+            or label_of(weighed.candidates) < label_of(best.candidates)
+        ]
         looked_beside = [
             weighed
-            for number, weighed in enumerate(ranked)
+            for number, weighed in enumerate(near)
             if number < MOST_OUTSIDE or not weighed.candidates
         ]
         every = sorted(
@@ -368,15 +377,17 @@ class Growth:
 
     def _with_outside(self, weighed: Weighed) -> Weighed:
         """Return a set with something outside of the library as well."""
-        score, places = score_with_outside(weighed.linearised, self.errors.outside)
-        return replace(
-            weighed,
-            score=score,
-            prior=self._prior(weighed.candidates, True),
-            worst_chance=score.worst_chance(self.errors.groups),
-            outside=True,
-            places=tuple(places),
-        )
+        if weighed not in self._outside:
+            score, places = score_with_outside(weighed.linearised, self.errors.outside)
+            self._outside[weighed] = replace(
+                weighed,
+                score=score,
+                prior=self._prior(weighed.candidates, True),
+                worst_chance=score.worst_chance(self.errors.groups),
+                outside=True,
+                places=tuple(places),
+            )
+        return self._outside[weighed]
 
     def _prior(self, members: Sequence[Candidate], outside: bool = False) -> float:
         """Return the logarithm of the prior odds of a set against nothing."""
@@ -387,11 +398,6 @@ class Growth:
     def _as_hypothesis(self, fitted: Fit) -> Hypothesis:
         excess = max(self.base.chi_square - len(self.base.residuals), 1.0)
         return hypothesis_of(fitted, excess)
-
-
-def _is_value(member: Candidate) -> bool:
-    """Tell whether a member is a value of the base, released or under the name of an effect."""
-    return member.releases is not None or bool(member.effect and member.effect.covers)
 
 
 def _size(members: Sequence[Candidate]) -> int:

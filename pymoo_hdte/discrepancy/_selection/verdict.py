@@ -122,7 +122,9 @@ class Verdict:
             return "class"
         if self.reasons:
             return "partial"
-        out = all(candidate.name == "parameter" for candidate in chosen.candidates)
+        values_only = all(candidate.is_value for candidate in chosen.candidates)
+        # One value that an effect covers is that effect.
+        out = values_only and any(name == "parameter" for name, _ in chosen.names)
         return "parameter" if out else "named"
 
     @property
