@@ -491,12 +491,15 @@ class Integral:
         left = (self.shift + self.columns @ mean) / by_row
         gains = np.full(len(places), -np.inf)
         every = np.column_stack([part.columns for part in places]) / by_row[:, None]
-        beyond = every - scaled @ (covariance @ (scaled.T @ every))
+        shared = scaled.T @ every
+        followed = covariance @ shared
         ends = np.cumsum([0, *(part.columns.shape[1] for part in places)])
         for number, part in enumerate(places):
             place = slice(ends[number], ends[number + 1])
-            along = -every[:, place].T @ left
-            values, vectors = np.linalg.eigh(every[:, place].T @ beyond[:, place])
+            columns = every[:, place]
+            along = -columns.T @ left
+            curvature = columns.T @ columns - shared[:, place].T @ followed[:, place]
+            values, vectors = np.linalg.eigh(curvature)
             values = np.maximum(values, 0.0)
             least = part.least
             if part.cut:
@@ -510,7 +513,7 @@ class Integral:
             gains[number], _, at = _mean_over_scales(grid, values, projected**2, cut, one_sided)
             if renewed:
                 sizes = vectors @ (projected / (values + np.exp(-2.0 * at)))
-                after = left + beyond[:, place] @ sizes
+                after = left + columns @ sizes - scaled @ (followed[:, place] @ sizes)
                 gains[number] += self._gain_of_noise(after, covariance)
         return gains
 
