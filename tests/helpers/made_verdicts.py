@@ -40,5 +40,7 @@ def with_status(verdict, status, **content):
 
 def made_set(fit=None, *names, listed=True):
     """Return what stands for a set of effects in a verdict."""
-    candidates = [SimpleNamespace(name=name) for name in names or ("torque_ripple",)]
-    return SimpleNamespace(fit=fit, listed=listed, candidates=candidates)
+    names = names or ("torque_ripple",)
+    candidates = [SimpleNamespace(name=name, is_value=name == "parameter") for name in names]
+    placed = frozenset((name, "") for name in names)
+    return SimpleNamespace(fit=fit, listed=listed, candidates=candidates, names=placed)
