@@ -18,6 +18,10 @@ from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from pymoo_hdte.discrepancy._evidence.order_lines.prediction import Conditions, Prediction
+from pymoo_hdte.discrepancy._evidence.order_lines.wander import (
+    line_variances,
+    wander_of_lines,
+)
 from pymoo_hdte.discrepancy._records.believed import Rig
 from pymoo_hdte.discrepancy._records.campaign import Campaign
 from pymoo_hdte.discrepancy._records.line_fit import (
@@ -59,7 +63,7 @@ class Features:
         Which lines each record shows; by default all.
     wander : ndarray, shape (r, m), optional
         Variance of the lines of the input angle by what the motor does beside its loop, rad2: see
-        `_wander`; by default none.
+        `wander_of_lines`; by default none.
     ends : complex ndarray, shape (r, 2, m), optional
         Lines of the input's acceleration by what is not known of its speed at either end of a
         record, rad/s2: see `unsteady_lines`; by default none.
@@ -147,12 +151,13 @@ def measure(
     )
     wander = np.zeros(shown.shape)
     unsteady, ends = np.zeros((2, len(records), 2, len(all_orders)), dtype=complex)
+    of_lines = wander_of_lines(records, campaign, measured, rules)
     for row, (record, line, of_record) in enumerate(zip(records, measured, shown, strict=True)):
-        wander[row, of_record] = _wander(record, campaign, line, rules)
+        wander[row, of_record] = of_lines[row]
         if wander[row].any():
             rates = unsteady_lines(record, ratio, line)
             unsteady[row][:, of_record], ends[row][:, of_record] = rates
-    noise = np.array([_line_variances(line) for line in lines])
+    noise = np.array([line_variances(line) for line in lines])
     conditions = replace(
         conditions,
         lead=np.array([line.phasors[3] for line in lines]),
@@ -174,43 +179,6 @@ def measure(
         wander,
         ends,
     )
-
-
-def _line_variances(line: OrderLines) -> NDArray[np.float64]:
-    """Return the variances of the lines of the input angle by its sensor, rad2, shape (m,)."""
-    variances = np.diag(line.covariance[3])[1:]
-    return np.asarray((variances[: len(line.orders)] + variances[len(line.orders) :]) / 2.0)
-
-
-def _wander(
-    record: RunningRecord,
-    campaign: Campaign,
-    line: OrderLines,
-    rules: Rules,
-) -> NDArray[np.float64]:
-    """Return the variance of the lines of the input angle beside their noise, rad2, shape (m,).
-
-    Nobody holds a set speed exactly. What the input does between the lines, it does in them as
-    well: the neighbours tell how much. A set point that goes in steps has a speed whose power falls
-    as the square of the frequency, and an angle as its fourth power.
-    """
-    orders = line.orders
-    searched, amplitudes = residual_spectrum(
-        record, campaign.rig, campaign.believed.ratio, orders, rules.highest_order
-    )
-    power, variances = amplitudes[3] ** 2, _line_variances(line)
-    excess, seen = np.zeros(len(orders)), np.zeros(len(orders), dtype=bool)
-    for place, order in enumerate(orders):
-        middle = int(np.searchsorted(searched, order))
-        near = slice(max(middle - _NEIGHBOURS, 0), middle + _NEIGHBOURS)
-        count = len(searched[near])
-        if not count:
-            continue
-        # The power of each neighbour is exponential under noise, with mean 1.
-        chance = rules.unexpected_line_chance / len(orders)
-        seen[place] = power[near].sum() > chi2.isf(chance, 2 * count) / 2.0
-        excess[place] = np.mean((power[near] - 1.0) * (searched[near] / order) ** 4)
-    return np.maximum(excess, 0.0) * variances if seen.any() else np.zeros(len(orders))
 
 
 def _at_all_orders(
