@@ -60,7 +60,7 @@ TOLD_AS: Mapping[str, frozenset[str]] = {
     "gravity": frozenset({"torque_ripple", "gravity"}),
     "warming": frozenset({"warming"}),
     "drift": frozenset({"input_torque_drift", "output_torque_drift"}),
-    "zeros": frozenset({"new_input_torque_zero", "new_output_torque_zero"}),
+    "zeros": frozenset({"new_zero", "new_input_torque_zero", "new_output_torque_zero"}),
     "saturation": frozenset({SATURATED}),
     "resolution": frozenset({COARSE}),
 }

@@ -230,5 +230,6 @@ register(
         _new_zero,
         change=NewZero,
         exact=True,
+        nuisance_at=("sensor",),
     )
 )

@@ -11,7 +11,6 @@ from pymoo_hdte.discrepancy._selection import fitted_sets
 from pymoo_hdte.discrepancy._selection.fitting import fit
 from pymoo_hdte.discrepancy._selection.rules import RULES
 from pymoo_hdte.discrepancy._verdicts.drive import examine_drive
-from pymoo_hdte.drive import NewZero
 from pymoo_hdte.units import ARCSEC
 
 
@@ -67,11 +66,9 @@ def test_a_small_change_of_the_zero_is_no_drift():
         replace(one, output_angle=one.output_angle + ARCSEC) if one.elapsed > 65.0 else one
         for one in clean.running
     ]
-    verdict = examine_drive(replace(clean, running=tuple(moved))).verdict
-    assert verdict.status == "named"
-    (change,) = verdict.chosen.fit.effects
-    assert isinstance(change, NewZero)
-    assert change.size == pytest.approx(ARCSEC, rel=0.3)
+    finding = examine_drive(replace(clean, running=tuple(moved)))
+    assert finding.verdict.status == "adequate"
+    assert "new_zero" in {nuisance.name for nuisance, _ in finding.nuisances}
 
 
 @pytest.mark.nightly

@@ -249,8 +249,8 @@ def test_the_motor_carries_friction_from_the_start():
 
 def test_every_listed_effect_of_the_library_is_hidden_and_has_foreign_forms():
     names = {one.name for one in drive_effects() if not one.is_of_bench}
-    # Changes of a zero are faults of rows, and these campaigns have no temperatures.
-    never = {"new_zero", "temperature_dependent_friction"}
+    # These campaigns have no temperatures.
+    never = {"temperature_dependent_friction"}
     # These joined the library after the last cases were drawn.
     never |= {"load_dependent_error", "load_dependent_damping", "gravity"}
     never |= {"changed_static_error", "uneven_load_sharing"}

@@ -388,15 +388,15 @@ class _Hidden:
 
 
 def test_an_answer_that_the_bench_never_hides_has_its_place_in_the_confusion_matrix():
-    """The picture of a block of cases failed at a new zero of a sensor."""
+    """The picture of a block of cases failed at such an effect."""
     outcomes = [
-        Outcome(CLEAN, "named", ("new_zero:sensor",)),
+        Outcome(CLEAN, "named", ("changed_static_error:mesh",)),
         Outcome(ECCENTRIC, "named", ("eccentricity:sensor",)),
     ]
     (axis,) = confusion_matrix(outcomes).axes
     answers = [one.get_text() for one in axis.get_xticklabels()]
     places = {answers[round(one.get_position()[0])] for one in axis.texts}
-    assert places == {"new zero", "eccentricity"}
+    assert places == {"changed static error", "eccentricity"}
 
 
 def test_numbers_of_a_case_give_its_scores():
