@@ -28,7 +28,11 @@ from pymoo_hdte._runner.result import Finding, Result, significant
 OURS = "AMP-MOPSO"
 
 CONFIRMED = 0.5
-"""An advantage agrees with the paper's if it is significant and at least this share of it."""
+"""An advantage agrees with the paper's if it is significant and at least this share of it: it is
+nearer to the paper's than to none."""
+SAME_TIME = 1.1
+"""Slowest over fastest mean time that counts as the same, set by hand: three times the 3.3 % by
+which the paper's times differ."""
 
 SETTING = """\
 Every run spends 100 x 100 evaluations, the budget that the paper states; what is found holds for \
@@ -127,7 +131,7 @@ def _time_finding(comparison: Comparison) -> Finding:
     paper = [row.seconds for row in TABLE_7.values()]
     paper_spread = max(paper) / min(paper)
     return Finding(
-        spread < 1.1,
+        spread < SAME_TIME,
         f"On {comparison.model}, {OURS} takes {significant(ours[OURS], 2)} s a run against "
         f"{TABLE_7[OURS].seconds} s in the paper, and the slowest algorithm takes "
         f"{significant(spread, 2)} times as long as the fastest (paper: "

@@ -30,8 +30,6 @@ _WORDS = {
     "cam_class": "tolerance class of the cam",
     "tooth_class": "tolerance class of the teeth",
 }
-WEIGHTY = 0.05
-"""Share of the gain that an estimate must move to be worth a measurement; set by hand."""
 
 
 def write_decision(decision: Decision, notes: Sequence[str], out: Path) -> dict[str, Any]:
@@ -112,16 +110,14 @@ def sentences(decision: Decision) -> list[str]:
 
 def _to_measure(decision: Decision) -> str:
     """Say which figures decide whether the change pays."""
-    width = max(abs(decision.before.mean - decision.after.mean), 1e-9)
-    weighty = [name for name, moved in decision.gain_changes.items() if moved > WEIGHTY * width][:2]
+    least = LITTLE * decision.before.mean
+    weighty = [name for name, moved in decision.gain_changes.items() if moved > least][:2]
     if weighty:
-        first = f"Measure first: {' and '.join(weighty)}, on which the gain depends most."
-    else:
-        first = (
-            f"No estimate moves the gain by {100.0 * WEIGHTY:g} % of it. What is to be measured "
-            "is the DTE itself, before and after the first change."
-        )
-    return first
+        return f"Measure first: {' and '.join(weighty)}, on which the gain depends most."
+    return (
+        f"No estimate moves the gain by {100.0 * LITTLE:g} % of the DTE. What is to be measured is "
+        "the DTE itself, before and after the first change."
+    )
 
 
 def _of_found(decision: Decision) -> str:

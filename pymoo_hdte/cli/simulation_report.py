@@ -18,7 +18,7 @@ from pymoo_hdte._reports.html import change, number, page
 from pymoo_hdte.cli.command import heading
 from pymoo_hdte.cli.drive_arguments import near_resonances
 from pymoo_hdte.cli.simulation import FASTEST, Simulation
-from pymoo_hdte.drive import OperatingMap
+from pymoo_hdte.drive import Comparison, OperatingMap
 from pymoo_hdte.drive.catalogue import figure_text
 from pymoo_hdte.drive.dte_map import DIRECTIONS, neighbouring_resonances
 from pymoo_hdte.units import ARCSEC, REVOLUTION_PER_MINUTE
@@ -149,14 +149,32 @@ def sentences(simulation: Simulation) -> list[str]:
         _torques(simulation),
     ]
     if simulation.printed:
-        off = [c.figure.name for c in simulation.printed if not c.holds]
-        said.append(
-            f"Of {len(simulation.printed)} printed figures that were not entered, the model meets "
-            f"{len(simulation.printed) - len(off)}"
-            + (f"; it does not meet {', '.join(off)}." if off else ".")
-        )
+        said.append(_of_printed(simulation.printed))
     if simulation.map is not None:
         said.append(_of_map(simulation.map))
+    return said
+
+
+def _of_printed(printed: Sequence[Comparison]) -> str:
+    """Say how many printed figures are met, and which are not."""
+    off = [
+        f"{comparison.figure.name.replace('_', ' ')} "
+        f"({figure_text(comparison.figure.name, comparison.value)} against "
+        f"{'at most ' if comparison.figure.limit else ''}"
+        f"{figure_text(comparison.figure.name, comparison.figure.value)})"
+        for comparison in printed
+        if not comparison.holds
+    ]
+    said = (
+        f"Of {len(printed)} printed figures that were not entered, the model meets "
+        f"{len(printed) - len(off)}" + (f"; it does not meet {', '.join(off)}." if off else ".")
+    )
+    accuracy = [c for c in printed if c.figure.name == "transmission_accuracy" and not c.holds]
+    if accuracy:
+        said += (
+            " The accuracy follows from the errors of the parts. No page prints them, and those of "
+            "the HS-20-100 stand in: enter the printed accuracy below [catalogue]."
+        )
     return said
 
 
