@@ -104,17 +104,3 @@ def test_the_citation_is_that_of_this_version():
     ):
         assert version == pymoo_hdte.__version__
     assert re.search("doi: (.*)", cff)[1] in page
-
-
-def test_pictures_of_gallery_and_front_page_are_drawn_by_scripts():
-    gallery = (DOCS / "gallery.md").read_text(encoding="utf-8")
-    pictures = re.findall(r"!\[[^]]+\]\((.*?)\)", gallery)
-    assert len(pictures) >= 10
-    for picture in pictures:
-        guide = re.search(r"sphx_glr_(\w+)_\d{3}\.png$", picture)
-        if guide:
-            assert (DOCS / "guides" / f"{guide[1]}.py").is_file()
-        else:
-            assert (DOCS / picture).is_file()
-    for script in re.findall(r"{download}`(?:.*?<)?(.*?)>?`", gallery):
-        assert (DOCS / script).is_file()
