@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from pymoo_hdte._io.fields import Fields
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.drive import Eccentricity, NewZero, ThermalDrift, harmonic_balance, preset
-from pymoo_hdte.drive._effects import drive_effects, effect_from_fields
+from pymoo_hdte.drive._effects import Session, drive_effects, effect_from_fields
 from pymoo_hdte.units import ARCSEC
 
 EFFECTS = [
@@ -23,41 +23,25 @@ phases = st.floats(-np.pi, np.pi)
 
 @given(phases, st.floats(0.0, 1e-4), st.integers(1, 30))
 def test_a_disc_adds_one_line_of_its_order(phase, amplitude, order):
-    angle = 2.0 * np.pi * np.arange(64) / 64
-    lines = np.fft.rfft(Eccentricity(amplitude, phase, order).reading(angle, 0.0)) / 32
-    assert lines[order] == pytest.approx(amplitude * np.exp(1j * phase), abs=1e-17)
-    assert np.delete(lines, order) == pytest.approx(0.0, abs=1e-17)
-
-
-@given(st.floats(0.0, 1e3), st.floats(-np.pi, np.pi))
-def test_clocking_the_encoder_turns_the_phase(time, turn):
-    """Only this tells it from a once-per-turn error of the drive."""
-    angle = np.linspace(0.0, 7.0, 50)
-    clocked = Eccentricity(1e-5, 0.3).reading(angle + turn, time)
-    assert clocked == pytest.approx(Eccentricity(1e-5, 0.3 + turn).reading(angle, time), abs=1e-18)
-
-
-def test_drift_grows_with_the_session_and_not_with_the_angle():
-    drift = ThermalDrift(3e-9)
-    angle = np.linspace(0.0, 6.0, 5)
-    elapsed = np.array([0.0, 1.0, 10.0, 100.0, 1000.0])
-    assert drift.reading(angle, elapsed) == pytest.approx(3e-9 * elapsed)
-    assert drift.reading(angle, 500.0) == pytest.approx(np.full(5, 1.5e-6))
+    session = Session(np.arange(1, 31) / 101.0, 101.0, np.zeros(1), np.zeros((1, 3, 31)))
+    mean, lines = Eccentricity(amplitude, phase, order).reading_lines(session)
+    assert mean == 0.0
+    assert lines[0, order - 1] == pytest.approx(amplitude * np.exp(1j * phase))
+    assert np.count_nonzero(np.delete(lines, order - 1)) == 0
 
 
 def test_a_new_zero_holds_from_its_time_on():
-    angle, elapsed = np.linspace(0.0, 6.0, 4), np.array([0.0, 599.0, 600.0, 1e4])
-    read = NewZero(1e-5, 600.0).reading(angle, elapsed)
+    read = NewZero(1e-5, 600.0).added(np.array([0.0, 599.0, 600.0, 1e4]))
     np.testing.assert_array_equal(read, [0.0, 0.0, 1e-5, 1e-5])
 
 
 @given(st.floats(100.0, 1e4), st.floats(0.0, 1e4))
 def test_a_drift_that_settles_starts_at_its_rate_and_bends(time, elapsed):
     drift, steady = ThermalDrift(3e-9, time), ThermalDrift(3e-9)
-    assert drift.after(1e-6 * time) == pytest.approx(steady.after(1e-6 * time), rel=2e-6)
-    assert drift.after(50.0 * time) == pytest.approx(3e-9 * time)
+    assert drift.added(1e-6 * time) == pytest.approx(steady.added(1e-6 * time), rel=2e-6)
+    assert drift.added(50.0 * time) == pytest.approx(3e-9 * time)
     step = 1e-2 * time
-    near = drift.after(elapsed + step * np.arange(-2, 3))
+    near = drift.added(elapsed + step * np.arange(-2, 3))
     second, third, fourth = drift.bends(np.array([elapsed]))[:, 0]
     scale = abs(second)
     assert np.diff(near[1:4], 2)[0] / step**2 == pytest.approx(

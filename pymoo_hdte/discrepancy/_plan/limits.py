@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -114,12 +114,6 @@ class PlanLimits:
     def believed(self, model: DriveModel) -> BelievedDrive:
         """Return a drive model with these tolerances; errors are those of `believed_of_model`."""
         return believed_of_model(model, self.tolerance, self.error_tolerance, self.tolerances)
-
-    def with_noise(self, factor: float) -> PlanLimits:
-        """Return the same limits with all noise of the sensors multiplied by a factor."""
-        names = ("angle_noise", "input_torque_noise", "output_torque_noise", "torsion_angle_noise")
-        noisier = {name: factor * getattr(self.rig, name) for name in names}
-        return replace(self, rig=replace(self.rig, **noisier))
 
 
 def read_limits(path: str | Path) -> PlanLimits:

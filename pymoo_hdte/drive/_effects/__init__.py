@@ -11,21 +11,22 @@ from pymoo_hdte.drive._effects.base import (
 )
 from pymoo_hdte.drive._effects.bench_resonance import BenchResonance
 from pymoo_hdte.drive._effects.encoder import ENCODER_LINE, Eccentricity
-from pymoo_hdte.drive._effects.encoder_zero import NewZero, ThermalDrift
 from pymoo_hdte.drive._effects.load_damping import LoadDamping
 from pymoo_hdte.drive._effects.load_error import LoadDependentError
 from pymoo_hdte.drive._effects.load_shaft import LoadShaft
 from pymoo_hdte.drive._effects.mesh_stiffness import MeshStiffnessVariation
 from pymoo_hdte.drive._effects.presliding import PreslidingFriction
-from pymoo_hdte.drive._effects.series_error import ChangedStaticError
-from pymoo_hdte.drive._effects.shafts import CoupledInertia, DampingReference, LoadInertia
-from pymoo_hdte.drive._effects.static_error import KinematicErrorLine, KinematicReaction
-from pymoo_hdte.drive._effects.torque_sensors import (
+from pymoo_hdte.drive._effects.sensor_zero import (
     InputTorqueDrift,
     NewInputTorqueZero,
     NewOutputTorqueZero,
+    NewZero,
     OutputTorqueDrift,
+    ThermalDrift,
 )
+from pymoo_hdte.drive._effects.series_error import ChangedStaticError
+from pymoo_hdte.drive._effects.shafts import CoupledInertia, DampingReference, LoadInertia
+from pymoo_hdte.drive._effects.static_error import KinematicErrorLine, KinematicReaction
 from pymoo_hdte.drive._effects.warming import WarmingFriction
 
 __all__ = [

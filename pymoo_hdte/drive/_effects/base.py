@@ -131,23 +131,6 @@ class DriveEffect:
         """Return port and law, where the effect is a law at a port."""
         return None
 
-    def reading(self, output_angle: Values, elapsed: Values | float) -> Values | None:
-        """Return what is added to the reading of true output angles, or None for nothing.
-
-        Parameters
-        ----------
-        output_angle : ndarray, shape (n,)
-            rad.
-        elapsed : float or ndarray, shape (n,)
-            Time of the session, s.
-
-        Returns
-        -------
-        ndarray, shape (n,), or None
-            rad.
-        """
-        return None
-
     def reading_lines(self, records: Session) -> tuple[Values, Lines] | None:
         """Return what is added to the reading of the output angle, or None for nothing.
 

@@ -54,23 +54,6 @@ class Eccentricity(DriveEffect):
     def __post_init__(self) -> None:
         check_line(self)
 
-    def reading(self, output_angle: Values, elapsed: Values | float) -> Values:
-        """Return what is added to the reading of true output angles.
-
-        Parameters
-        ----------
-        output_angle : ndarray, shape (n,)
-            rad.
-        elapsed : float or ndarray, shape (n,)
-            Time of the session, s; not used.
-
-        Returns
-        -------
-        ndarray, shape (n,)
-            rad.
-        """
-        return np.asarray(self.amplitude * np.cos(self.order * output_angle + self.phase))
-
     def reading_lines(self, records: Session) -> tuple[Values, Lines]:
         """Return means (r,) and lines (r, m) of what is added to the reading, rad.
 
