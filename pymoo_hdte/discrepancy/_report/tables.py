@@ -17,7 +17,6 @@ from pymoo_hdte.discrepancy._evidence.order_lines.parameters import (
 from pymoo_hdte.discrepancy._records.campaign import Campaign
 from pymoo_hdte.discrepancy._records.cleaning.findings import (
     FAILED,
-    UNITS,
     NoiseFinding,
     RowFault,
     RowFindings,
@@ -289,32 +288,6 @@ _NOUNS = {
 }
 
 
-@dataclass(frozen=True)
-class FaultRow:
-    """A fault as the page shows it; angles in arcsec."""
-
-    record: str
-    kind: str
-    channel: str
-    row: int
-    rows: int
-    size: float
-    unit: str
-    treatment: str
-
-
-@dataclass(frozen=True)
-class NoiseRow:
-    """A noise as the page shows it; angles in arcsec."""
-
-    name: str
-    stated: float
-    found: float | None
-    used: float
-    unit: str
-    reason: str
-
-
 def rows_sentence(findings: RowFindings) -> str:
     """Return what was wrong with rows and stated noise, in words; empty if nothing was."""
     words = []
@@ -371,42 +344,32 @@ def _treatment(findings: RowFindings) -> str:
     return "; ".join(done) or "nothing had to be left out"
 
 
-def fault_rows(findings: RowFindings) -> list[FaultRow]:
-    """Return the faults of the page."""
-    return [_fault_row(fault) for fault in findings.faults[:_MOST_FAULTS]]
+def fault_rows(findings: RowFindings) -> list[dict[str, Any]]:
+    """Return the faults of the page, as in the verdict but for words and small angles, arcsec."""
+    rows = []
+    for fault in findings.faults[:_MOST_FAULTS]:
+        row = fault.as_dict()
+        row["channel"] = "all" if fault.channel == "rows" else fault.channel.replace("_", " ")
+        row["kind"] = "repeated rows" if fault.kind == "repeated" else fault.kind
+        # The size of a channel that failed is a reading, and no small angle.
+        rows.append(row if fault.kind in FAILED else _small(row, "size"))
+    return rows
 
 
-def _fault_row(fault: RowFault) -> FaultRow:
-    unit, size = UNITS[fault.channel], fault.size
-    if fault.kind not in FAILED:  # whose size is a reading, and no small angle
-        unit, size = _unit_of(unit, size)
-    channel = "all" if fault.channel == "rows" else fault.channel.replace("_", " ")
-    kind = "repeated rows" if fault.kind == "repeated" else fault.kind
-    return FaultRow(
-        fault.record, kind, channel, fault.row + 1, fault.rows, size, unit, fault.treatment
-    )
+def noise_rows(findings: RowFindings) -> list[dict[str, Any]]:
+    """Return stated and found noise; angles in arcsec."""
+    return [
+        _small(finding.as_dict() | {"name": _name(finding)}, "stated", "found", "used")
+        for finding in findings.noise
+    ]
 
 
-def noise_rows(findings: RowFindings) -> list[NoiseRow]:
-    """Return stated and found noise."""
-    return [_noise_row(finding) for finding in findings.noise]
-
-
-def _noise_row(finding: NoiseFinding) -> NoiseRow:
-    unit, stated = _unit_of(finding.unit, finding.stated)
-    estimate = None if finding.found is None else _unit_of(finding.unit, finding.found)[1]
-    return NoiseRow(
-        _name(finding),
-        stated,
-        estimate,
-        _unit_of(finding.unit, finding.used)[1],
-        unit,
-        finding.reason,
-    )
-
-
-def _unit_of(unit: str, size: float) -> tuple[str, float]:
-    return ("arcsec", size / ARCSEC) if unit == "rad" else (unit, size)
+def _small(row: dict[str, Any], *names: str) -> dict[str, Any]:
+    """Return a row with its angles in arcsec."""
+    if row["unit"] != "rad":
+        return row
+    sizes = {name: row[name] / ARCSEC for name in names if row[name] is not None}
+    return row | sizes | {"unit": "arcsec"}
 
 
 def _name(finding: NoiseFinding) -> str:
