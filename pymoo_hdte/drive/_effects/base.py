@@ -119,9 +119,13 @@ class DriveEffect:
     @property
     def only_reads(self) -> bool:
         """Whether it changes readings only, so that no motion has to be found anew."""
-        kind = type(self)
-        reads = kind.reading_lines is not DriveEffect.reading_lines
-        return reads and kind.apply is DriveEffect.apply
+        reads = type(self).reading_lines is not DriveEffect.reading_lines
+        return reads and not self.changes_motion
+
+    @property
+    def changes_motion(self) -> bool:
+        """Whether the drive moves otherwise, and is not only read otherwise."""
+        return type(self).apply is not DriveEffect.apply
 
     def apply(self, coefficients: Coefficients) -> Coefficients:
         """Return the coefficients with this effect added."""

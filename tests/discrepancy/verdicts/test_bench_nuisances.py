@@ -17,6 +17,7 @@ from pymoo_hdte.drive._effects import (
     InputTorqueDrift,
     LoadShaft,
     NewInputTorqueZero,
+    NewZero,
     WarmingFriction,
 )
 from pymoo_hdte.effects.friction import CoulombFriction
@@ -39,6 +40,7 @@ ALONE = {
     "warming": LawAtPort("warming", "input", WarmingFriction(DAMPING, 0.2, 250.0)),
     "input_torque_drift": InputTorqueDrift(3e-3, 250.0),
     "new_input_torque_zero": NewInputTorqueZero(3e-3, 350.0),
+    "new_zero": NewZero(1e-5, 350.0),
     "bench_resonance": BenchResonance(5e-6, 400.0, 0.05),
     "load_shaft": LoadShaft(1e-5, 1e-5),
 }

@@ -112,7 +112,7 @@ class Bench:
         values : mapping of str to ndarray, shape (v,)
             Parameters of v vectors by name.
         moves : callable
-            Tells whether an effect changes the motion; others only add to readings.
+            Tells whether a nuisance changes the motion; others only add to readings.
         """
         moving, further = Bench(), Bench()
         for nuisance, begin in zip(self.nuisances, self.begins, strict=True):
@@ -122,8 +122,9 @@ class Bench:
                 further = further.with_nuisance(nuisance, begin)
         groups = []
         for rows, effects in of_equal_numbers(known, values):
-            believed = tuple(effect for effect in effects if moves(effect))
-            rest = tuple(effect for effect in effects if not moves(effect))
+            # What is believed may be as strong as any effect of the drive.
+            believed = tuple(effect for effect in effects if effect.changes_motion)
+            rest = tuple(effect for effect in effects if not effect.changes_motion)
             for places, own in moving._of_equal_numbers(values, rows):
                 some = rows[places]
                 parts = further._of_equal_numbers(values, some)

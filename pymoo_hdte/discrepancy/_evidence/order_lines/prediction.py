@@ -178,9 +178,9 @@ def predict(
 
 def _moves(conditions: Conditions, remembers: bool, effect: DriveEffect) -> bool:
     """Tell whether an effect is a part of the equations of motion as they are solved."""
-    if type(effect).apply is DriveEffect.apply:
-        return False
-    return conditions.lead is None or not _is_line_of_bench(effect, remembers)
+    return effect.changes_motion and (
+        conditions.lead is None or not _is_line_of_bench(effect, remembers)
+    )
 
 
 def _remembers(effects: Sequence[DriveEffect]) -> bool:
