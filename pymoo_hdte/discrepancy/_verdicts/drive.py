@@ -19,9 +19,9 @@ from pymoo_hdte.discrepancy._evidence.order_lines.features import (
     unexpected_lines,
     unexpected_orders,
 )
+from pymoo_hdte.discrepancy._evidence.order_lines.folded_lines import motor_orders
 from pymoo_hdte.discrepancy._evidence.order_lines.prediction import coefficients_of
 from pymoo_hdte.discrepancy._evidence.order_lines.sizes import (
-    motor_orders,
     port_sizes,
     scales_of,
 )

@@ -9,6 +9,7 @@ from virtual_rig_cases import BELIEVED, PHASES, RIG, SHORT, effect, true_rig
 from experiments.studies.virtual_rig.rig import run_campaign
 from experiments.studies.virtual_rig.runs import Condition
 from pymoo_hdte.discrepancy._evidence.order_lines.features import measure
+from pymoo_hdte.discrepancy._evidence.order_lines.folded_lines import orders_that_fold
 from pymoo_hdte.discrepancy._evidence.order_lines.parameters import base_parameters
 from pymoo_hdte.discrepancy._evidence.order_lines.prediction import (
     Conditions,
@@ -22,7 +23,7 @@ from pymoo_hdte.drive._effects import MeshStiffnessVariation
 from pymoo_hdte.drive._solve.free_angle import torus_of
 from pymoo_hdte.effects.gravity import Gravity
 from pymoo_hdte.effects.hysteresis import MaxwellSlip
-from pymoo_hdte.effects.ripple import COGGING_ORDERS, PeriodicTorque
+from pymoo_hdte.effects.ripple import PeriodicTorque
 from pymoo_hdte.effects.stiffness import HardeningStiffness
 from pymoo_hdte.units import ARCSEC, REVOLUTION_PER_MINUTE
 
@@ -118,12 +119,19 @@ def test_two_lines_of_the_input_beat_as_its_inertia_has_it(speed):
         assert found == pytest.approx(expected, rel=0.05)
 
 
-@pytest.mark.parametrize("analysed", [[], [24.0]])
-def test_what_a_record_folds_down_it_does_whatever_others_show(analysed):
-    """Two records of one motor: the rows of the first show order 24, those of the other fold it."""
+STATED = replace(QUIET, motor_slots=36, motor_poles=8)
+"""A motor with distributed windings, which is not among the usual ones."""
+
+
+@pytest.mark.parametrize(
+    ("rig", "order", "analysed"), [(QUIET, 24.0, []), (QUIET, 24.0, [24.0]), (STATED, 72.0, [])]
+)
+def test_what_a_record_folds_down_it_does_whatever_others_show(rig, order, analysed):
+    """Two records of one motor: the rows of the first show an order, those of the other fold it."""
     orders = [1.0, 6.0, *analysed]
-    folded = np.zeros((2, len(COGGING_ORDERS), 2, 1 + len(orders)), dtype=complex)
-    folded[1, COGGING_ORDERS.index(24.0), :, 2] = 0.3, 0.3j
+    possible = orders_that_fold(rig)
+    folded = np.zeros((2, len(possible), 2, 1 + len(orders)), dtype=complex)
+    folded[1, possible.index(order), :, 2] = 0.3, 0.3j
     conditions = Conditions(
         np.array([3.0, 200.0]),
         np.zeros(2),
@@ -134,9 +142,9 @@ def test_what_a_record_folds_down_it_does_whatever_others_show(analysed):
     values = {
         one.name: np.array([one.start]) for one in base_parameters(BELIEVED, QUIET, PHASES, 0.0)
     }
-    cogging = LawAtPort("cogging", "input", PeriodicTorque(24.0, 0.4, 2e-3))
+    cogging = LawAtPort("cogging", "input", PeriodicTorque(order, 0.4, 2e-3))
     without, present = (
-        predict(BELIEVED, QUIET, some, orders, values, (cogging,)).phasors[0]
+        predict(BELIEVED, rig, some, orders, values, (cogging,)).phasors[0]
         for some in (conditions, replace(conditions, folded=folded))
     )
     shown = (present - without)[..., :2]

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
+from pymoo_hdte.discrepancy._evidence.order_lines.folded_lines import orders_that_fold
 from pymoo_hdte.discrepancy._evidence.order_lines.prediction import Conditions, Prediction
 from pymoo_hdte.discrepancy._evidence.order_lines.wander import (
     line_variances,
@@ -33,7 +34,6 @@ from pymoo_hdte.discrepancy._records.line_fit import (
 from pymoo_hdte.discrepancy._records.records import RunningRecord
 from pymoo_hdte.discrepancy._records.residual_spectrum import residual_spectrum
 from pymoo_hdte.discrepancy._selection.rules import RULES, Rules
-from pymoo_hdte.effects.ripple import COGGING_ORDERS
 
 _NEIGHBOURS = 4
 """Multiples of 1/N on either side of a line that tell the noise there: a mean of sixteen squares,
@@ -129,7 +129,7 @@ def measure(
     all_orders = np.array(orders)
     shown = np.array([all_orders <= shown_order(record, rules) for record in records])
     measured = [
-        order_lines(record, rig, ratio, all_orders[of_record], COGGING_ORDERS)
+        order_lines(record, rig, ratio, all_orders[of_record], orders_that_fold(rig))
         for record, of_record in zip(records, shown, strict=True)
     ]
     lines = [

@@ -12,15 +12,26 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from pymoo_hdte.drive import Coefficients, DriveEffect, LawAtPort, SpeedLoop, SteadyMotion
+from pymoo_hdte.discrepancy._records.believed import Rig
+from pymoo_hdte.drive import Coefficients, DriveEffect, LawAtPort, SteadyMotion
 from pymoo_hdte.drive._solve.lead_response import lead_response
-from pymoo_hdte.effects.ripple import COGGING_ORDERS, PeriodicTorque
+from pymoo_hdte.effects.ripple import COGGING_ORDERS, PeriodicTorque, cogging_of
 from pymoo_hdte.effects.unknowns import is_among
 
 Lines = NDArray[np.complex128]
 
 
-def beyond_rows(effects: Sequence[DriveEffect], folded: Lines) -> list[PeriodicTorque]:
+def motor_orders(rig: Rig) -> tuple[float, ...]:
+    """Return the orders at which the motor of a bench cogs; none where it is not known."""
+    return cogging_of(rig.motor_slots, rig.motor_poles) if rig.motor_slots else ()
+
+
+def orders_that_fold(rig: Rig) -> tuple[float, ...]:
+    """Return the orders that are looked for above the rows: of its motor, or of any usual one."""
+    return motor_orders(rig) or COGGING_ORDERS
+
+
+def beyond_rows(effects: Sequence[DriveEffect], folded: Lines, rig: Rig) -> list[PeriodicTorque]:
     """Return the lines of a motor that the averaged rows of any record fold down.
 
     Parameters
@@ -28,8 +39,10 @@ def beyond_rows(effects: Sequence[DriveEffect], folded: Lines) -> list[PeriodicT
     effects : sequence of DriveEffect
     folded : ndarray of complex, shape (r, n_orders, 2, 1 + m)
         As of `Conditions`.
+    rig : Rig
     """
-    orders = [COGGING_ORDERS[place] for place in np.unique(np.nonzero(folded)[1])]
+    possible = orders_that_fold(rig)
+    orders = [possible[place] for place in np.unique(np.nonzero(folded)[1])]
     laws = [
         effect.law for effect in effects if isinstance(effect, LawAtPort) and effect.port == "input"
     ]
@@ -44,10 +57,9 @@ def folded_down(
     coefficients: Coefficients,
     balance: SteadyMotion,
     speed: NDArray[np.float64],
-    loop: SpeedLoop,
+    rig: Rig,
     torques: Sequence[PeriodicTorque],
     folded: Lines,
-    at_brake: bool = False,
 ) -> tuple[NDArray[np.float64], Lines]:
     """Return the means (n, 4) and phasors (n, 4, m) that torques of a motor add to readings.
 
@@ -62,28 +74,26 @@ def folded_down(
         Their steady states without these torques.
     speed : ndarray, shape (n,)
         Mean speed of the input, rad/s.
-    loop : SpeedLoop
+    rig : Rig
     torques : sequence of PeriodicTorque
     folded : ndarray of complex, shape (r, n_orders, 2, 1 + m)
         As of `Conditions`.
-    at_brake : bool
-        Whether the sensor of the output's torque stands behind the load's inertia.
     """
     orders = [law.order for law in torques]
     response = lead_response(coefficients, balance.slopes, speed, orders)
-    if at_brake:
+    if rig.output_torque_at == "brake":
         response = response.without_load()
-    held = response.motor_torque + loop.proportional * response.rate + loop.integral
+    held = response.motor_torque + rig.proportional * response.rate + rig.integral
     lead = np.array([law.amplitude * np.exp(1j * law.phase) for law in torques]) / held
     lines = np.concatenate([response.channels * lead[:, None], lead[:, None]], axis=1)
-    places = [int(np.argmin(np.abs(np.subtract(COGGING_ORDERS, order)))) for order in orders]
+    places = [int(np.argmin(np.abs(np.subtract(orders_that_fold(rig), order)))) for order in orders]
     shares = np.tile(folded[:, places], (len(lines) // len(folded), 1, 1, 1))
     parts = np.stack([lines.real, lines.imag], axis=-1)
     added = np.einsum("nckp,nkpm->ncm", parts, shares)
     return added[..., 0].real, added[..., 1:]
 
 
-def folded_orders(folded: Lines | None, least: NDArray[np.float64]) -> tuple[float, ...]:
+def folded_orders(folded: Lines | None, least: NDArray[np.float64], rig: Rig) -> tuple[float, ...]:
     """Return the orders that show in any record more than noise does.
 
     Parameters
@@ -92,9 +102,10 @@ def folded_orders(folded: Lines | None, least: NDArray[np.float64]) -> tuple[flo
         As of `Conditions`.
     least : ndarray, shape (r, m)
         Noise of each line over the size that a line may have there.
+    rig : Rig
     """
     if folded is None:
         return ()
     seen = np.abs(folded[..., 1:]).max(axis=2) > least[:, None]
-    shown = seen.any(axis=(0, 2))
-    return tuple(order for order, is_shown in zip(COGGING_ORDERS, shown, strict=True) if is_shown)
+    possible = np.array(orders_that_fold(rig))
+    return tuple(possible[seen.any(axis=(0, 2))].tolist())

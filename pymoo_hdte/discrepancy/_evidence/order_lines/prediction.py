@@ -29,7 +29,6 @@ from pymoo_hdte.discrepancy._records.line_fit import CHANNELS
 from pymoo_hdte.drive import (
     Coefficients,
     DriveEffect,
-    SpeedLoop,
     SteadyMotion,
 )
 from pymoo_hdte.drive._effects import Session
@@ -78,8 +77,8 @@ class Conditions:
         Lines of the input's speed and acceleration beyond those of a steady motion, rad/s and
         rad/s2: see `unsteady_lines`; by default none.
     folded : complex ndarray, shape (r, k, 2, 1 + m), optional
-        Contribution of what a motor does at `COGGING_ORDERS` beyond those that the rows of a record
-        show, see `OrderLines`; by default none.
+        Contribution of what a motor does at `orders_that_fold` beyond those that the rows of a
+        record show, see `OrderLines`; by default none.
     """
 
     input_speed: NDArray[np.float64]
@@ -287,13 +286,12 @@ def _predict_group(
     for places, further in parts:
         some = {name: values[name][places] for name in READING}
         readings = mean[places], phasors[places]
-        if conditions.folded is not None and (beyond := beyond_rows(further, conditions.folded)):
+        by_rows = conditions.folded
+        if by_rows is not None and (beyond := beyond_rows(further, by_rows, rig)):
             rows = _cases(places, records)
-            held_by = SpeedLoop(rig.proportional, rig.integral)
             folded = folded_down(
-                under_load.rows(rows), balance.rows(rows), speed[rows], held_by,
-                beyond, conditions.folded, at_brake,
-            )  # fmt: skip
+                under_load.rows(rows), balance.rows(rows), speed[rows], rig, beyond, by_rows
+            )
             for reading, added in zip(readings, folded, strict=True):
                 reading += added.reshape(reading.shape)
         _add_sensor_errors(believed.ratio, conditions, orders, some, (*moving, *further), *readings)

@@ -15,12 +15,11 @@ from numpy.typing import NDArray
 
 from pymoo_hdte.discrepancy._evidence.order_lines.evidence import Data
 from pymoo_hdte.discrepancy._evidence.order_lines.features import MEANS, Features
-from pymoo_hdte.discrepancy._evidence.order_lines.folded_lines import folded_orders
-from pymoo_hdte.discrepancy._records.believed import BelievedDrive, Rig
+from pymoo_hdte.discrepancy._evidence.order_lines.folded_lines import folded_orders, motor_orders
+from pymoo_hdte.discrepancy._records.believed import BelievedDrive
 from pymoo_hdte.discrepancy._records.cleaning.session_zero import places_of_change
 from pymoo_hdte.discrepancy._selection.fitting import Fit
 from pymoo_hdte.drive._effects import DriveSizes
-from pymoo_hdte.effects.ripple import cogging_of
 
 LARGEST = 5.0
 """Largest missing line of the transmission error, in units of the residual of the base: the base
@@ -118,13 +117,10 @@ def scales_of(data: Data, base: Fit) -> Scales:
         swept=bool(data.torsion),
         loads_differ=bool(np.ptp(when.output_torque) > least),
         motor=motor_orders(data.campaign.rig),
-        folded=folded_orders(when.folded, noise[:, features.places(1)].min(axis=2) / input_torque),
+        folded=folded_orders(
+            when.folded, noise[:, features.places(1)].min(axis=2) / input_torque, data.campaign.rig
+        ),
     )
-
-
-def motor_orders(rig: Rig) -> tuple[float, ...]:
-    """Return the orders at which the motor of a bench cogs; none where it is not known."""
-    return cogging_of(rig.motor_slots, rig.motor_poles) if rig.motor_slots else ()
 
 
 def _temperature(data: Data) -> float:
