@@ -154,7 +154,15 @@ BBOB_PEERS: dict[str, Contestant] = {
         starts_anew=PEERS[name].starts_anew and name != OURS,
     )
     for name, make in MADE.items()
-} | {"COMO-CMA-ES": PEERS["COMO-CMA-ES"]}
+} | {
+    "COMO-CMA-ES": PEERS["COMO-CMA-ES"],
+    **{
+        name + SIZED: Contestant(
+            "pymoo", partial(_sized, partial(make, sampling=StartBox())), starts_anew=True
+        )
+        for name, make in RIVALS.items()
+    },
+}
 """On bbob-biobj, where first positions lie in a part of the box: those that can be told so."""
 
 ON_BBOB: dict[str, Contestant] = BBOB_PEERS | {
