@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import math
 import warnings
 from typing import Any
 
@@ -37,7 +38,7 @@ def size_for(evaluations: float) -> int:
     Particles and generations then grow alike: 11 particles after 500 evaluations, 22 after 2,000,
     50 after 10,000 and 79 after 25,000.
     """
-    return int(np.clip(np.sqrt(min(evaluations, 1e9)) / 2.0, SMALLEST, LARGEST).round())
+    return round(min(max(math.sqrt(min(evaluations, 1e9)) / 2.0, SMALLEST), LARGEST))
 
 
 def evaluations_of(generations: int) -> int:

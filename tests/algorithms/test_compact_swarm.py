@@ -67,8 +67,10 @@ def test_models_learn_every_evaluated_point_once_and_in_its_turn(kwargs):
     algorithm = run(problem, 300, **kwargs).algorithm
     (model,) = (move for move in algorithm.moves if isinstance(move, ModelStep))
     asked = np.vstack(algorithm.problem.asked)
-    np.testing.assert_array_equal(model._known().X, asked)
-    np.testing.assert_array_equal(model._known().F, Parabolas().evaluate(asked))
+    first, *others = model._known()
+    known = first.followed_by(*others)
+    np.testing.assert_array_equal(known.X, asked)
+    np.testing.assert_array_equal(known.F, Parabolas().evaluate(asked))
 
 
 # --- result and archive ---------------------------------------------------------------------------
@@ -387,6 +389,16 @@ def test_a_history_takes_at_most_three_times_the_memory_of_nsga2_s():
         sizes.append(tracemalloc.get_traced_memory()[0] if history else 0)
         tracemalloc.stop()
     assert 0 < sizes[0] <= 3 * sizes[1]
+
+
+def test_with_many_variables_no_matrix_has_them_all():
+    n_var = 2000
+    run("zdt1", 20, make=CompactSwarm)  # what is loaded once is no part of it
+    tracemalloc.start()
+    run(get_problem("zdt1", n_var=n_var), 100, make=CompactSwarm)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 8 * n_var**2
 
 
 def test_a_number_of_generations_is_told_in_evaluations():
