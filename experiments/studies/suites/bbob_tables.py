@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from itertools import product
 from pathlib import Path
 from typing import NamedTuple
 
@@ -13,7 +14,7 @@ from experiments.comparing.rivals import RivalTest, holm_against
 from experiments.runner.committed import read_rows
 from experiments.studies.suites.data import Outcome
 from experiments.studies.suites.peers import BBOB_PEERS, ON_BBOB, OURS
-from experiments.studies.suites.protocol import BESIDE_PEERS, BUDGETS, DIMENSIONS
+from experiments.studies.suites.protocol import BESIDE_BEST, BESIDE_PEERS, BUDGETS, DIMENSIONS
 from pymoo_hdte._runner.result import Cell, Column, Table
 
 ANCHORS = Path(__file__).resolve().parents[5] / "shared" / "anchors" / "bbob_biobj.csv"
@@ -58,18 +59,25 @@ def _of_the_right_year(row: dict[str, str]) -> bool:
     return row["year"] == ("2017" if row["algorithm"] == "SMS-EMOA-" else "2016")
 
 
-def reached_shares(outcome: Outcome, dimension: int, evaluations: int) -> list[float]:
-    """Return the share of our swarm after so many evaluations on each function that was run.
+def shares_of(
+    outcome: Outcome, dimension: int, algorithm: str, instance: int, evaluations: int
+) -> list[float]:
+    """Return the share of an algorithm after so many evaluations on each function that was run.
 
-    It moves alike whatever its budget, so that its longest runs tell of shorter ones. Only the
-    held-out instance counts.
+    The longest runs tell of shorter ones, unless the algorithm starts anew for each budget.
     """
-    where = dimension, OURS, BUDGETS[-1], BESIDE_PEERS
+    told = evaluations if ON_BBOB[algorithm].starts_anew else BUDGETS[-1]
+    where = dimension, algorithm, told, instance
     return [
         shares[evaluations]
         for run, shares in outcome.bbob.items()
         if (run.dimension, run.algorithm, run.told, run.instance) == where and evaluations in shares
     ]
+
+
+def reached_shares(outcome: Outcome, dimension: int, evaluations: int) -> list[float]:
+    """Return the `shares_of` our swarm on the instance that is set beside the best published."""
+    return shares_of(outcome, dimension, OURS, BESIDE_BEST, evaluations)
 
 
 def reached(outcome: Outcome, dimension: int, evaluations: int) -> float | None:
@@ -146,11 +154,13 @@ def _pairs(outcome: Outcome, control: str, rival: str, evaluations: int) -> NDAr
 def shares_table(outcome: Outcome) -> Table:
     """Mean shares of targets by dimension and evaluations, ours before the published ones."""
     rows: list[tuple[Cell, ...]] = []
+    for dimension, instance in product(DIMENSIONS, (BESIDE_BEST, BESIDE_PEERS)):
+        for algorithm in BBOB_PEERS:
+            shares = [shares_of(outcome, dimension, algorithm, instance, n) for n in BUDGETS]
+            if any(shares):
+                means = (float(np.mean(share)) if share else None for share in shares)
+                rows.append((algorithm, dimension, f"here, instance {instance}", *means))
     for dimension in DIMENSIONS:
-        for algorithm, budget in told_most(outcome, dimension):
-            shares = outcome.shares(dimension, algorithm, budget)
-            where = f"here{_extent(outcome, dimension, algorithm, budget)}"
-            rows.append((algorithm, dimension, where, *(shares.get(budget) for budget in BUDGETS)))
         for name, curve in curves(dimension).items():
             rows.append((name, dimension, "published", *(curve.get(budget) for budget in BUDGETS)))
     return Table(
@@ -161,30 +171,9 @@ def shares_table(outcome: Outcome) -> Table:
             *(Column(f"{budget:,}", "", 3, "evaluations") for budget in BUDGETS),
         ),
         tuple(rows),
-        note="On all 55 functions where it does not say otherwise, one run each; published are "
-        "averages over all functions and instances, read from pictures to some .01.",
+        note="On all 55 functions, one run each; published are averages over all functions and "
+        "instances, read from pictures to some .01.",
     )
-
-
-def told_most(outcome: Outcome, dimension: int) -> list[tuple[str, int]]:
-    """Return which peers ran in a dimension, each with its largest budget."""
-    ran = {(run.algorithm, run.told) for run in outcome.bbob if run.dimension == dimension}
-    largest = {name: max(told for run, told in ran if run == name) for name, _ in ran}
-    return [(name, largest[name]) for name in BBOB_PEERS if name in largest]
-
-
-def _extent(outcome: Outcome, dimension: int, algorithm: str, told: int) -> str:
-    """Say on which instances an algorithm ran, and on how many functions if not on all."""
-    ran = [
-        run
-        for run in outcome.bbob
-        if (run.dimension, run.algorithm, run.told) == (dimension, algorithm, told)
-    ]
-    functions = {run.function for run in ran}
-    instances = sorted({run.instance for run in ran})
-    said = [f"{len(functions)} functions"] if len(functions) < 55 else []
-    said.append(f"instance {' and '.join(map(str, instances))}")
-    return f" ({', '.join(said)})"
 
 
 def duels_table(outcome: Outcome) -> Table:

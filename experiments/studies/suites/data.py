@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -16,7 +16,7 @@ from experiments.studies.suites.coco import EXTRA
 from experiments.studies.suites.jobs import MEASURES, BbobRun, SuiteRun
 from experiments.studies.suites.peers import OF_OUR_SIZE, OURS, PEERS, takes
 from experiments.studies.suites.problems import PROBLEMS, SUITES, problem_of
-from experiments.studies.suites.protocol import FULL, STORED, BbobPart, SuitePart
+from experiments.studies.suites.protocol import STORED, SuitePart
 from pymoo_hdte._runner.campaign import Run
 from pymoo_hdte._runner.store import write_atomically
 
@@ -37,7 +37,7 @@ BBOB_COLUMNS = (
     "share",
 )
 
-SEEDS = range(1, 1 + max(part.seeds for part in (*STORED, *FULL)))
+SEEDS = range(1, 1 + max(part.seeds for part in STORED))
 """All seeds that any part has."""
 
 SuiteKey = tuple[str, str, int, int]
@@ -174,21 +174,19 @@ class Outcome:
         )
         return [self.suites[key][place] for key in keys if key in self.suites]
 
-    def shares(
-        self, dimension: int, algorithm: str, told: int, *, instance: int | None = None
-    ) -> dict[int, float]:
+    def shares(self, dimension: int, algorithm: str, told: int, instance: int) -> dict[int, float]:
         """Return the mean share by number of evaluations over problems, empty if none ran."""
         gathered: dict[int, list[float]] = defaultdict(list)
         for run, shares in self.bbob.items():
-            same = (run.dimension, run.algorithm, run.told) == (dimension, algorithm, told)
-            if same and instance in (None, run.instance):
+            place = run.dimension, run.algorithm, run.told, run.instance
+            if place == (dimension, algorithm, told, instance):
                 for mark, share in shares.items():
                     gathered[mark].append(share)
         return {mark: float(np.mean(gathered[mark])) for mark in sorted(gathered)}
 
 
 def outcome_for(context: Context) -> Outcome:
-    """Return the stored outcome, or run what it takes (quick) or the whole (full).
+    """Return the stored outcome, or run what it takes.
 
     Files are written after every part, so that an interrupted run leaves what is done.
     """
@@ -196,9 +194,8 @@ def outcome_for(context: Context) -> Outcome:
         return stored()
     for package, extra in (("cocoex", EXTRA), ("comocma", EXTRA), ("jmetal", EXTRA)):
         require(package, extra)
-    parts: Iterable[SuitePart | BbobPart] = FULL if context.full else STORED
     outcome = Outcome()
-    for part in parts:
+    for part in STORED:
         jobs: list[SuiteRun | BbobRun] = list(part.jobs())
         name = part.suite if isinstance(part, SuitePart) else f"bbob-biobj, {part.algorithm}"
         outcome.add(jobs, context.campaign.run(jobs, name))

@@ -5,10 +5,10 @@ from __future__ import annotations
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from experiments.studies.suites.bbob_tables import BEST, CITED, curves, told_most
+from experiments.studies.suites.bbob_tables import BEST, CITED, curves
 from experiments.studies.suites.data import Outcome
 from experiments.studies.suites.peers import OURS
-from experiments.studies.suites.protocol import BUDGETS, DIMENSIONS, HELD_OUT
+from experiments.studies.suites.protocol import BESIDE_PEERS, BUDGETS, DIMENSIONS, HELD_OUT
 from experiments.studies.suites.suite_tables import named, ranks
 from pymoo_hdte._comparing.figures import BLUE, GREEN, GREY, ORANGE, PINK, SKY, YELLOW, grid
 
@@ -36,10 +36,9 @@ def runtime_profiles(outcome: Outcome) -> Figure:
 
 def _run_here(axis: Axes, outcome: Outcome, dimension: int) -> None:
     """Draw what ran here, each algorithm's run of the largest budget."""
-    budgets = dict(told_most(outcome, dimension))
     for name, colour in LINES.items():
-        if name in budgets:
-            shares = outcome.shares(dimension, name, budgets[name])
+        shares = outcome.shares(dimension, name, BUDGETS[-1], BESIDE_PEERS)
+        if shares:
             width = 2.2 if name == OURS else 1.3
             axis.plot(*_line(shares), color=colour, lw=width, label=f"{name}, here")
 

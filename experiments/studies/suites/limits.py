@@ -135,7 +135,7 @@ QUESTIONS = {
         "ZDT1 with noise: IGD+ without it",
         "standard deviation",
         (0.05, 0.2),
-        (2_000, 10_000),
+        (500, 2_000, 10_000),
         {
             **_PLAIN,
             **{name + AGAIN: partial(_again, make) for name, make in _SWARMS.items()},
