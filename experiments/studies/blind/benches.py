@@ -6,8 +6,7 @@ bench is ``ideal``, a level with all nuisances, or one group of them alone at th
 whose leading number another one may replace. With ``--protocol`` the cases are `protocol_cases`:
 forty pairs of the ideal bench and the level ``mild``, and five with each of `TOLD_AS` alone.
 
-``experiments/data/blind_benches.csv`` has 38 of the pairs; at place 3014 the rig itself diverges on
-the level ``mild``.
+``experiments/data/blind_benches.csv`` has 38 of the pairs.
 """
 
 from __future__ import annotations

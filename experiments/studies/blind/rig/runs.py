@@ -30,6 +30,9 @@ LONGEST_STEP = 1.25e-3
 """s; and no line of the highest order turns by more than `FINEST` rad in a step."""
 FINEST = 0.8
 HIGHEST_ORDER = 14.0
+STABLE = 2.0
+"""Largest step times the rate at which further damping slows the output: it is a part of the
+forcing, for which the method is the classical one of Runge and Kutta, stable up to 2.78."""
 LOADING = 60
 """Steps in which the brake applies its load."""
 _HALVINGS = 48
@@ -159,6 +162,11 @@ def run(
     substeps = condition.substeps * refined
     if finest > HIGHEST_ORDER:
         substeps = condition.substeps_for(finest) * refined
+    damped = plant.rows[plant.rows[:, 0] == el.DAMPING]
+    further = float(np.sum(damped[:, 1] * (1.0 + damped[:, 2] * abs(condition.speed))))
+    # Ahead of a shaft that twists the output alone is light.
+    fastest = further * linear.entry[3, 1]
+    substeps = max(substeps, math.ceil(refined * fastest / (STABLE * condition.rate)))
     modes = np.abs(np.linalg.eigvals(linear.system).real)
     settling = max(
         SETTLED / modes[modes > 1e-6].min(), SETTLED_TURNS * 2.0 * math.pi / abs(condition.speed)

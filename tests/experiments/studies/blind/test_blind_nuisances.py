@@ -112,6 +112,13 @@ def test_no_ripple_is_folded_at_half_the_sampling_rate():
     assert np.array_equal(run(folded, RATED, 40.0, 0.0, 0.0), run(MACHINE, RATED, 40.0, 0.0, 0.0))
 
 
+def test_damping_of_an_output_ahead_of_a_shaft_does_not_make_it_diverge():
+    """At place 3014 all records above 200 r/min were no numbers."""
+    machine = on_bench(MILD.alone("shaft")).machine
+    damped = replace(machine, elements=(element(el.DAMPING, 39.0, 1.4e-3),))
+    assert np.isfinite(run(damped, RATED, 20.0, 0.0, 0.0)).all()
+
+
 def test_ripple_and_gravity_of_the_load_show_at_the_sensor_and_do_no_work():
     whole = replace(RATED, rpm=600.0, rate=1010.0)
     plain = run(MACHINE, whole, 40.0, 0.0, 0.0)
