@@ -184,7 +184,7 @@ def test_a_record_that_the_campaign_has_is_called_a_repeat():
 def fake(*names):
     return SimpleNamespace(
         names=frozenset(names),
-        candidates=(SimpleNamespace(name="law"),),
+        candidates=(SimpleNamespace(name="law", is_value=False),),
         listed=True,
         bic=0.0,
         fit=names,
