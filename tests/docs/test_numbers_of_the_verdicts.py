@@ -41,11 +41,6 @@ def test_goals_and_states_are_those_of_the_pooled_runs():
         assert state == one.verdict.lower()
 
 
-def test_frequent_questions_say_how_often_an_answer_is_wrong():
-    questions = (DOCS / "faq.md").read_text(encoding="utf-8")
-    assert f"{POOLED.plain_wrong} of {POOLED.plain} unqualified answers were wrong" in questions
-
-
 def test_the_time_is_that_of_the_last_run():
     outcomes = read_outcomes(DATA / OUTCOMES, DATA / SECONDS)
     middle = np.median([sum(one.seconds) for one in outcomes])
