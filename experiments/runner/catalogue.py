@@ -144,7 +144,6 @@ EXPERIMENTS = (
         "The swarms on bbob-biobj and other suites that they were not tuned on",
         "Is the swarm the best on suites that no setting was chosen on?",
         reads_outcome=True,
-        has_small_version=True,
     ),
     Experiment(
         "cards",

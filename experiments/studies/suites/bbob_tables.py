@@ -62,17 +62,18 @@ def _of_the_right_year(row: dict[str, str]) -> bool:
 def shares_of(
     outcome: Outcome, dimension: int, algorithm: str, instance: int, evaluations: int
 ) -> list[float]:
-    """Return the share of an algorithm after so many evaluations on each function that was run.
+    """Return the share of an algorithm after so many evaluations on each function, rising.
 
     The longest runs tell of shorter ones, unless the algorithm starts anew for each budget.
     """
     told = evaluations if ON_BBOB[algorithm].starts_anew else BUDGETS[-1]
     where = dimension, algorithm, told, instance
-    return [
-        shares[evaluations]
+    by_function = {
+        run.function: shares[evaluations]
         for run, shares in outcome.bbob.items()
         if (run.dimension, run.algorithm, run.told, run.instance) == where and evaluations in shares
-    ]
+    }
+    return [by_function[function] for function in sorted(by_function)]
 
 
 def reached_shares(outcome: Outcome, dimension: int, evaluations: int) -> list[float]:

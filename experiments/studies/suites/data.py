@@ -23,7 +23,7 @@ from pymoo_hdte._runner.store import write_atomically
 NAME = "suites"
 BBOB = f"{NAME}_bbob"
 DIGITS = 6
-COMMAND = "python -m experiments suites --quick"
+COMMAND = "python -m experiments suites --full"
 """What an outcome is made by, unless `renew` made it; told in its first line."""
 SUITE_COLUMNS = ("problem", "algorithm", "evaluations", "seed", "spent", *MEASURES)
 BBOB_COLUMNS = (
@@ -186,11 +186,8 @@ class Outcome:
 
 
 def outcome_for(context: Context) -> Outcome:
-    """Return the stored outcome, or run what it takes.
-
-    Files are written after every part, so that an interrupted run leaves what is done.
-    """
-    if not (context.full or context.quick):
+    """Return the stored outcome, or run what it takes."""
+    if not context.full:
         return stored()
     for package, extra in (("cocoex", EXTRA), ("comocma", EXTRA), ("jmetal", EXTRA)):
         require(package, extra)
@@ -199,7 +196,7 @@ def outcome_for(context: Context) -> Outcome:
         jobs: list[SuiteRun | BbobRun] = list(part.jobs())
         name = part.suite if isinstance(part, SuitePart) else f"bbob-biobj, {part.algorithm}"
         outcome.add(jobs, context.campaign.run(jobs, name))
-        write_outcome(outcome, context.out / NAME)
+    write_outcome(outcome, context.out / NAME)
     return outcome
 
 

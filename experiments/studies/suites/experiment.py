@@ -1,8 +1,8 @@
 """The swarms on suites of others, held-out ones first; see `protocol` for what is run.
 
 Without an option the report is made from the stored outcome, and a few of its runs are made anew;
-``--quick`` and ``--full`` run what the stored outcome took, some hours of one core. They need the
-extra ``suites``, and go on where they were interrupted.
+``--full`` runs what the stored outcome took, some hours of one core. It needs the extra ``suites``,
+and goes on where it was interrupted.
 """
 
 from __future__ import annotations

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.comparing.rivals import RivalTest, signs_against, tests_of_medians
-from experiments.studies.suites.bbob_tables import BEST, CITED, reached
+from experiments.studies.suites.bbob_tables import BEST, CITED, reached, shares_of
 from experiments.studies.suites.coco import FUNCTIONS
 from experiments.studies.suites.data import Outcome
-from experiments.studies.suites.jobs import MEASURES, BbobRun
+from experiments.studies.suites.jobs import MEASURES
 from experiments.studies.suites.peers import BBOB_PEERS, OURS
 from experiments.studies.suites.problems import PROBLEMS, SUITES
 from experiments.studies.suites.protocol import (
@@ -292,18 +292,12 @@ def signs_together(outcome: Outcome, budget: int) -> list[RivalTest]:
 
 def _shares(outcome: Outcome, name: str, budget: int) -> list[float] | None:
     """Return the share on each problem after a budget, None if one was not run."""
-    anew = BBOB_PEERS[name].starts_anew
-    shares = []
-    for dimension in DIMENSIONS:
-        for function in FUNCTIONS:
-            for told in (budget,) if anew else (budget, *BUDGETS[::-1]):
-                run = BbobRun(function, dimension, BESIDE_PEERS, name, told)
-                if budget in outcome.bbob.get(run, ()):
-                    shares.append(outcome.bbob[run][budget])
-                    break
-            else:
-                return None
-    return shares
+    shares = [
+        share
+        for dimension in DIMENSIONS
+        for share in shares_of(outcome, dimension, name, BESIDE_PEERS, budget)
+    ]
+    return shares if len(shares) == len(DIMENSIONS) * len(FUNCTIONS) else None
 
 
 def together_table(outcome: Outcome) -> Table:
