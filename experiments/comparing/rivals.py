@@ -10,11 +10,11 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.stats import binomtest, mannwhitneyu, rankdata
+from scipy.stats import binomtest, rankdata
 
 from pymoo_hdte._comparing.indicators import smaller_is_better
 from pymoo_hdte._comparing.paired import SIGNIFICANT
-from pymoo_hdte._comparing.ranks import OF_PROBLEMS, OF_RUNS, costs_of
+from pymoo_hdte._comparing.ranks import OF_PROBLEMS, costs_of
 from pymoo_hdte._comparing.statistics import holm, state_of, wilcoxon_p
 from pymoo_hdte.checks import InvalidInput, one_of
 
@@ -40,15 +40,6 @@ class RivalTest(NamedTuple):
 def better_than_each(tests: Sequence[RivalTest]) -> str:
     """Return the state of the demand to be better than each rival, shown if beyond chance."""
     return state_of(all(test.ahead for test in tests), shown=all(test.beaten for test in tests))
-
-
-class WinTieLoss(NamedTuple):
-    """On how many problems a control beats a rival significantly, does not differ, or loses."""
-
-    rival: str
-    wins: int
-    ties: int
-    losses: int
 
 
 def holm_against(
@@ -135,55 +126,6 @@ def _tested(
             rival, float(adjusted), int(np.sum(gain > 0)), int(np.sum(gain < 0)), _ahead(gain)
         )
         for rival, adjusted, gain in zip(rivals, p, gains, strict=True)
-    ]
-
-
-def outcomes(
-    control: str, algorithms: Sequence[str], values: ArrayLike, *, smaller_is_better: bool
-) -> NDArray[np.int_]:
-    """Judge one algorithm against each other on each problem by the Mann-Whitney test of the runs.
-
-    Runs are independent, so they are not paired. Holm's correction goes over all pairs of problem
-    and rival, because their counts are read together as one table: with 95 % confidence none of
-    its verdicts is due to chance. That takes many seeds (n runs that all beat n others have
-    p = 2 / C(2n, n)) and hides small defeats as well as small victories: 0 does not mean equal.
-
-    Parameters
-    ----------
-    control, algorithms, smaller_is_better
-        See `holm_against`.
-    values : array_like, shape (problems, algorithms, seeds)
-        One indicator of every run; runs that are not finite failed.
-
-    Returns
-    -------
-    ndarray of int, shape (problems, algorithms - 1)
-        1 where the control is significantly better, -1 where worse, 0 elsewhere; the rivals in
-        the order of ``algorithms``.
-
-    Raises
-    ------
-    InvalidInput
-        For a control, names or a shape that do not fit.
-    """
-    ours, theirs, _ = _opponents(control, algorithms, costs_of(values, smaller_is_better, OF_RUNS))
-    tests = [[mannwhitneyu(b, a) for a, b in zip(ours, rival, strict=True)] for rival in theirs]
-    p = np.array([[test.pvalue for test in row] for row in tests])
-    # U counts the pairs of runs in which the rival's cost is the larger.
-    excess = np.array([[test.statistic for test in row] for row in tests]) - ours.shape[-1] ** 2 / 2
-    significant = holm(p.ravel()).reshape(p.shape) < SIGNIFICANT
-    return np.where(significant, np.sign(excess), 0.0).astype(int).T
-
-
-def win_tie_loss(
-    control: str, algorithms: Sequence[str], values: ArrayLike, *, smaller_is_better: bool
-) -> list[WinTieLoss]:
-    """Count the `outcomes` against each rival, in the order of ``algorithms``."""
-    verdicts = outcomes(control, algorithms, values, smaller_is_better=smaller_is_better)
-    rivals = [name for name in algorithms if name != control]
-    return [
-        WinTieLoss(rival, *(int(np.sum(column == verdict)) for verdict in (1, 0, -1)))
-        for rival, column in zip(rivals, verdicts.T, strict=True)
     ]
 
 

@@ -393,9 +393,9 @@ def test_a_history_takes_at_most_three_times_the_memory_of_nsga2_s():
 
 def test_with_many_variables_no_matrix_has_them_all():
     n_var = 2000
-    run("zdt1", 20, make=CompactSwarm)  # what is loaded once is no part of it
+    run("zdt1", 20)  # what is loaded once is no part of it
     tracemalloc.start()
-    run(get_problem("zdt1", n_var=n_var), 100, make=CompactSwarm)
+    run(get_problem("zdt1", n_var=n_var), 100)
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     assert peak < 8 * n_var**2

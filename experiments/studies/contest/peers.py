@@ -30,7 +30,6 @@ from experiments.studies.contest.peers_tables import (
     rivals_table,
     subsets_table,
     times_table,
-    tuning_table,
 )
 from experiments.studies.contest.problems import BENCHMARKS
 from pymoo_hdte._comparing.figures import critical_difference_plot, rank_heatmap
@@ -73,7 +72,6 @@ def run(context: Context) -> Result:
             rivals_table(scores),
             nearest_rival_table(scores),
             reductions_table(scores),
-            tuning_table(scores),
             *medians_tables(scores),
             times_table(scores),
         ),

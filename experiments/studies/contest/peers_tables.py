@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import mannwhitneyu
 
-from experiments.comparing.rivals import better_than_each, tests_of_medians, win_tie_loss
+from experiments.comparing.rivals import better_than_each, tests_of_medians
 from experiments.studies.contest.peers_data import Scores, takes_part
 from experiments.studies.contest.problems import BENCHMARKS
 from pymoo_hdte._comparing.indicators import NAMES, smaller_is_better
@@ -93,23 +93,6 @@ def _ranks_table(scores: Scores, evaluations: int, rng: np.random.Generator) -> 
         note="Ranks of medians over the seeds; intervals by bootstrap over the seeds. An algorithm "
         "that cannot take a problem ranks last there. That all rank alike, by Iman and Davenport's "
         "form of Friedman's test: " + "; ".join(tests) + ".",
-    )
-
-
-def tuning_table(scores: Scores) -> Table:
-    """Average ranks on the problems that our algorithm was tuned on, which prove nothing."""
-    ranks = {
-        (evaluations, indicator): median_ranks(scores, indicator, evaluations, tuning=True)
-        for evaluations in scores.budgets
-        for indicator in NAMES
-    }
-    columns = [Column(NAMES[i], "", 3, f"{evaluations:,} evaluations") for evaluations, i in ranks]
-    order = np.argsort(next(iter(ranks.values())), kind="stable")
-    return Table(
-        "tuning",
-        f"Average ranks over the {len(scores.rows(True))} problems that tuning saw",
-        (Column("algorithm"), *columns),
-        tuple((scores.algorithms[i], *(float(r[i]) for r in ranks.values())) for i in order),
     )
 
 
@@ -331,30 +314,21 @@ def rivals_table(scores: Scores) -> Table:
         columns += [
             Column("p", digits=2, group=name),
             *(Column(word, group=name) for word in ("better", "worse")),
-            *(Column(word, group=f"{name}, single problems") for word in ("win", "tie", "loss")),
         ]
     rows: dict[tuple[str, int], list[Cell]] = {}
     for evaluations in scores.budgets:
         for indicator in ("igd", "hypervolume"):
-            counts = win_tie_loss(
-                OURS,
-                scores.algorithms,
-                scores.of(indicator, evaluations, tuning=False),
-                smaller_is_better=smaller_is_better(indicator),
-            )
             values = median_values(scores, indicator, evaluations, tuning=False)
             tests = tests_of_medians(OURS, scores.algorithms, values, indicator)
-            for test, count in zip(tests, counts, strict=True):
+            for test in tests:
                 row = rows.setdefault((test.rival, evaluations), [test.rival, evaluations])
-                row += [test.p, test.better, test.worse, count.wins, count.ties, count.losses]
+                row += [test.p, test.better, test.worse]
     return Table(
         "rivals",
         f"{OURS} against every rival on the held-out problems",
         tuple(columns),
         tuple(tuple(row) for _, row in sorted(rows.items(), key=lambda item: item[0][1])),
-        note="p is Wilcoxon's over the problems, after Holm. Better and worse compare medians. Win "
-        "and loss are problems on which the runs differ beyond chance (Mann-Whitney, Holm over all "
-        "problems and rivals), so a tie is no equality.",
+        note="p is Wilcoxon's over the problems, after Holm. Better and worse compare medians.",
     )
 
 

@@ -1,7 +1,7 @@
 """Ranks over problems against Demsar's worked example, closed forms and scipy; their figures."""
 
 from itertools import combinations, product
-from math import comb, exp, isinf, sqrt
+from math import exp, isinf, sqrt
 from statistics import NormalDist
 
 import numpy as np
@@ -12,7 +12,7 @@ from hypothesis.extra.numpy import arrays
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from scipy.stats import friedmanchisquare
 
-from experiments.comparing.rivals import holm_against, outcomes, signs_against, win_tie_loss
+from experiments.comparing.rivals import holm_against, signs_against
 from pymoo_hdte._comparing.figures import critical_difference_plot, rank_heatmap
 from pymoo_hdte._comparing.ranks import (
     average_ranks,
@@ -270,51 +270,6 @@ class TestAgainstAControl:
     def test_names_that_do_not_fit_are_refused(self, control, names):
         with pytest.raises(InvalidInput):
             holm_against(control, names, np.ones((4, 3)), smaller_is_better=True)
-
-
-class TestWinTieLoss:
-    @staticmethod
-    def apart(n_problems: int, n_rivals: int):
-        """Five runs of the control "a" below all of every rival: p = 2 / C(10, 5) = 1 / 126."""
-        runs = np.arange(5.0) + 10.0 * np.arange(n_rivals + 1)[:, None]
-        return np.tile(runs, (n_problems, 1, 1))
-
-    @pytest.mark.parametrize(
-        ("n_problems", "n_rivals", "wins"), [(6, 1, 6), (7, 1, 0), (1, 6, 1), (1, 7, 0), (2, 3, 2)]
-    )
-    def test_holm_goes_over_all_pairs_of_problem_and_rival(self, n_problems, n_rivals, wins):
-        """Six tests leave 6 / 126 < 5 %, seven do not, whichever way they are arranged."""
-        assert 6 * 2 / comb(10, 5) < 0.05 < 7 * 2 / comb(10, 5)
-        counts = win_tie_loss(
-            "a", NAMES[: n_rivals + 1], self.apart(n_problems, n_rivals), smaller_is_better=True
-        )
-        assert [c[1:] for c in counts] == [(wins, n_problems - wins, 0)] * n_rivals
-
-    def test_verdicts_stand_where_the_differences_are(self):
-        """Against the middle one of three: a is better, c is worse, and on problem 1 all alike."""
-        values = self.apart(2, 2)
-        values[1] = np.arange(5.0)
-        verdicts = outcomes("b", NAMES[:3], values, smaller_is_better=True)
-        assert verdicts.tolist() == [[-1, 1], [0, 0]]
-        reverse = outcomes("b", NAMES[:3], values, smaller_is_better=False)
-        assert reverse.tolist() == [[1, -1], [0, 0]]
-        assert win_tie_loss("b", NAMES[:3], values, smaller_is_better=True) == [
-            ("a", 0, 1, 1),
-            ("c", 1, 1, 0),
-        ]
-
-    def test_runs_are_not_paired(self):
-        rng = np.random.default_rng(5)
-        values = rng.normal(size=(3, 3, 12)) + 0.9 * np.arange(3)[:, None]
-        verdicts = outcomes("a", NAMES[:3], values, smaller_is_better=True)
-        shuffled = outcomes("a", NAMES[:3], rng.permuted(values, axis=2), smaller_is_better=True)
-        assert set(verdicts.ravel()) == {0, 1}
-        np.testing.assert_array_equal(shuffled, verdicts)
-
-    def test_a_rival_whose_runs_all_fail_loses(self):
-        values = np.stack([np.arange(21.0), np.full(21, np.nan)])[None]
-        for smaller in (True, False):
-            assert outcomes("a", NAMES[:2], values, smaller_is_better=smaller).tolist() == [[1]]
 
 
 class TestRankIntervals:
