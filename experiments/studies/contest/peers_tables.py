@@ -178,8 +178,6 @@ SUBSETS: dict[str, tuple[str, ...]] = {
 """Subsets of the held-out problems, with the families left out."""
 SPACING_PLACE = 3
 MOVED_ZDT4_IGD = 0.3
-SLIGHT = 0.01
-"""Relative loss of hypervolume below which a defeat is counted separately."""
 
 
 def must_reach_table(scores: Scores) -> Table:
@@ -368,34 +366,3 @@ def _standing(
     tests = tests_of_medians(OURS, algorithms, medians, indicator)
     won = sum(test.beaten for test in tests)
     return [*_ours_and_best(algorithms, ranks), f"{won} of {len(tests)}"]
-
-
-def nearest_rival_table(scores: Scores) -> Table:
-    """Show, problem by problem, how we stand beside the rival that ranks best by hypervolume."""
-    evaluations = scores.budgets[-1]
-    volumes = median_values(scores, "hypervolume", evaluations, tuning=False)
-    distances = median_values(scores, "igd", evaluations, tuning=False)
-    ranks = average_ranks(volumes, smaller_is_better=False)
-    _, name, _ = _ours_and_best(scores.algorithms, ranks)
-    pair = ours, rival = [scores.algorithms.index(rival_name) for rival_name in (OURS, name)]
-    problems = [scores.problems[row] for row in scores.rows(False)]
-    gains = volumes[:, ours] - volumes[:, rival]
-    slight = (gains < 0.0) & (-gains < SLIGHT * volumes[:, rival])
-    return Table(
-        "nearest_rival",
-        f"Beside {name}, which ranks best by hypervolume of the rivals, at {evaluations:,} "
-        "evaluations",
-        (
-            Column("problem"),
-            *(Column(algorithm, "", 6, "hypervolume") for algorithm in (OURS, name)),
-            Column("gain", "", 2, "hypervolume"),
-            *(Column(algorithm, "", 3, "IGD") for algorithm in (OURS, name)),
-        ),
-        tuple(
-            (problems[i], *volumes[i, pair].tolist(), float(gains[i]), *distances[i, pair].tolist())
-            for i in np.argsort(gains, kind="stable")
-        ),
-        note=f"Medians. {name} is ahead by hypervolume on {np.sum(gains < 0.0)} of {len(problems)} "
-        f"held-out problems, on {np.sum(slight)} of them by less than {100 * SLIGHT:g} %.",
-        folded=True,
-    )

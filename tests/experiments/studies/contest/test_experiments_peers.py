@@ -26,7 +26,6 @@ from experiments.studies.contest.peers_tables import (
     FAITHFUL,
     OURS,
     must_reach_table,
-    nearest_rival_table,
     ranks_tables,
     subsets_table,
 )
@@ -191,23 +190,6 @@ def test_ranks_without_a_family_are_those_of_the_others(rng):
     assert every[:4] == ("all", 14, 10_000, (9 * 4.0 + 5 * 1.0) / 14)
     # Five problems that all agree have p = 2 / 2^5 before Holm.
     assert without[6] == "0 of 3"
-
-
-def test_the_nearest_rival_is_shown_worst_problem_first(rng):
-    scores = planted(rng, [2.0, 3.0, 80.0, 1.0])
-    held_out = scores.rows(False)
-    # Ours wins one problem, and loses one by 0.5 rather than by about 0.01.
-    scores.values[2, held_out[1], 0] = 1.0
-    scores.values[2, held_out[3], 0] -= 0.5
-    table = nearest_rival_table(scores)
-    assert table.columns[2].name == "SMS-EMOA"
-    assert table.rows[0][0] == PROBLEMS[held_out[3]]
-    assert table.rows[-1][0] == PROBLEMS[held_out[1]]
-    for _, ours, rival, gain, *_ in table.rows:
-        assert gain == ours - rival
-    lost = len(held_out) - 1
-    slight = sum(0.0 < rival - ours < 0.01 * rival for _, ours, rival, *_ in table.rows)
-    assert f"on {lost} of {len(held_out)} held-out problems, on {slight} of" in table.note
 
 
 # --- ablation -----------------------------------------------------------------------------------
