@@ -156,7 +156,7 @@ class _Field:
                 share = np.full(len(functionals), np.sqrt(np.mean(fit.left_out**2)))
             else:
                 of_mean, of_std = np.maximum(fit.regression.surprises, LEAST_SURPRISE)
-                share = COVERAGE * fit.regression.spread(features, functionals)
+                share = COVERAGE * fit.regression.spread(features, functionals)[0]
                 share *= np.append(of_mean, np.full(len(share) - 1, of_std))
                 off[:, k] = fit.regression.predict(features) - kept[:, k]
             squares += (np.array([np.full(len(pattern), share[0]), share[1:]]) * pattern) ** 2

@@ -96,9 +96,9 @@ def factors(features: list[Array], others: list[Array], variance: Array) -> list
     """Return the covariance's factor of every axis between two sets of points, (n, m) each."""
     per_axis = []
     for rows, columns, of_axis in zip(features, others, variance, strict=True):
-        factor = 1.0 + (rows.T * of_axis) @ columns
-        small = np.abs(factor) < _LEAST
-        factor[small] = _LEAST
+        factor = (rows * of_axis[:, None]).T @ columns
+        factor += 1.0
+        factor[np.abs(factor) < _LEAST] = _LEAST
         per_axis.append(factor)
     return per_axis
 

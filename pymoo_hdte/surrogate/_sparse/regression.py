@@ -31,7 +31,12 @@ NUGGET = 1e-10
 """Variance of an error of the runs, as a share of the response's: keeps the solution stable."""
 MOST_LEARNT = 300
 """Runs from which the parameters are learnt at most; the polynomial is of all."""
-_ITERATIONS = 60
+_ITERATIONS, _GAIN = 60, 1e-5
+"""Most steps of learning, and the share of the loss below which a step ends it.
+
+The loss is a logarithm of a likelihood of some hundreds: the last steps add some hundredths to it,
+and cost a third of the time.
+"""
 NOISE = (np.log(1e-8), np.log(1e-4), np.log(10.0))
 """Logarithms of the least variance of the runs' own scatter, where its search starts, and the most.
 
@@ -124,17 +129,11 @@ class Regression:
         """
         return np.asarray(solve_triangular(self._lower, across, lower=True))
 
-    def spread_by_noise(self, features: list[Array], functionals: Array) -> Array:
-        """Return what of `spread` is due to the runs' own scatter, the same shape and unit.
+    def spread(self, features: list[Array], functionals: Array) -> tuple[Array, Array]:
+        """Return the standard deviation of sums over points, and what of it is the runs' scatter.
 
-        A sum over points is one over runs, each of which scatters independently of the others.
-        """
-        across = covariance(self._features, features, self.variance)
-        of_runs = self._inverse @ (across @ functionals.T)
-        return self.unit * np.sqrt(self.size * (self._noises @ of_runs**2))
-
-    def spread(self, features: list[Array], functionals: Array) -> Array:
-        """Return the standard deviation of sums over points, shape (f,), in the response's unit.
+        Both have shape (f,) and are in the response's unit. A sum over points is one over runs,
+        each of which scatters independently of the others.
 
         Parameters
         ----------
@@ -144,11 +143,11 @@ class Regression:
             The weights of every sum.
         """
         inside = covariance(features, features, self.variance)
-        across = covariance(self._features, features, self.variance)
+        across = covariance(self._features, features, self.variance) @ functionals.T
         prior = np.einsum("fm,mn,fn->f", functionals, inside, functionals, optimize=True)
-        known = self.whitened(across @ functionals.T)
-        variance = np.maximum(prior - np.sum(known**2, axis=0), 0.0)
-        return self.unit * np.sqrt(self.size * variance)
+        variance = np.maximum(prior - np.sum(self.whitened(across) ** 2, axis=0), 0.0)
+        of_noise = self._noises @ (self._inverse @ across) ** 2
+        return self.unit * np.sqrt(self.size * variance), self.unit * np.sqrt(self.size * of_noise)
 
 
 def surprises(squares: Array, relevance: Array, values: Array) -> Array:
@@ -201,7 +200,7 @@ def _learnt(
         return value + 0.5 * float(off @ off), slope
 
     def optimum(flat: Array, ends: list[tuple[float, float]]) -> Any:
-        options = {"maxiter": _ITERATIONS, "maxcor": 20}
+        options = {"maxiter": _ITERATIONS, "maxcor": 20, "ftol": _GAIN}
         return scipy.optimize.minimize(
             loss, flat, jac=True, method="L-BFGS-B", bounds=ends, options=options
         )
@@ -227,16 +226,20 @@ def _misfit(
     parameters = flat.reshape(len(features), -1)
     variance, slopes = variances(parameters, len(features[0]))
     of_axes = factors(features, features, variance)
-    product = np.prod(of_axes, axis=0) if len(of_axes) < 3 else _product(of_axes)
+    product = of_axes[0].copy()
+    for factor in of_axes[1:]:
+        product *= factor
     try:
         lower = cholesky(with_nugget(product.copy(), noise.sum() * shares), lower=True)
     except np.linalg.LinAlgError:
         return 1e10, np.zeros(flat.size + noise.size)
-    inverse = cho_solve((lower, True), np.eye(len(standard)))
-    weights = inverse @ standard
+    weights = cho_solve((lower, True), standard)
     size = max(float(standard @ weights) / len(standard), np.finfo(float).tiny)
     value = 0.5 * len(standard) * np.log(size) + float(np.log(np.diag(lower)).sum())
-    whole = 0.5 * (inverse - np.outer(weights, weights) / size)
+    # Of the symmetric inverse one half, doubled, gives the same sums as the whole.
+    whole = scipy.linalg.lapack.dpotri(lower, lower=True)[0].T
+    whole[np.diag_indices(len(whole))] *= 0.5
+    whole -= np.outer(0.5 / size * weights, weights)
     outer = whole * product
     gradient = np.empty_like(parameters)
     for j, (feature, factor) in enumerate(zip(features, of_axes, strict=True)):
@@ -244,10 +247,3 @@ def _misfit(
         gradient[j] = slopes[:, j] @ by_degree
     of_noise = noise * float(np.diag(whole) @ shares)
     return value, np.append(gradient.ravel(), of_noise)
-
-
-def _product(of_axes: list[Array]) -> Array:
-    product = of_axes[0].copy()
-    for factor in of_axes[1:]:
-        product *= factor
-    return product

@@ -139,8 +139,7 @@ class ResponseFit:
                 continue
             off = self.regression.predict(features) - values
             functionals = np.array([weights, weights * deviation / scatter])
-            expected = self.regression.spread(features, functionals)
-            by_noise = self.regression.spread_by_noise(features, functionals)
+            expected, by_noise = self.regression.spread(features, functionals)
             expected = COVERAGE * np.sqrt(np.maximum(expected**2 - by_noise**2, 0.0))
             expected = np.hypot(expected, (COVERAGE_OF_DRAWS if counted else COVERAGE) * by_noise)
             expected = expected * np.maximum(self.regression.surprises, LEAST_SURPRISE)
@@ -242,7 +241,9 @@ def _converted(
     """Return a polynomial of another surrogate."""
     values = surrogate.predict(dense)
     some = [feature[:, :LEARNT_FROM] for feature in dense]
-    regression = Regression(some, values[:LEARNT_FROM], np.ones(LEARNT_FROM), noisy=False)
+    regression = Regression(
+        some, values[:LEARNT_FROM], np.ones(LEARNT_FROM), parameters, noisy=False
+    )
     scatters = [
         _std(surrogate.predict(features), weights)
         for features, weights in zip(judged.features, judged.weights, strict=True)

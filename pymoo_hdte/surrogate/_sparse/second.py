@@ -12,7 +12,6 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any, Protocol
 
 import numpy as np
@@ -36,11 +35,11 @@ class Surrogate(Protocol):
     def predict(self, features: list[Array]) -> Array:
         """Return the response, shape (m,), at points of these features."""
 
-    def spread(self, features: list[Array], functionals: Array) -> Array:
-        """Return the standard deviation of sums over points, shape (f,)."""
+    def spread(self, features: list[Array], functionals: Array) -> tuple[Array, Array]:
+        """Return the standard deviation of sums over points, and what of it is the runs' scatter.
 
-    def spread_by_noise(self, features: list[Array], functionals: Array) -> Array:
-        """Return what of it is due to the runs' own scatter, shape (f,)."""
+        Both have shape (f,).
+        """
 
 
 @dataclass(frozen=True)
@@ -104,15 +103,10 @@ class Linked:
         """Return the response, shape (m,), at points of these features."""
         return self._link.back(self._regression.predict(features))
 
-    def spread(self, features: list[Array], functionals: Array) -> Array:
-        """Return the standard deviation of sums over points, shape (f,)."""
+    def spread(self, features: list[Array], functionals: Array) -> tuple[Array, Array]:
+        """Return both standard deviations of sums over points, shape (f,) each."""
         slope = self._link.slope(self._regression.predict(features))
         return self._regression.spread(features, functionals * slope)
-
-    def spread_by_noise(self, features: list[Array], functionals: Array) -> Array:
-        """Return what of it is due to the runs' own scatter, shape (f,)."""
-        slope = self._link.slope(self._regression.predict(features))
-        return self._regression.spread_by_noise(features, functionals * slope)
 
 
 class Process:
@@ -152,28 +146,21 @@ class Process:
         self.surprises = surprises(squares, relevance, values)
         self._runs, self._inverse, self._noise = points, inverse, noise
 
-    @cached_property
-    def _lower(self) -> Array:
-        return np.asarray(self._model.L_)
-
     def predict(self, features: list[Array]) -> Array:
         """Return the response, shape (m,), at points of these features."""
         across = self._covariance(_points(features), self._runs)
         return self._centre + self._unit * np.asarray(across @ self._model.alpha_)
 
-    def spread(self, features: list[Array], functionals: Array) -> Array:
-        """Return the standard deviation of sums over points, shape (f,)."""
+    def spread(self, features: list[Array], functionals: Array) -> tuple[Array, Array]:
+        """Return both standard deviations of sums over points, shape (f,) each."""
         points = _points(features)
-        inside, across = self._covariance(points), self._covariance(self._runs, points)
+        inside = self._covariance(points)
+        across = self._covariance(self._runs, points) @ functionals.T
         prior = np.einsum("fm,mn,fn->f", functionals, inside, functionals, optimize=True)
-        known = scipy.linalg.solve_triangular(self._lower, across @ functionals.T, lower=True)
-        return self._unit * np.sqrt(np.maximum(prior - np.sum(known**2, axis=0), 0.0))
-
-    def spread_by_noise(self, features: list[Array], functionals: Array) -> Array:
-        """Return what of it is due to the runs' own scatter, shape (f,)."""
-        across = self._covariance(self._runs, _points(features))
-        of_runs = self._inverse @ (across @ functionals.T)
-        return self._unit * np.sqrt(self._noise * np.sum(of_runs**2, axis=0))
+        known = scipy.linalg.solve_triangular(self._model.L_, across, lower=True)
+        variance = np.maximum(prior - np.sum(known**2, axis=0), 0.0)
+        of_noise = self._noise * np.sum((self._inverse @ across) ** 2, axis=0)
+        return self._unit * np.sqrt(variance), self._unit * np.sqrt(of_noise)
 
 
 def _points(features: list[Array]) -> Array:

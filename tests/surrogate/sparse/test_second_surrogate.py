@@ -128,4 +128,5 @@ def test_the_spread_of_a_sum_is_that_of_the_posterior():
     # scikit-learn's has the runs' own scatter on the diagonal.
     own = process._model.kernel_.k2.noise_level * np.eye(12)
     expected = process._unit * np.sqrt(weights @ (covariance - own) @ weights)
-    assert process.spread(features, weights[None])[0] == pytest.approx(expected, rel=1e-4)
+    spread, _ = process.spread(features, weights[None])
+    assert spread[0] == pytest.approx(expected, rel=1e-4)
