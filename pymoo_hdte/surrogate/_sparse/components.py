@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from pymoo_hdte.surrogate._sparse.response import (
     COVERAGE,
+    COVERAGE_OF_CUT,
     LEAST_SURPRISE,
     Judged,
     ResponseFit,
@@ -162,8 +163,9 @@ class _Field:
             squares += (np.array([np.full(len(pattern), share[0]), share[1:]]) * pattern) ** 2
         cut = off @ patterns
         mean, std = np.sqrt(squares) + self.left
-        mean += np.abs(weights @ cut)
-        std += np.sqrt(weights @ (cut - weights @ cut) ** 2)
+        mean += COVERAGE_OF_CUT * np.abs(weights @ cut)
+        whole = np.sqrt(weights @ (deviation + cut - weights @ cut) ** 2)
+        std += COVERAGE_OF_CUT * np.abs(whole - scatter)
         noise = np.array([fit.regression.noise_std for fit in self.fits]) ** 2 @ patterns**2
         return scatter, mean, std + np.sqrt(scatter**2 + noise) - scatter
 

@@ -137,14 +137,14 @@ class ResponseFit:
                 share = float(np.sqrt(np.mean(self.left_out**2))) / scatter
                 errors.append((share, share))
                 continue
-            off = self.regression.predict(features) - values
+            whole = self.regression.predict(features)
             functionals = np.array([weights, weights * deviation / scatter])
             expected, by_noise = self.regression.spread(features, functionals)
             expected = COVERAGE * np.sqrt(np.maximum(expected**2 - by_noise**2, 0.0))
             expected = np.hypot(expected, (COVERAGE_OF_DRAWS if counted else COVERAGE) * by_noise)
             expected = expected * np.maximum(self.regression.surprises, LEAST_SURPRISE)
-            cut = np.array([abs(float(weights @ off)), _std(off, weights)])
-            expected = expected + COVERAGE_OF_CUT * cut
+            changes = weights @ (whole - values), _std(whole, weights) - _std(values, weights)
+            expected = expected + COVERAGE_OF_CUT * np.abs(changes)
             # What runs scatter by themselves may as well be a part of the response.
             if not counted:
                 expected[1] += np.hypot(scatter, self.regression.noise_std) - scatter

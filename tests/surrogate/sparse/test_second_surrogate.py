@@ -10,6 +10,7 @@ from scipy.stats import norm
 from pymoo_hdte.problems import Design, Mean, Std, robust_problem
 from pymoo_hdte.surrogate._sparse.kernel import EvenPolynomials
 from pymoo_hdte.surrogate._sparse.regression import Regression, surprises
+from pymoo_hdte.surrogate._sparse.response import COVERAGE_OF_CUT, Judged, ResponseFit
 from pymoo_hdte.surrogate._sparse.second import Linked, Process, better, links_for
 
 SHARES = (0.8, 0.5)
@@ -130,3 +131,16 @@ def test_the_spread_of_a_sum_is_that_of_the_posterior():
     expected = process._unit * np.sqrt(weights @ (covariance - own) @ weights)
     spread, _ = process.spread(features, weights[None])
     assert spread[0] == pytest.approx(expected, rel=1e-4)
+
+
+def test_terms_that_are_left_out_count_by_what_they_change_of_the_moments():
+    x, y = POINTS.T
+    regression = Regression(FEATURES, x + 0.2 * y, ONES)
+    nodes, weights = leggauss(6)
+    grid = np.array([(z, w) for z in nodes for w in nodes])[None]
+    judged = Judged.at(grid, 0.25 * np.outer(weights, weights).reshape(1, -1), EvenPolynomials(20))
+    of_x = np.array([[0, 0], [1, 0]]), np.array([0.0, 3.0**-0.5])
+    fit = ResponseFit(regression, regression.parameters, *of_x, regression.left_out, alone=False)
+    mean, std = fit.errors(judged, 1e-9)
+    assert mean[0] == pytest.approx(0.0, abs=1e-3)
+    assert std[0] == pytest.approx(COVERAGE_OF_CUT * (np.sqrt(1.04) - 1.0), rel=0.02)
