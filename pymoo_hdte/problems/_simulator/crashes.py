@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtr
 
+from pymoo_hdte._unchanging import Unchanging
 from pymoo_hdte.problems._simulator.statistics import Probability
 from pymoo_hdte.surrogate._sparse.axes import Axis
 from pymoo_hdte.surrogate._sparse.moments import SparseMoments
@@ -24,7 +26,7 @@ NONE_OF = 3.0
 """Events of a probability p are none in n draws with 5 % where n p = -ln 0.05 = 3.0."""
 
 
-class SuccessMoments:
+class SuccessMoments(Unchanging):
     """The probability of success around designs, at samples of the scatter.
 
     Parameters
@@ -39,15 +41,6 @@ class SuccessMoments:
         self.success, self._scatter = success, scatter
         self._mode = SparseMoments(success.polynomial, axes)
         self._draws = SparseMoments(success.draws, axes)
-        self._bases: dict[str, Array] = {}
-
-    def __deepcopy__(self, memo: dict[int, Any]) -> SuccessMoments:
-        """Return itself: nothing in it changes."""
-        return self
-
-    def __getstate__(self) -> dict[str, Any]:
-        """Return what is pickled: not what can be computed anew."""
-        return vars(self) | {"_bases": {}}
 
     def around(self, designs: Array) -> SuccessAround:
         """Return it around designs of shape (n, m)."""
@@ -57,12 +50,15 @@ class SuccessMoments:
         """Return the expansions of the posterior's draws around designs, shape (n, 16, q)."""
         return self._draws.expansion(designs)
 
-    def basis(self, kind: str) -> Array:
-        """Return the polynomials at the samples, shape (k, q), of the mode or of the draws."""
-        if kind not in self._bases:
-            moments = self._mode if kind == "mode" else self._draws
-            self._bases[kind] = moments.basis(self._scatter)
-        return self._bases[kind]
+    @cached_property
+    def of_mode(self) -> Array:
+        """The polynomials of the mode at the samples, shape (k, q)."""
+        return self._mode.basis(self._scatter)
+
+    @cached_property
+    def of_draws(self) -> Array:
+        """Those of the draws, shape (k, q)."""
+        return self._draws.basis(self._scatter)
 
     def at(self, scatter: Array) -> Array:
         """Return the polynomials of the mode, shape (k, q), at any s of shape (k, d)."""
@@ -76,16 +72,17 @@ class SuccessAround:
     moments: SuccessMoments
     expansion: Array
     designs: Array
-    kind: str = "mode"
+    is_draw: bool = False
 
     def probabilities(self, part: slice = slice(None)) -> Array:
         """Return the probability of success at the samples, shape (n, k)."""
-        return ndtr(self.expansion @ self.moments.basis(self.kind)[part].T)
+        basis = self.moments.of_draws if self.is_draw else self.moments.of_mode
+        return ndtr(self.expansion @ basis[part].T)
 
     def drawn(self) -> Iterator[SuccessAround]:
         """Yield it by every draw of the posterior."""
         for expansion in np.swapaxes(self.moments.drawn(self.designs), 0, 1):
-            yield replace(self, expansion=expansion, kind="draws")
+            yield replace(self, expansion=expansion, is_draw=True)
 
     def likely_at(self, scatter: Array) -> NDArray[np.bool_]:
         """Return whether success is likelier than failure at values of s around every design.

@@ -12,6 +12,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from pymoo_hdte._unchanging import Unchanging
 from pymoo_hdte.checks import InvalidInput, one_of, real_number
 from pymoo_hdte.problems._simulator.distributions import joint_distribution
 from pymoo_hdte.problems._simulator.kinds_of_noise import Interval, Scenarios, whole_numbers
@@ -124,11 +125,15 @@ def _scatters(field: str, given: Any, below: float = np.inf) -> bool:
 def _scatter(field: str, given: Any, tail: float) -> Scatter:
     if not hasattr(given, "pdf"):
         given = scipy.stats.uniform(-float(given), 2.0 * float(given))
+    return _measured(field, given, tail)
+
+
+def _measured(field: str, given: Any, tail: float) -> Scatter:
     distribution = Distribution(field, given)
     return Scatter(distribution, Measure.of(field, distribution), tail)
 
 
-class Inputs:
+class Inputs(Unchanging):
     """All inputs of a simulator, as independent axes in -1..1 and as named values.
 
     Parameters
@@ -199,10 +204,6 @@ class Inputs:
         self.names = tuple(names)
         self.axis_names = tuple(axis.name for axis in self.axes)
 
-    def __deepcopy__(self, memo: dict[int, Any]) -> Inputs:
-        """Return itself: nothing in it changes."""
-        return self
-
     def _add_noise(self, group: Sequence[str], given: Any) -> None:
         start = len(self.axes)
         if isinstance(given, Scenarios):
@@ -219,7 +220,8 @@ class Inputs:
             self.axes.append(Axis(group[0], None, (given.lower, given.upper)))
             return
         if len(group) == 1:
-            self.axes.append(noise_axis(group[0], _noise(group[0], given, self.tail)))
+            scatter = _measured(f"noise[{group[0]!r}]", given, self.tail)
+            self.axes.append(noise_axis(group[0], scatter))
             return
         given = joint_distribution(f"noise[{group!r}]", given, len(group))
         if not given.stochastic_dependent:
@@ -281,9 +283,3 @@ def _positions(table: Array, rows: Array) -> Array:
     """Return the positions of rows in a table, shape (n,); NaN where they are none of its."""
     same = np.all(np.isclose(rows[:, None], table[None], rtol=1e-9, atol=0.0), axis=2)
     return np.where(same.any(axis=1), np.argmax(same, axis=1), np.nan)
-
-
-def _noise(name: str, given: Any, tail: float) -> Scatter:
-    field = f"noise[{name!r}]"
-    distribution = Distribution(field, given)
-    return Scatter(distribution, Measure.of(field, distribution), tail)

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtri
 
+from pymoo_hdte._unchanging import Unchanging
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.problems._simulator.data import Data, Runs
 from pymoo_hdte.problems._simulator.runs import Simulator
@@ -81,7 +82,7 @@ class Replicates:
         return points, np.array(moments)
 
 
-class OwnMoments:
+class OwnMoments(Unchanging):
     """The simulator's own variance around designs, and draws of what it adds.
 
     Parameters
@@ -98,27 +99,16 @@ class OwnMoments:
         count = len(scatter)
         shares = (np.random.default_rng(3).permutation(count) + 0.5) / count
         self.normal = np.asarray(ndtri(shares))
-        self._basis: Array | None = None
-
-    def __deepcopy__(self, memo: dict[int, Any]) -> OwnMoments:
-        """Return itself: nothing in it changes."""
-        return self
-
-    def __getstate__(self) -> dict[str, Any]:
-        """Return what is pickled: not what can be computed anew."""
-        return vars(self) | {"_basis": None}
 
     def around(self, designs: Array) -> list[OwnScatter]:
         """Return it around designs of shape (n, m), by response."""
         expansion = self.moments.expansion(designs)
         return [OwnScatter(self, expansion[:, place]) for place in range(expansion.shape[1])]
 
-    @property
+    @cached_property
     def basis(self) -> Array:
         """The polynomials at the samples, shape (k, q)."""
-        if self._basis is None:
-            self._basis = self.moments.basis(self._scatter)
-        return self._basis
+        return self.moments.basis(self._scatter)
 
 
 @dataclass(frozen=True)

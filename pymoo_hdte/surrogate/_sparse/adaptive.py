@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
@@ -13,6 +12,7 @@ import scipy
 from numpy.typing import NDArray
 
 from pymoo_hdte._one_thread import ONE_THREAD
+from pymoo_hdte._unchanging import Unchanging
 from pymoo_hdte.surrogate._sparse.axes import Axis
 from pymoo_hdte.surrogate._sparse.components import PartOfField, fitted_together
 from pymoo_hdte.surrogate._sparse.draws import (
@@ -73,7 +73,7 @@ _SAME_POINT = 1e-9
 
 
 @dataclass(frozen=True)
-class AdaptiveFit:
+class AdaptiveFit(Unchanging):
     """The surrogate with which its building ended.
 
     Attributes
@@ -122,10 +122,6 @@ class AdaptiveFit:
     success: Success | None = None
     own: SparsePolynomial | None = None
     confirmed: bool = True
-
-    def __deepcopy__(self, memo: dict[int, Any]) -> AdaptiveFit:
-        """Return itself: nothing in it changes."""
-        return self
 
     @property
     def errors(self) -> Array:

@@ -10,13 +10,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.polynomial.chebyshev import chebder
 from numpy.typing import NDArray
 
 from pymoo_hdte._compilation import COMPILES
+from pymoo_hdte._unchanging import Unchanging
 from pymoo_hdte.surrogate._sparse.axes import Axis
 from pymoo_hdte.surrogate._sparse.index_set import AxisMap
 from pymoo_hdte.surrogate._sparse.many_designs import ManyDesigns
@@ -32,7 +32,7 @@ _AT_ONCE = 2**18
 """Numbers in one array: more exceed the processor's cache, fewer cost numpy overhead."""
 
 
-class SparseMoments:
+class SparseMoments(Unchanging):
     """The expansion of r responses around a design, and their moments.
 
     Parameters
@@ -79,10 +79,6 @@ class SparseMoments:
         self._order, self.indices = order, indices[order]
         largest = max(step.size for step in self._steps)
         self._at_once = max(1, _AT_ONCE // (largest * coefficients.shape[1]))
-
-    def __deepcopy__(self, memo: dict[int, Any]) -> SparseMoments:
-        """Return itself: nothing in it changes."""
-        return self
 
     def expansion(self, designs: Array) -> Array:
         """Return the coefficients around designs of shape (n, m), shape (n, r, q)."""
