@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property
-from itertools import product
 from typing import Any
 
 import numpy as np
@@ -19,6 +18,7 @@ from pymoo_hdte.problems.operating_conditions import (
     shares,
 )
 from pymoo_hdte.surrogate import Box, ChebyshevSurrogate, TruncatedNormal
+from pymoo_hdte.surrogate.box import corners
 from pymoo_hdte.units import ARCSEC
 
 SURROGATE_BOX = 0.35
@@ -132,7 +132,14 @@ class DriveResponse:
         """
         box = surrogate_box(self.model, self.theta_s, self._box, tolerance)
         # The nodes of the fit may miss an unstable nominal design, or corner of the box.
-        self._dte_arcsec(np.vstack([self.model.nominal, *_corners(box)]))
+        self._dte_arcsec(
+            np.vstack(
+                [
+                    self.model.nominal,
+                    *corners(np.column_stack([box.lower, box.upper]), 2 ** len(box)),
+                ]
+            )
+        )
         provenance = {"model": self.model.to_dict(), "output": "DTE in arcsec"}
         provenance |= self._duty_cycle()
         return ChebyshevSurrogate.fit(self._dte_arcsec, box, self._order, provenance)
@@ -181,7 +188,3 @@ def theta_s_scatter(model: DriveModel) -> TruncatedNormal:
         limit = f"below {mean / theta_s.cut / ARCSEC:g} arcsec, so that theta_s stays above 0"
         raise InvalidInput("kinematic_error.std in arcsec", std / ARCSEC, limit)
     return theta_s
-
-
-def _corners(box: Box) -> NDArray[np.float64]:
-    return np.array(list(product(*zip(box.lower, box.upper, strict=True))))

@@ -20,13 +20,14 @@ from pymoo_hdte.surrogate import (
     VariableBandMoments,
     latin_hypercube,
 )
+from pymoo_hdte.surrogate.box import corners
 from pymoo_hdte.surrogate.sign import sign_at_nodes
 from pymoo_hdte.surrogate.trust import UntrustedSurrogate, region_of
 
 MOMENTS = ("exact", "sample")
 
 _LOOKED_AT = 256
-"""Designs, beside the corners of the box, at which the sign of the mean is looked at."""
+"""Corners of the box at most, and designs within it, at which the sign of the mean is looked at."""
 
 
 def make_moments(
@@ -117,7 +118,8 @@ class RobustProblem(Problem):
         if self.positive is False or not sign:
             return
         box: Box = self.moments.design_box
-        designs = np.vstack([_some_corners(box), latin_hypercube(box, _LOOKED_AT, 0)])
+        ends = np.column_stack([box.lower, box.upper])
+        designs = np.vstack([corners(ends, _LOOKED_AT), latin_hypercube(box, _LOOKED_AT, 0)])
         mean, _ = self.moments(designs)
         wrong = sign * mean < 0.0
         if wrong.any():
@@ -143,12 +145,3 @@ class RobustProblem(Problem):
         out["F"] = np.column_stack(self.moments(designs))
         if "dF" in out:
             out["dF"] = np.stack(self.moments.gradient(designs), axis=1)
-
-
-def _some_corners(box: Box) -> NDArray[np.float64]:
-    """Return the corners of the box, or those of the first eight variables from its centre."""
-    corners = np.tile(box.centre, (2 ** min(len(box), 8), 1))
-    for axis in range(min(len(box), 8)):
-        upper = (np.arange(len(corners)) >> axis) & 1 == 1
-        corners[:, axis] = np.where(upper, box.upper[axis], box.lower[axis])
-    return corners

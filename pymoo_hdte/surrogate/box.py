@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -217,6 +218,20 @@ class Box:
             float(physical[row, column]),
             f"{self.lower[column]!s} to {self.upper[column]!s} (row {row} of the points)",
         )
+
+
+def corners(
+    ends: NDArray[np.float64], most: int, random_state: int | np.random.Generator = 0
+) -> NDArray[np.float64]:
+    """Return all corners of a box with ends of shape (d, 2), or so many by chance, shape (k, d)."""
+    moving = np.flatnonzero(ends[:, 0] < ends[:, 1])
+    if 2 ** len(moving) <= most:
+        sides = np.array(list(product((0, 1), repeat=len(moving))), dtype=int)
+    else:
+        sides = np.random.default_rng(random_state).integers(0, 2, (most, len(moving)))
+    chosen = np.tile(ends[:, 0], (len(sides), 1))
+    chosen[:, moving] = ends[moving, sides]
+    return chosen
 
 
 def _half_unit(bounds: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from functools import cached_property
-from itertools import product
-from typing import Any
 
 import numpy as np
 
@@ -13,11 +11,14 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from pymoo_hdte._unchanging import Unchanging
 from pymoo_hdte.problems._simulator.crashes import SuccessAround
 from pymoo_hdte.problems._simulator.replicates import OwnScatter
 from pymoo_hdte.problems._simulator.tails import NormalScatter, Tail
+from pymoo_hdte.problems._simulator.worst import largest_in_box
 from pymoo_hdte.surrogate._sparse.moments import SparseMoments, deviation
 from pymoo_hdte.surrogate._sparse.success import STUDENT_OF_DRAWS
+from pymoo_hdte.surrogate.box import corners
 from pymoo_hdte.surrogate.moments import divide_or_zero
 
 Array = NDArray[np.float64]
@@ -36,12 +37,11 @@ OFTEN = 0.1
 """Smallest probability of an event for which they serve: 410 of them have an error of 5 %."""
 MOST_CORNERS = 256
 """Corners of the box of the scatter at which a search for the extreme begins, at most."""
-_SWEEPS = 8
-_LINE = 33
-"""Points on a line through the box."""
+_INSIDE, _LINE = 64, 33
+"""Points within at which it begins besides, and points on a line through the box."""
 
 
-class CommonSamples:
+class CommonSamples(Unchanging):
     """Samples of the scatter that serve all designs, and the expansion's polynomials there.
 
     Parameters
@@ -66,32 +66,7 @@ class CommonSamples:
         ]
         p = np.concatenate(shares)
         self.scatter = np.column_stack([axis.sample(p[:, j]) for j, axis in enumerate(axes)])
-        ends = np.array([axis.scatter_ends for axis in axes])
-        self.ends = ends
-        self._corners = self._some_corners(ends, np.random.default_rng(seed))
-
-    def __deepcopy__(self, memo: dict[int, Any]) -> CommonSamples:
-        """Return itself: nothing in it changes."""
-        return self
-
-    @staticmethod
-    def _some_corners(ends: Array, random_state: np.random.Generator) -> Array:
-        moving = np.flatnonzero(ends[:, 0] < ends[:, 1])
-        if 2 ** len(moving) <= MOST_CORNERS:
-            sides = np.array(list(product((0, 1), repeat=len(moving))), dtype=int)
-        else:
-            sides = random_state.integers(0, 2, (MOST_CORNERS, len(moving)))
-        corners = np.tile(ends[:, 0], (len(sides), 1))
-        corners[:, moving] = ends[moving, sides]
-        return corners
-
-    def __getstate__(self) -> dict[str, Any]:
-        """Return what is pickled: not what can be computed anew."""
-        return {
-            name: value
-            for name, value in vars(self).items()
-            if name not in ("basis", "starts", "normal_scatter")
-        }
+        self._seed = seed
 
     @cached_property
     def normal_scatter(self) -> NormalScatter:
@@ -104,10 +79,23 @@ class CommonSamples:
         return self.moments.basis(self.scatter)
 
     @cached_property
+    def box(self) -> tuple[Array, dict[int, Array]]:
+        """Ends of the scatter, shape (d, 2), and values in it of the axes that take no others."""
+        ends = np.array([axis.scatter_ends for axis in self.moments.axes])
+        discrete = {}
+        for j, ((low, high), axis) in enumerate(zip(ends, self.moments.axes, strict=True)):
+            if axis.discrete is not None:
+                values = axis.discrete.values
+                discrete[j] = values[(values >= low) & (values <= high)]
+        return ends, discrete
+
+    @cached_property
     def starts(self) -> tuple[Array, Array]:
         """Corners and some samples within the box, shape (k, d), and the polynomials there."""
-        inside = np.clip(self.scatter[:64], self.ends[:, 0], self.ends[:, 1])
-        points = np.concatenate([self._corners, inside])
+        ends, _ = self.box
+        inside = np.clip(self.scatter[:_INSIDE], *ends.T)
+        some = corners(ends, MOST_CORNERS, np.random.default_rng(self._seed))
+        points = np.concatenate([some, inside])
         return points, self.moments.basis(points)
 
 
@@ -256,50 +244,22 @@ class Around:
     def extreme(self, side: float) -> tuple[Array, Array]:
         """Return the largest value in the box, shape (n,), and the polynomials there, (n, q).
 
-        The smallest for ``side`` -1; where runs fail, only where one is likelier to succeed. From
-        the best of the corners and of some points inside, by searches along one axis after the
-        other.
+        The smallest for ``side`` -1; where runs fail, only where one is likelier to succeed.
         """
-        points, basis = self._common.starts
+        moments, (ends, discrete) = self._common.moments, self._common.box
+        starts, basis = self._common.starts
+
+        def value(points: Array) -> Array:
+            basis = moments.basis(points.reshape(-1, points.shape[2]))
+            basis = basis.reshape(*points.shape[:2], -1)
+            values = side * np.einsum("nkq,nq->nk", basis, self.expansion)
+            if self.success is not None:
+                values = np.where(self.success.likely_at(points), values, -np.inf)
+            return np.asarray(values)
+
         values = side * self.expansion @ basis.T
         if self.success is not None:
-            values = np.where(self.success.likely_at(points), values, -np.inf)
-        best = np.argmax(values, axis=1)
-        optima = points[best]
-        ends = self._common.ends
-        moving = np.flatnonzero(ends[:, 0] < ends[:, 1])
-        line = 0.5 - 0.5 * np.cos(np.pi * np.arange(_LINE) / (_LINE - 1))
-        width = ends[:, 1] - ends[:, 0]
-        for sweep in range(_SWEEPS):
-            for j in moving.tolist():
-                discrete = self._common.moments.axes[j].discrete
-                if discrete is not None:
-                    inside = (discrete.values >= ends[j, 0]) & (discrete.values <= ends[j, 1])
-                    tried = np.tile(discrete.values[inside], (len(optima), 1))
-                    optima = self._best_on_line(optima, j, tried, side)
-                    continue
-                # The first sweep looks along the whole line, later ones ever nearer.
-                steps = (line - 0.5) * 2.0 * 0.25**sweep * width[j]
-                if not sweep:
-                    tried = np.tile(ends[j, 0] + line * width[j], (len(optima), 1))
-                    tried = np.column_stack([tried, optima[:, j]])
-                else:
-                    tried = np.clip(optima[:, j, None] + steps, *ends[j])
-                optima = self._best_on_line(optima, j, tried, side)
-        at = self._common.moments.basis(optima)
+            values = np.where(self.success.likely_at(starts), values, -np.inf)
+        first = starts[np.argmax(values, axis=1)]
+        at = moments.basis(largest_in_box(first, ends, value, _LINE, discrete))
         return np.einsum("nq,nq->n", self.expansion, at), at
-
-    def _best_on_line(self, optima: Array, axis: int, tried: Array, side: float) -> Array:
-        moments = self._common.moments
-        count = tried.shape[1]
-        points = np.repeat(optima, count, axis=0)
-        points[:, axis] = tried.reshape(-1)
-        basis = moments.basis(points).reshape(len(optima), count, -1)
-        values = side * np.einsum("nkq,nq->nk", basis, self.expansion)
-        if self.success is not None:
-            at = points.reshape(len(optima), count, -1)
-            values = np.where(self.success.likely_at(at), values, -np.inf)
-        best = np.argmax(values, axis=1)
-        optima = optima.copy()
-        optima[:, axis] = tried[np.arange(len(optima)), best]
-        return optima

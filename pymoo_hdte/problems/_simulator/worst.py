@@ -1,9 +1,8 @@
-"""The worst that values within intervals do to a goal: a search on the surrogate at each design."""
+"""The largest value in a box by searches along one axis after the other; the worst of intervals."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from itertools import product
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
@@ -11,18 +10,62 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from pymoo_hdte.surrogate.box import corners
+
 Array = NDArray[np.float64]
 
-MOST_CORNERS = 64
-"""Corners at which the search looks first; with six intervals all of them."""
-_INSIDE = 16
-"""Points within, at which it looks besides."""
-_LINE, _SWEEPS, _NEARER = 9, 8, 0.25
-"""Points on a line, sweeps along all intervals, and what shortens a line from one to the next.
+_SWEEPS, _NEARER = 8, 0.25
+"""Sweeps along all axes, and what shortens a line from one to the next.
 
-The last points are 1/8 * 0.25^7 = 8e-6 of an interval apart: a smooth maximum between them is
-missed by some 1e-11 of what the goal varies by.
+With 9 points on a line, the last are 1/8 * 0.25^7 = 8e-6 of an axis apart: a smooth maximum between
+them is missed by some 1e-11 of what the value varies by. The second line reaches as far as the
+neighbours of the best point of the first.
 """
+_CORNERS, _INSIDE, _LINE = 64, 16, 9
+"""Corners of the intervals, points within, and points on a line at which a goal is looked at.
+
+Every one costs all statistics of a design. With six intervals these are all corners.
+"""
+
+
+def largest_in_box(
+    optima: Array,
+    ends: Array,
+    value: Callable[[Array], Array],
+    line: int,
+    discrete: Mapping[int, Array] | None = None,
+) -> Array:
+    """Return the points of a box to which searches lead, shape (n, d); values are largest there.
+
+    Parameters
+    ----------
+    optima : ndarray, shape (n, d)
+        Where they begin.
+    ends : ndarray, shape (d, 2)
+    value : callable
+        Maps points of shape (n, k, d) to their values, shape (n, k).
+    line : int
+        Points on a line through the box.
+    discrete : mapping of int to ndarray, optional
+        Values of the axes that take no others.
+    """
+    width, steps = ends[:, 1] - ends[:, 0], np.linspace(-0.5, 0.5, line)
+    for sweep in range(_SWEEPS):
+        for j in np.flatnonzero(width > 0.0).tolist():
+            # The first sweep looks along the whole line, later ones ever nearer.
+            centre = optima[:, j] if sweep else np.full(len(optima), ends[j].mean())
+            along = np.add.outer(centre, _NEARER**sweep * width[j] * steps)
+            if discrete and j in discrete:
+                along = np.tile(discrete[j], (len(optima), 1))
+            tried = np.repeat(optima[:, None], along.shape[1] + 1, axis=1)
+            tried[:, 1:, j] = np.clip(along, *ends[j])
+            optima = best_of(tried, value(tried))
+    return optima
+
+
+def best_of(points: Array, values: Array) -> Array:
+    """Return the points with the largest values, shape (n, d), from (n, k, d) and (n, k)."""
+    return np.array(points[np.arange(len(points)), np.argmax(values, axis=1)])
 
 
 class WorstOver:
@@ -35,14 +78,11 @@ class WorstOver:
     """
 
     def __init__(self, bounds: Array) -> None:
-        self._lower, self._width = bounds[:, 0], bounds[:, 1] - bounds[:, 0]
-        q = len(bounds)
-        inside = scipy.stats.qmc.Sobol(q, rng=np.random.default_rng(1)).random(_INSIDE)
-        if 2**q <= MOST_CORNERS:
-            corners = np.array(list(product((0.0, 1.0), repeat=q)))
-        else:
-            corners = np.random.default_rng(1).integers(0, 2, (MOST_CORNERS, q)).astype(float)
-        self._starts = np.concatenate([corners, np.full((1, q), 0.5), inside])
+        self._bounds = bounds
+        inside = scipy.stats.qmc.Sobol(len(bounds), rng=np.random.default_rng(1)).random(_INSIDE)
+        inside = np.vstack([np.full((1, len(bounds)), 0.5), inside])
+        inside = bounds[:, 0] + np.diff(bounds).T * inside
+        self._starts = np.vstack([corners(bounds, _CORNERS, np.random.default_rng(1)), inside])
 
     def __call__(self, designs: Array, goal: Callable[[Array], Array]) -> Array:
         """Return the designs with the worst values behind them, shape (n, m + q).
@@ -53,32 +93,21 @@ class WorstOver:
         goal : callable
             Maps designs with values behind them, shape (k, m + q), to what is to be small, (k,).
         """
+
+        def value(tried: Array) -> Array:
+            return self._of(designs, tried, goal)
+
         starts = np.broadcast_to(self._starts, (len(designs), *self._starts.shape))
-        best = self._worst_of(designs, starts, goal)
-        line = np.linspace(-0.5, 0.5, _LINE)
-        for sweep in range(_SWEEPS):
-            for j in range(len(self._width)):
-                # The first sweep looks along the whole interval.
-                centre = 0.5 if not sweep else best[:, j, None]
-                along = np.clip(centre + line * _NEARER**sweep, 0.0, 1.0)
-                along = np.broadcast_to(along, (len(best), _LINE))
-                tried = np.repeat(best[:, None], _LINE + 1, axis=1)
-                tried[:, 1:, j] = along
-                best = self._worst_of(designs, tried, goal)
-        return np.column_stack([designs, self._lower + self._width * best])
+        first = best_of(starts, value(starts))
+        return np.column_stack([designs, largest_in_box(first, self._bounds, value, _LINE)])
 
     def largest(self, designs: Array, number: Callable[[Array], Array]) -> Array:
         """Return the largest of a number over corners and points within, shape (n,)."""
         starts = np.broadcast_to(self._starts, (len(designs), *self._starts.shape))
         return self._of(designs, starts, number).max(axis=1, initial=-np.inf)
 
-    def _worst_of(self, designs: Array, tried: Array, goal: Callable[[Array], Array]) -> Array:
-        """Return the worst of the values tried at each design, shape (n, q)."""
-        worst = np.argmax(self._of(designs, tried, goal), axis=1)
-        return np.array(tried[np.arange(len(designs)), worst])
-
     def _of(self, designs: Array, tried: Array, number: Callable[[Array], Array]) -> Array:
         count = tried.shape[1]
-        values = (self._lower + self._width * tried).reshape(-1, tried.shape[2])
-        points = np.column_stack([np.repeat(designs, count, axis=0), values])
+        behind = tried.reshape(-1, tried.shape[2])
+        points = np.column_stack([np.repeat(designs, count, axis=0), behind])
         return number(points).reshape(len(designs), count) if len(points) else np.empty((0, count))
