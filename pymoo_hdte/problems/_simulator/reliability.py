@@ -6,7 +6,6 @@ import os
 import sys
 import warnings
 from collections.abc import Callable, Mapping
-from contextlib import closing
 from dataclasses import dataclass
 from typing import Any
 
@@ -18,15 +17,11 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from pymoo_hdte.checks import InvalidInput, real_number, whole_number
-from pymoo_hdte.problems._simulator.identity import identity
 from pymoo_hdte.problems._simulator.inputs import Inputs
-from pymoo_hdte.problems._simulator.normal_space import NormalSpace
 from pymoo_hdte.problems._simulator.requested import place_of
-from pymoo_hdte.problems._simulator.run_file import RunFile
-from pymoo_hdte.problems._simulator.runs import Simulator
+from pymoo_hdte.problems._simulator.runs import opened
 from pymoo_hdte.problems._simulator.statistics import Statistic
-from pymoo_hdte.problems._simulator.tails import REACH, TAIL_OF_REACH
-from pymoo_hdte.problems._simulator.workers import Workers
+from pymoo_hdte.problems._simulator.tails import REACH, TAIL_OF_REACH, NormalScatter
 from pymoo_hdte.surrogate._rare.events import Event
 from pymoo_hdte.surrogate._rare.limit_state import (
     LEAST,
@@ -88,6 +83,24 @@ class Reliability:
     n_runs: int
     confirmed: bool
     failed: Array
+
+
+class _NormalSpace:
+    """Standard normal variables that make the scatter of all inputs, one for each that scatters."""
+
+    def __init__(self, inputs: Inputs) -> None:
+        self.inputs, self._scatter = inputs, NormalScatter(inputs.axes)
+        self.d = self._scatter.d
+        middles = [axis.around(None)[:2] for axis in inputs.axes]
+        self._offsets, self._factors = np.array(middles)[..., 0].T
+
+    def cube(self, points: Array) -> Array:
+        """Return the coordinates of the surrogate in -1..1, shape (n, axes)."""
+        return np.clip(self._offsets + self._factors * self._scatter(points), -1.0, 1.0)
+
+    def values(self, points: Array) -> Array:
+        """Return the inputs in their units, shape (n, axes)."""
+        return self.inputs.values(self.cube(points))
 
 
 def failure_probability(
@@ -161,20 +174,20 @@ def failure_probability(
     if inputs.designed:
         allowed = "distributions: an Interval has no probability (robust_problem takes the worst)"
         raise InvalidInput(f"noise[{inputs.designed[0]!r}]", noise[inputs.designed[0]], allowed)
-    space = NormalSpace(inputs)
+    space = _NormalSpace(inputs)
     if not isinstance(event, Event):
         allowed = "an event, as Response('stress') > 250e6 makes it"
         raise InvalidInput("event", event, allowed)
     accuracy = real_number("accuracy", accuracy, above=0.0, below=1.0)
     budget = whole_number("budget", budget, first_runs(len(inputs.axes)))
-    if vectorised and time_limit is not None:
-        raise InvalidInput("time_limit", time_limit, "None for a vectorised simulator")
-    count, batch = whole_number("tries", tries, 1), whole_number("at_once", at_once, 1)
+    batch = whole_number("at_once", at_once, 1)
     random_state = np.random.default_rng(whole_number("seed", seed, 0))
-    file = None if cache is None else RunFile(cache, inputs.names, identity(simulator))
-    bar = tqdm(total=budget, desc="runs", unit="run", disable=not progress, file=sys.stderr)
-    with bar, closing(Workers(executor, time_limit)) as workers:
-        simulate = Simulator(simulator, inputs.names, vectorised, workers, count, file, bar)
+
+    def bar() -> tqdm:
+        return tqdm(total=budget, desc="runs", unit="run", disable=not progress, file=sys.stderr)
+
+    making = vectorised, executor, tries, time_limit, cache, bar
+    with opened(simulator, inputs.names, *making) as simulate:
 
         def responses(points: Array) -> dict[str | None, Array]:
             values = simulate(space.values(points))
@@ -186,8 +199,6 @@ def failure_probability(
         state = learnt_limit_state(
             responses, event, space.d, space.cube, accuracy, budget, random_state, batch
         )
-    if file:
-        file.finish()
     if len(state.failed):
         message = f"{len(state.failed)} of {state.n_runs} runs failed and are left out"
         warnings.warn(message, RuntimeWarning, stacklevel=2)
@@ -197,7 +208,7 @@ def failure_probability(
     return _reliability(state, event, space)
 
 
-def _reliability(state: LimitState, event: Event, space: NormalSpace) -> Reliability:
+def _reliability(state: LimitState, event: Event, space: _NormalSpace) -> Reliability:
     probability = state.probability
     error = Z * np.hypot(state.surrogate_error, state.sampling_error)
     factor = float(np.exp(min(error / max(probability, np.finfo(float).tiny), 700.0)))
@@ -220,13 +231,13 @@ def _reliability(state: LimitState, event: Event, space: NormalSpace) -> Reliabi
     )
 
 
-def _margin(state: LimitState, event: Event, space: NormalSpace, points: Array) -> Array:
+def _margin(state: LimitState, event: Event, space: _NormalSpace, points: Array) -> Array:
     cube = space.cube(points)
     means = {name: response.moments(cube)[0] for name, response in state.posteriors.items()}
     return event.margin(means)
 
 
-def _most_probable(state: LimitState, event: Event, space: NormalSpace) -> Array:
+def _most_probable(state: LimitState, event: Event, space: _NormalSpace) -> Array:
     """Return the point of the limit state nearest to the origin, shape (d,).
 
     From the point of the sample that is nearest; that itself where the search does not end.

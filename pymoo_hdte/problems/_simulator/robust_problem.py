@@ -7,7 +7,6 @@ import os
 import sys
 import warnings
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import closing
 from typing import Any
 
 import numpy as np
@@ -17,13 +16,11 @@ from tqdm import tqdm
 from pymoo_hdte.checks import InvalidInput, one_of, real_number, whole_number
 from pymoo_hdte.problems._simulator.crashes import CrashProbability
 from pymoo_hdte.problems._simulator.data import read_data
-from pymoo_hdte.problems._simulator.identity import identity
 from pymoo_hdte.problems._simulator.inputs import Design, Inputs
 from pymoo_hdte.problems._simulator.problem import SimulatorProblem
 from pymoo_hdte.problems._simulator.replicates import SEED, Replicates
 from pymoo_hdte.problems._simulator.requested import least_tail, places_of
-from pymoo_hdte.problems._simulator.run_file import RunFile
-from pymoo_hdte.problems._simulator.runs import Simulator, no_simulator
+from pymoo_hdte.problems._simulator.runs import Simulator, no_simulator, opened
 from pymoo_hdte.problems._simulator.statistics import (
     Mean,
     RobustConstraint,
@@ -39,7 +36,6 @@ from pymoo_hdte.problems._simulator.trust import (
     random,
     unresolved,
 )
-from pymoo_hdte.problems._simulator.workers import Workers
 from pymoo_hdte.surrogate._sparse.adaptive import (
     IN_A_ROW,
     AdaptiveFit,
@@ -216,16 +212,15 @@ def robust_problem(
     if simulator is None and given is not None and not least:
         simulator, vectorised, budget, cache = no_simulator, False, 0, None
     else:
-        simulator = _checked_signature(simulator, names if takes_seed else inputs.names)
         budget = whole_number("budget", budget, least)
-    file = None if cache is None else RunFile(cache, names, identity(simulator))
-    count, batch = whole_number("tries", tries, 1), whole_number("at_once", at_once, 1)
+    batch = whole_number("at_once", at_once, 1)
     random_state = np.random.default_rng(whole_number("seed", seed, 0))
-    if vectorised and time_limit is not None:
-        raise InvalidInput("time_limit", time_limit, "None for a vectorised simulator")
-    bar = _announce(inputs, least, budget) if progress else tqdm(disable=True)
-    with bar, closing(Workers(executor, time_limit)) as workers:
-        simulate = Simulator(simulator, names, vectorised, workers, count, file, bar, takes_seed)
+
+    def bar() -> tqdm:
+        return _announce(inputs, least, budget) if progress else tqdm(disable=True)
+
+    making = vectorised, executor, tries, time_limit, cache, bar, takes_seed
+    with opened(simulator, names, *making) as simulate:
         at_points: Callable[[Array], Array] = simulate
         in_hand = None if given is None else (given.points, given.values)
         if given is not None:
@@ -257,16 +252,14 @@ def robust_problem(
             surrogate == "auto",
         )
         refusal = _refusal(inputs, fit, accuracy, simulate, positive, (objectives, constraints))
-    responses = simulate.responses
-    runs = None if repeated is None else repeated.runs
-    n_runs = fit.n_runs if runs is None else len(runs.X)
-    parts = inputs, fit, responses, objectives, constraints, n_runs
-    problem = SimulatorProblem(*parts, str(refusal) if refusal else None, runs)
-    if refusal is not None and accept == "accurate":
-        refusal.problem, refusal.runs = problem, problem.runs
-        raise refusal
-    if file:
-        file.finish()
+        responses = simulate.responses
+        runs = None if repeated is None else repeated.runs
+        n_runs = fit.n_runs if runs is None else len(runs.X)
+        parts = inputs, fit, responses, objectives, constraints, n_runs
+        problem = SimulatorProblem(*parts, str(refusal) if refusal else None, runs)
+        if refusal is not None and accept == "accurate":
+            refusal.problem, refusal.runs = problem, problem.runs
+            raise refusal
     _warn_of_failures(problem)
     if refusal:
         warnings.warn(f"accepted as the best there is: {refusal}", RuntimeWarning, stacklevel=2)
@@ -354,43 +347,6 @@ def _takes_seed(
         # One with a default is a random simulator whose seed was fixed, unless runs are repeated.
         takes = parameter is not None and (parameter.default is parameter.empty or bool(replicates))
     return takes if takes or replicates is not None else None
-
-
-def _checked_signature(
-    simulator: Callable[..., Any] | None, names: Sequence[str]
-) -> Callable[..., Any]:
-    """Return a simulator that can be called with these inputs, as far as it tells."""
-    if not callable(simulator):
-        allowed = "a function of the designs and the noise, or None where data have runs enough"
-        raise InvalidInput("simulator", simulator, allowed)
-    try:
-        # What a decorator wraps is not what is called.
-        signature = inspect.signature(simulator, follow_wrapped=False)
-    except (TypeError, ValueError):
-        return simulator
-    parameters = signature.parameters.values()
-    named = [
-        parameter
-        for parameter in parameters
-        if parameter.kind in (parameter.POSITIONAL_OR_KEYWORD, parameter.KEYWORD_ONLY)
-    ]
-    optional = (inspect.Parameter.VAR_POSITIONAL, inspect.Parameter.VAR_KEYWORD)
-    takes = {parameter.name for parameter in named}
-    anything = any(parameter.kind is parameter.VAR_KEYWORD for parameter in parameters)
-    surplus = [] if anything else [name for name in names if name not in takes]
-    missing = [
-        parameter.name
-        for parameter in parameters
-        if parameter.default is parameter.empty
-        and parameter.kind not in optional
-        and parameter.name not in names
-    ]
-    if surplus or missing:
-        reasons = [f"it takes no {', '.join(surplus)}"] if surplus else []
-        reasons += [f"it needs {', '.join(missing)}"] if missing else []
-        allowed = f"those of designs and noise ({', '.join(names)}); {' and '.join(reasons)}"
-        raise InvalidInput("arguments of the simulator", str(signature), allowed)
-    return simulator
 
 
 def _check_statistics(

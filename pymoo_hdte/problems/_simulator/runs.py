@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+import inspect
+import os
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import closing, contextmanager
 from functools import partial
 from typing import Any
 
@@ -10,8 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from pymoo_hdte.checks import InvalidInput
+from pymoo_hdte.checks import InvalidInput, whole_number
 from pymoo_hdte.problems._simulator.children import TOO_LONG, Failure
+from pymoo_hdte.problems._simulator.identity import identity
 from pymoo_hdte.problems._simulator.run_file import RunFile, check_again
 from pymoo_hdte.problems._simulator.workers import Workers, failure_of
 
@@ -37,6 +41,45 @@ class SimulatorFailed(RuntimeError):
     ...
     failed
     """
+
+
+@contextmanager
+def opened(
+    function: Callable[..., Any] | None,
+    names: tuple[str, ...],
+    vectorised: bool,
+    executor: Any,
+    tries: int,
+    time_limit: float | None,
+    cache: str | os.PathLike[str] | None,
+    progress: Callable[[], tqdm],
+    takes_seed: bool | None = None,
+) -> Iterator[Simulator]:
+    """Yield a user's function with its workers and the file of its runs, which ends as this does.
+
+    Parameters
+    ----------
+    function, names, vectorised, takes_seed
+        As in `Simulator`.
+    executor, tries, time_limit, cache
+        As in `robust_problem`.
+    progress : callable
+        Makes the bar.
+
+    Raises
+    ------
+    InvalidInput
+        For an argument that is not allowed, or a function that does not take the inputs.
+    """
+    function = _checked_signature(function, names[:-1] if takes_seed is False else names)
+    count = whole_number("tries", tries, 1)
+    if vectorised and time_limit is not None:
+        raise InvalidInput("time_limit", time_limit, "None for a vectorised simulator")
+    file = None if cache is None else RunFile(cache, names, identity(function))
+    with progress() as bar, closing(Workers(executor, time_limit)) as workers:
+        yield Simulator(function, names, vectorised, workers, count, file, bar, takes_seed)
+    if file:
+        file.finish()
 
 
 def no_simulator(**inputs: Any) -> Any:
@@ -284,3 +327,40 @@ class Simulator:
             raise InvalidInput("names of the responses", names, str(self.responses))
         self.responses = names
         return np.column_stack(arrays)
+
+
+def _checked_signature(
+    simulator: Callable[..., Any] | None, names: Sequence[str]
+) -> Callable[..., Any]:
+    """Return a simulator that can be called with these inputs, as far as it tells."""
+    if not callable(simulator):
+        allowed = "a function of the designs and the noise, or None where data have runs enough"
+        raise InvalidInput("simulator", simulator, allowed)
+    try:
+        # What a decorator wraps is not what is called.
+        signature = inspect.signature(simulator, follow_wrapped=False)
+    except (TypeError, ValueError):
+        return simulator
+    parameters = signature.parameters.values()
+    named = [
+        parameter
+        for parameter in parameters
+        if parameter.kind in (parameter.POSITIONAL_OR_KEYWORD, parameter.KEYWORD_ONLY)
+    ]
+    optional = (inspect.Parameter.VAR_POSITIONAL, inspect.Parameter.VAR_KEYWORD)
+    takes = {parameter.name for parameter in named}
+    anything = any(parameter.kind is parameter.VAR_KEYWORD for parameter in parameters)
+    surplus = [] if anything else [name for name in names if name not in takes]
+    missing = [
+        parameter.name
+        for parameter in parameters
+        if parameter.default is parameter.empty
+        and parameter.kind not in optional
+        and parameter.name not in names
+    ]
+    if surplus or missing:
+        reasons = [f"it takes no {', '.join(surplus)}"] if surplus else []
+        reasons += [f"it needs {', '.join(missing)}"] if missing else []
+        allowed = f"those of designs and noise ({', '.join(names)}); {' and '.join(reasons)}"
+        raise InvalidInput("arguments of the simulator", str(signature), allowed)
+    return simulator

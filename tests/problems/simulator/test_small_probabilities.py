@@ -171,6 +171,12 @@ def test_the_most_probable_point_is_that_of_first_order():
     assert result.importance == pytest.approx({"load": 0.36, "strength": 0.64}, abs=1e-3)
 
 
+def test_inputs_that_do_not_fit_the_signature_are_told_before_any_run():
+    noise = {"load": norm(), "strength": norm()}
+    with pytest.raises(InvalidInput, match="it takes no strength"):
+        failure_probability(lambda load: load, noise, Response() > 4.0, progress=False)
+
+
 def test_a_budget_that_ends_first_gives_a_wide_band():
     with pytest.warns(RuntimeWarning, match="budget"):
         result = failure_probability(
