@@ -69,8 +69,7 @@ _OF_FIT = (*_OF_RESPONSES, *_OF_POINTS, "held_out_error", "truth")
 def _of_success(fit: AdaptiveFit) -> dict[str, Array]:
     """Return the latent polynomial and its draws on the terms of the latter; nothing for None."""
     if fit.success is None:
-        none = np.empty((0, 0))
-        return {name: none for name in _OF_SUCCESS}
+        return dict.fromkeys(_OF_SUCCESS, np.empty((0, 0)))
     draws, mode = fit.success.draws, fit.success.polynomial
     places = {tuple(row): place for place, row in enumerate(draws.indices.tolist())}
     coefficients = np.zeros((1, len(draws.indices)))
@@ -79,36 +78,31 @@ def _of_success(fit: AdaptiveFit) -> dict[str, Array]:
     return dict(zip(_OF_SUCCESS, parts, strict=True))
 
 
-def _read_success(arrays: dict[str, Array], inputs: int) -> Success | None:
-    indices, mode, draws = (arrays[name] for name in _OF_SUCCESS)
+def _read_terms(
+    arrays: dict[str, Array], names: tuple[str, ...], inputs: int, rows: tuple[int, ...]
+) -> list[Any] | None:
+    """Return terms, (p, d), and coefficients of so many rows, (r, p); None where there are none."""
+    indices = arrays[names[0]]
     if indices is None or not len(indices):
         return None
-    shapes = (len(indices), inputs), (1, len(indices)), (DRAWN, len(indices))
-    for name, shape in zip(_OF_SUCCESS, shapes, strict=True):
+    shapes = (len(indices), inputs), *((count, len(indices)) for count in rows)
+    for name, shape in zip(names, shapes, strict=True):
         if arrays[name].shape != shape:
             raise InvalidInput(f"shape of {name}", arrays[name].shape, str(shape))
         if not np.all(np.isfinite(arrays[name])):
             raise InvalidInput(f"{name} of the file", arrays[name].tolist(), "finite")
     _check_indices(indices)
-    whole = indices.astype(int)
-    stays = np.isin(rows_of(whole), rows_of(closed(whole[mode[0] != 0.0])))
-    polynomial = SparsePolynomial(whole[stays], mode[:, stays])
-    return Success(polynomial, SparsePolynomial(whole, draws), np.empty(0))
+    return [indices.astype(int), *(arrays[name] for name in names[1:])]
 
 
-def _read_own(arrays: dict[str, Array], inputs: int, responses: int) -> SparsePolynomial | None:
-    indices, coefficients = arrays["own_indices"], arrays["own_coefficients"]
-    if indices is None or not len(indices):
+def _read_success(arrays: dict[str, Array], inputs: int) -> Success | None:
+    parts = _read_terms(arrays, _OF_SUCCESS, inputs, (1, DRAWN))
+    if parts is None:
         return None
-    for name, shape in zip(
-        _OF_OWN, ((len(indices), inputs), (responses, len(indices))), strict=True
-    ):
-        if arrays[name].shape != shape:
-            raise InvalidInput(f"shape of {name}", arrays[name].shape, str(shape))
-    _check_indices(indices)
-    if not np.all(np.isfinite(coefficients)):
-        raise InvalidInput("own_coefficients of the file", coefficients.tolist(), "finite")
-    return SparsePolynomial(indices.astype(int), coefficients)
+    indices, mode, draws = parts
+    stays = np.isin(rows_of(indices), rows_of(closed(indices[mode[0] != 0.0])))
+    polynomial = SparsePolynomial(indices[stays], mode[:, stays])
+    return Success(polynomial, SparsePolynomial(indices, draws), np.empty(0))
 
 
 def write_problem(
@@ -152,18 +146,11 @@ def write_problem(
         "refusal": refusal,
     }
     arrays = {name: getattr(fit, name) for name in _OF_FIT} | _of_success(fit)
-    none = np.empty((0, 0))
-    arrays |= {"own_indices": none, "own_coefficients": none}
-    if fit.own is not None:
-        arrays |= {
-            "own_indices": fit.own.indices.astype(float),
-            "own_coefficients": fit.own.coefficients,
-        }
-    polynomial = {
-        "indices": fit.polynomial.indices.astype(float),
-        "coefficients": fit.polynomial.coefficients,
-    }
-    FORMAT.write(path, header, **polynomial, **arrays)
+    for prefix, polynomial in (("", fit.polynomial), ("own_", fit.own)):
+        for name in ("indices", "coefficients"):
+            table = np.empty((0, 0)) if polynomial is None else getattr(polynomial, name)
+            arrays[prefix + name] = table.astype(float)
+    FORMAT.write(path, header, **arrays)
 
 
 def read_problem(
@@ -344,6 +331,7 @@ def _read_fit(
     measures = [axis.measure if has_tail else axis.cut for axis, has_tail in pairs]
     others: dict[str, Any] = {name: np.array(arrays[name]) for name in _OF_FIT}
     others["success"] = _read_success(arrays, len(axes))
-    others["own"] = _read_own(arrays, len(axes), responses)
+    own = _read_terms(arrays, _OF_OWN, len(axes), (responses,))
+    others["own"] = None if own is None else SparsePolynomial(*own)
     moments = SparseMoments(polynomial, axes, measures)
     return AdaptiveFit(polynomial=polynomial, moments=moments, n_runs=n_runs, **others)
