@@ -107,11 +107,10 @@ def _ripple(sizes: Sizes) -> list[Guess]:
     """Guess ripples at seen orders, behind a gear at those of two and more whole cycles in a turn.
 
     There nothing of a shaft has other orders, and a ripple once a turn is the same as `Gravity`. A
-    coupling has both, and a brake its ripple in proportion to the load as well.
+    coupling has both.
     """
-    behind_gear, lines = sizes.slower != 1.0, sizes.lines
-    if behind_gear:
-        lines = [family for family in lines if sizes.turns and _is_of_shaft(family.orders[0])]
+    behind_gear = sizes.slower != 1.0
+    lines = _of_shaft(sizes) if behind_gear else sizes.lines
     guesses = [
         guess_of_lines(
             family, "amplitude", sizes.largest, sizes.residual, torque_line, form=family.form
@@ -120,12 +119,16 @@ def _ripple(sizes: Sizes) -> list[Guess]:
     ]
     if behind_gear and sizes.coupling:
         guesses.append(_of_coupling(sizes, torque_line))
-    brakes = [sizes.family(1.0), *lines] if sizes.braked else []
-    return [*guesses, *(_of_brake(family, sizes) for family in brakes)]
+    return guesses
 
 
-def _is_of_shaft(order: float) -> bool:
-    return order > 1.5 and is_whole(order)
+def _of_shaft(sizes: Sizes) -> list[Family]:
+    """Return the lines of two and more whole cycles in a turn of the load's shaft."""
+    return [
+        family
+        for family in sizes.lines
+        if sizes.turns and family.orders[0] > 1.5 and is_whole(family.orders[0])
+    ]
 
 
 def _of_coupling(sizes: Sizes, line: Callable[[float, float, float], PeriodicTorque]) -> Guess:
@@ -144,9 +147,13 @@ def _of_coupling(sizes: Sizes, line: Callable[[float, float, float], PeriodicTor
     )
 
 
-def _of_brake(family: Family, sizes: Sizes) -> Guess:
-    """Guess a ripple in proportion to the load, up to all of it."""
+def _brakes(sizes: Sizes) -> list[Guess]:
+    """Guess ripples in proportion to the load, up to all of it."""
+    brakes = [sizes.family(1.0), *_of_shaft(sizes)] if sizes.braked else []
+    return [_of_brake(family, sizes) for family in brakes]
 
+
+def _of_brake(family: Family, sizes: Sizes) -> Guess:
     def line(order: float, share: float, phase: float) -> BrakeRipple:
         return BrakeRipple(order, phase, share)
 
@@ -156,9 +163,6 @@ def _of_brake(family: Family, sizes: Sizes) -> Guess:
         1.0,
         sizes.residual / sizes.braked,
         line,
-        form="of the load",
-        sentence="The torque of the brake varies in its turn, order {order}, as the load does.",
-        quantities={"share": ""},
     )
 
 
@@ -291,7 +295,8 @@ register(
         ("load",),
         {"order": "", "phase": "angle", "share": ""},
         "The torque of the brake varies in its turn, order {order}, as the load does.",
-        form_of="torque_ripple",
+        _brakes,
+        exact=True,
         nuisance_at=("load",),
     )
 )

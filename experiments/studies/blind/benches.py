@@ -55,7 +55,7 @@ TOLD_AS: Mapping[str, frozenset[str]] = {
     "cogging": frozenset({"cogging"}),
     "mount": frozenset({"bench_resonance"}),
     "shaft": frozenset({"load_shaft"}),
-    "brake_ripple": frozenset({"torque_ripple"}),
+    "brake_ripple": frozenset({"torque_ripple", "brake_ripple"}),
     "gravity": frozenset({"torque_ripple", "gravity"}),
     "warming": frozenset({"warming"}),
     "drift": frozenset({"input_torque_drift", "output_torque_drift"}),

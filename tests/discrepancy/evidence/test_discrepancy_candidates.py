@@ -101,7 +101,6 @@ def test_starts_are_within_the_bounds(candidate):
 
 
 IN_FILES = {
-    "torque_ripple/of the load": "brake_ripple",
     # A model takes the believed inertia beside it.
     "load_inertia/coupled": "coupled_inertia",
     # Another law, with other numbers.

@@ -255,7 +255,8 @@ def port_sizes(
             swept=scales.swept and port in ("output", "mesh"),
             turns=port == "load",
             coupling=port in ("input", "output", "load"),
-            braked=scales.torque if port == "load" else 0.0,
+            # Under one load a share of it is a torque like any other.
+            braked=scales.torque if port == "load" and scales.loads_differ else 0.0,
             slower=slower[port],
             expected=_SHAFTS[port],
         )
