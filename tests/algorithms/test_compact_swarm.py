@@ -122,7 +122,7 @@ def test_the_archive_has_every_front_solution_that_was_evaluated():
 
 @pytest.mark.parametrize("n_result", [1, 15, 300])
 def test_the_size_of_the_result_is_the_user_s(n_result):
-    assert len(run(Parabolas(), 1500, n_result=n_result).F) == n_result
+    assert len(run(Parabolas(), max(300, 5 * n_result), n_result=n_result).F) == n_result
 
 
 @pytest.mark.nightly

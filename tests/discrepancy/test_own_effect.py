@@ -134,6 +134,7 @@ def test_revised_model_has_it(revised, analysis):
     assert drag.law.level == pytest.approx(PLANTED.level, rel=0.2)
 
 
+@pytest.mark.nightly
 def test_believed_it_is_no_longer_missing(revised, analysis):
     again = analyse(analysis.campaign.believing(revised))
     assert again.verdict.status == "adequate"

@@ -67,7 +67,7 @@ def test_presets_agree_with_the_integrator_though_the_angle_is_free(name):
 
 
 @pytest.mark.parametrize(
-    "effect", others_at_night(MEMORYLESS, *MEMORYLESS[::6]), ids=lambda effect: effect.name
+    "effect", others_at_night(MEMORYLESS, *MEMORYLESS[::12]), ids=lambda effect: effect.name
 )
 def test_every_law_agrees_with_the_integrator_along_the_whole_turn(effect):
     model = with_effects(preset("resonant"), effect)

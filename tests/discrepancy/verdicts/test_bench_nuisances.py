@@ -73,8 +73,8 @@ def test_a_brake_may_ripple_once_a_turn_beside_a_coupling_or_a_weight():
     assert not any(label.startswith("torque_ripple/1+2:load") for label in labels)
 
 
-DAILY = ("coupling_ripple", "gravity")
-"""Others run at night."""
+DAILY = ("coupling_ripple",)
+"""Others run at night; gravity is told of by day beside friction."""
 
 
 @pytest.mark.parametrize(

@@ -154,7 +154,11 @@ def test_a_known_torque_is_an_input_of_gain_one():
     [
         pytest.param(lambda v: 6.0 * np.cbrt(v), id="free exponent", marks=pytest.mark.nightly),
         pytest.param(lambda v: 2.0 * np.sign(v) + 3.0 * np.cbrt(v), id="beside dry friction"),
-        pytest.param(lambda v: 4.0 * np.sign(v) * np.abs(v) ** 0.6, id="another exponent"),
+        pytest.param(
+            lambda v: 4.0 * np.sign(v) * np.abs(v) ** 0.6,
+            id="another exponent",
+            marks=pytest.mark.nightly,
+        ),
     ],
 )
 def test_friction_that_grows_slower_than_the_speed_is_known_as_a_curve(curve):

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from night import others_at_night
 
 from pymoo_hdte.discrepancy._evidence.force_balances.evidence import measured_data
 from pymoo_hdte.discrepancy._evidence.force_balances.unexplained import root_mean_square
@@ -43,7 +44,7 @@ def record_of(rest, drag=0.0, noises=(1e-5, 0.02), seed=0):
     return Record("moves", "train", STEP * np.arange(len(speed)), channels)
 
 
-@pytest.mark.parametrize("rest", [1.0, 4.0])
+@pytest.mark.parametrize("rest", others_at_night([1.0, 4.0], 4.0))
 def test_a_complete_model_of_a_joint_that_rests_is_adequate_and_rests_are_told(rest):
     finding = examine_mechanism(JOINT, [record_of(rest)], CUTOFF, [DRY])
     assert finding.verdict.status == "adequate"
@@ -95,7 +96,7 @@ def standing(share):
     return Record("standing", "train", STEP * np.arange(count + rows), channels)
 
 
-@pytest.mark.parametrize("share", [0.0, 0.2, 1.0 / 3.0])
+@pytest.mark.parametrize("share", others_at_night([0.0, 0.2, 1.0 / 3.0], 1.0 / 3.0))
 def test_a_joint_that_stands_still_has_the_same_friction(share):
     finding = examine_mechanism(JOINT, [standing(share)], CUTOFF)
     assert finding.verdict.status == "named"

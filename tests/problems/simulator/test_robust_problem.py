@@ -101,15 +101,17 @@ def test_it_is_an_ordinary_problem_of_pymoo(beam):
         beam.evaluate(np.array([[0.03, 0.06]]))
 
 
-def test_copies_and_pickles_hold_no_samples(beam):
+def test_copies_and_pickles_hold_no_samples():
     """A history of 100 generations held 100 copies of 8 MB of samples."""
     noise = {"F": FORCE, "E": MODULUS}
     tails = [Quantile(0.95), Quantile(0.05)]
-    problem = quiet(cantilever, SIZES, noise, objectives=tails, accuracy=0.05)
+    problem = quiet(
+        lambda b, h, F, E: b + h + F / 5e4 + E / 2e13, SIZES, noise, objectives=tails, accuracy=0.05
+    )
     X = designs_of(problem, 5)
     expected = problem.evaluate(X)
     assert np.array_equal(pickle.loads(pickle.dumps(problem)).evaluate(X), expected)
-    assert len(pickle.dumps(problem)) < 1e6
+    assert len(pickle.dumps(problem)) < 5e5
     tracemalloc.start()
     try:
         copies = [copy.deepcopy(problem) for _ in range(10)]
@@ -130,15 +132,14 @@ def test_prediction_is_near_the_simulator(beam):
 @pytest.mark.parametrize(
     ("simulator", "options", "words"),
     [
-        (cantilever, {"accuracy": 1e-3}, "error of the .* after 60 runs is .* at most 0.001"),
+        (cantilever, {"accuracy": 1e-3}, "error of the .* after 37 runs is .* at most 0.001"),
         (lambda b, h, F, E: b - 0.01, {"positive": True}, "positive response is -"),
     ],
 )
 def test_what_cannot_be_trusted_is_refused_with_the_region(simulator, options, words):
     sizes = {name: Design(0.008, 0.05, tolerance=0.02) for name in "bh"}
-    options = {"budget": 60} | options
     with pytest.raises(UntrustedSurrogate, match=words) as refusal:
-        quiet(simulator, sizes, {"F": FORCE, "E": MODULUS}, **options)
+        quiet(simulator, sizes, {"F": FORCE, "E": MODULUS}, budget=37, **options)
     assert set(refusal.value.region) & {"b", "h"}
     assert "so where" in str(refusal.value)
     assert str(pickle.loads(pickle.dumps(refusal.value))) == str(refusal.value)
@@ -383,7 +384,7 @@ def test_a_random_simulator_is_told_to_be_one():
         return x**2 + 0.1 * noise.standard_normal()
 
     with pytest.raises(InvalidInput, match="fix its seed"):
-        robust_problem(simulate, {"x": Design(1.0, 2.0, tolerance=0.1)}, budget=60, progress=False)
+        robust_problem(simulate, {"x": Design(1.0, 2.0, tolerance=0.1)}, budget=40, progress=False)
 
 
 @pytest.mark.nightly
