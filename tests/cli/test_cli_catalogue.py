@@ -14,8 +14,9 @@ from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.cli import command_line as cli
 from pymoo_hdte.cli import decision, decision_report
 from pymoo_hdte.cli.drive_arguments import exceeded, near_resonances, read_drive
-from pymoo_hdte.cli.example_records import TRUTH, VARIATION
+from pymoo_hdte.cli.example_records import TOLERANCES, TRUTH, VARIATION, true_drive
 from pymoo_hdte.discrepancy import read_drive_model
+from pymoo_hdte.discrepancy._records.known_values import known_values
 from pymoo_hdte.drive import (
     ESTIMATES,
     built_in_page,
@@ -56,6 +57,16 @@ def test_records_give_the_figures_of_the_drive_that_was_measured(gear, tmp_path)
     assert measured["load_inertia"] == before["load_inertia"]
     assert after.printed == load_page(gear / "gear.toml").printed
     assert load_drive(out / "identified_drive.toml").sheet.ratio == 100.0
+
+
+@pytest.mark.parametrize("size", [14, 20, 25])
+def test_the_drive_of_the_records_is_within_what_their_campaign_states(size):
+    """A limit that was taken for a value was found to be out of its tolerance."""
+    page = load_page(built_in_page(size))
+    believed, true = (known_values(drive.effects) for drive in (drive_of(page), true_drive(page)))
+    for name, value in believed.items():
+        tolerance = TOLERANCES.get(name.rpartition(".")[2], 0.0)
+        assert true[name] == pytest.approx(value, rel=max(0.95 * tolerance, 1e-9)), name
 
 
 def test_an_example_is_not_written_over_anything(gear, capsys):
