@@ -123,7 +123,11 @@ def test_rivals_of_both_sizes_on_a_suite_run_once(outcome):
         assert all(min(of_all, key=of_all.get) == "CompactSwarm" for of_all in ranks)
         against = [test for n in BUDGETS for test in suite_tests(outcome, BOTH_SIZES, n, measure)]
         assert all(test.beaten for test in against)
-    assert f"{len(outcome.problems(BOTH_SIZES, 500))} problems, one run each" in WORDS
+    problems = outcome.problems(BOTH_SIZES, 500)
+    assert f"{len(problems)} problems, two runs each, one from 10,000 on" in WORDS
+    for name in outcome.algorithms(BOTH_SIZES, 500):
+        runs = [len(outcome.runs(problems[0], name, n, 0)) for n in BUDGETS]
+        assert runs == [2, 2, 1, 1]
 
 
 def test_tables_hold_all_that_is_stored():

@@ -50,8 +50,8 @@ ours has for the budget (`compact.size_for`) and the front of all that was evalu
 all, then seeds 2 to 5 as far as the time of the processor goes, a seed only if all eight have it.
 Judged as ZCAT is: average ranks of the medians by the hypervolume and by IGD+, and Wilcoxon's test
 over the 26 problems, after Holm over the seven rivals of a budget. It is run once. The time was
-enough for seed 1. Later, before any of it was run: seeds 2 to 5 after 500 and 2,000 evaluations,
-which is what time there was.
+enough for seed 1. Later, before any of it was run: seeds 2 to 5 after 500 and 2,000 evaluations.
+The time was enough for seed 2.
 
 Beside the best published on bbob-biobj, written down before its run: ours as it is on instance 8,
 of which no run was ever stored and which today's swarm has not seen; 3 to 9 were looked at with
@@ -61,7 +61,7 @@ HMO-CMA-ES (`bbob_tables.CITED`) by more than 0.01 at any of the four budgets in
 and above it in the mean of the eight. Beside it NSGA-II with as many individuals as ours has for
 the budget, at all four, and SMS-EMOA and AGE-MOEA-II so sized after 500 and 2,000: longer runs of
 these would take more than the 25 minutes of a core that are allowed. COCO's logger is everybody's
-archive.
+archive. The time was enough for NSGA-II to 10,000.
 
 Seeds count from 1. On bbob-biobj each instance is one run, as with COCO, from first positions in
 [-5, 5] in the box [-100, 100] that the suite states.
