@@ -37,7 +37,8 @@ OPENTURNS = "OpenTURNS"
 CHAOSPY = "chaospy"
 KRIGING = "OpenTURNS Kriging"
 PROCESS = "Matern process"
-METHODS = (OURS, CHAOSPY, OPENTURNS, KRIGING, PROCESS)
+RIVALS = (CHAOSPY, OPENTURNS, KRIGING, PROCESS)
+METHODS = (OURS, *RIVALS)
 TRACES = {OPENTURNS: openturns_trace, KRIGING: kriging_trace, PROCESS: process_trace}
 ACCURACY = 0.01
 BUDGET = 500
@@ -212,8 +213,7 @@ def outcome_for(context: Context) -> Outcome:
         Curve(name, method, runs)
         for name in names
         if (runs := needed(name, OURS)) is not None
-        for method in METHODS
-        if method != OURS
+        for method in RIVALS
     ]
     states = [state.name for state in LIMIT_STATES] if context.full else QUICK_STATES
     groups = [
@@ -318,14 +318,19 @@ def read_outcome(curves: Path, stops: Path, rare: Path) -> Outcome:
     return Outcome(by_way, numbers, {case: np.array(rows) for case, rows in seeds.items()})
 
 
+def is_complete(outcome: Outcome, function: str) -> bool:
+    """Whether every rival has as many runs as ours needs, or needs fewer, or ours too many."""
+    ours = outcome.needed(function, OURS)
+    return ours is None or all(
+        outcome.needed(function, method) or outcome.tried(function, method) >= ours
+        for method in RIVALS
+    )
+
+
 def ahead(outcome: Outcome, function: str) -> bool:
     """Whether ours needs fewer runs than every rival, each of which was tried with as many."""
     ours = outcome.needed(function, OURS)
-    if ours is None:
+    if ours is None or not is_complete(outcome, function):
         return False
-    for method in METHODS:
-        if method != OURS:
-            needed = outcome.needed(function, method)
-            if not (outcome.tried(function, method) >= ours if needed is None else ours < needed):
-                return False
-    return True
+    counts = [outcome.needed(function, method) for method in RIVALS]
+    return all(count is None or ours < count for count in counts)

@@ -47,6 +47,7 @@ from experiments.studies.robust.data import (
     SEEDS,
     Outcome,
     ahead,
+    is_complete,
     outcome_for,
 )
 from experiments.studies.robust.functions import BY_NAME, FUNCTIONS
@@ -230,16 +231,11 @@ def of_the_first_page(outcome: Outcome) -> str:
 
 
 def _tried_and_won(outcome: Outcome) -> tuple[list[str], list[str]]:
-    """Return the functions that were run, and those on which ours needs least.
+    """Return the functions that were run with all methods, and those on which ours needs least.
 
     Others are not run where ours needs more than the budget.
     """
-    names = [
-        name
-        for name in outcome.functions()
-        if outcome.needed(name, OURS) is None
-        or all(outcome.tried(name, method) for method in METHODS)
-    ]
+    names = [name for name in outcome.functions() if is_complete(outcome, name)]
     return names, [name for name in names if ahead(outcome, name)]
 
 
