@@ -44,7 +44,10 @@ def periodic(misfit, *orders):
     """Effects of some orders that leave ``misfit`` times the variance of the noise."""
     fit = SimpleNamespace(**{**vars(UNFITTED), "chi_square": misfit * FREEDOM})
     ripple = effect_named("torque_ripple")
-    candidates = [SimpleNamespace(effect=ripple, name=ripple.name, order=one) for one in orders]
+    candidates = [
+        SimpleNamespace(effect=ripple, name=ripple.name, order=order, is_value=False)
+        for order in orders
+    ]
     return SimpleNamespace(fit=fit, candidates=candidates, listed=True, label="torque_ripple")
 
 
