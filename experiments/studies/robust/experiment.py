@@ -128,11 +128,12 @@ def runs_needed(outcome: Outcome) -> Figure:
         for method, (colour, style) in STYLES.items():
             runs = outcome.needed(name, method)
             tried = outcome.tried(name, method)
-            look = {"color": colour, "mfc": "none", "mew": 2}
             if runs is not None:
                 # Another with as many runs stands above ours.
                 raised = 0.0 if method == OURS else 0.3
-                axis.plot(runs, place - raised, style[0], markersize=9, **look)
+                axis.plot(
+                    runs, place - raised, style[0], markersize=9, color=colour, mfc="none", mew=2
+                )
             elif tried:
                 arrows[tried] = arrows.get(tried, 0) + 1
                 beside = tried * _ARROW ** (0.5 + arrows[tried])
