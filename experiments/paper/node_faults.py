@@ -13,7 +13,6 @@ from scipy.optimize import brentq
 from scipy.special import gamma
 from scipy.stats import gennorm
 
-from experiments.paper.inference.node_noise import share_of_noise
 from experiments.published_values import TABLE_5
 from experiments.runner.texts import paragraphs
 from pymoo_hdte._comparing.figures import BLUE, GREEN, GREY, ORANGE, grid
@@ -38,6 +37,18 @@ WITHIN = 2.45
 
 
 (FAULTS_NOTE,) = paragraphs("node_faults", above=HIGH + 1, high=HIGH, low=LOW, within=WITHIN)
+
+
+def share_of_noise(order: int, variables: int = len(PARAMETERS)) -> float:
+    """Return the variance of an interpolant's noise, averaged over the cube, for noise of size 1.
+
+    At p Chebyshev nodes the squares of the cardinal functions sum to
+    (1 + 2 sum_m T_m^2) / p, m = 1 .. p - 1. The average of T_m^2 over -1 .. 1 is
+    (1 - 1 / (4 m^2 - 1)) / 2, and those fractions sum to (p - 1) / (2 p - 1). One variable
+    therefore gives 1 - (p - 1) / (p (2 p - 1)), and several variables its power.
+    """
+    p = order + 1
+    return float((1.0 - (p - 1) / (p * (2 * p - 1))) ** variables)
 
 
 def cardinal_functions(cube: Array, order: int) -> Array:

@@ -12,7 +12,8 @@ ROOT = Path(pymoo_hdte.__file__).parent
 EXPERIMENTS = Path(experiments.__file__).parent
 TESTS = Path(__file__).parents[1]
 LOWEST_FIRST = (
-    *("checks", "_lazy", "units", "_compilation", "_one_thread", "_interrupts", "_io", "effects"),
+    *("checks", "_lazy", "units", "_compilation", "_one_thread", "_interrupts", "_unchanging"),
+    *("_io", "effects"),
     *("_reports", "drive._solve", "drive._effects", "drive", "mechanism"),
     *("surrogate", "surrogate._sparse", "surrogate._rare"),
     "validation",

@@ -26,6 +26,7 @@ from experiments.paper.inference.moments import (
     place,
     uniform_rule,
 )
+from experiments.paper.node_faults import share_of_noise
 from experiments.paper.scatter import Rule
 from experiments.published_values import TABLE_5, TABLE_9
 from pymoo_hdte.drive import PARAMETERS
@@ -37,18 +38,6 @@ SIZE = ORDER + 1
 """Nodes on each of the five axes."""
 ROLLING = PARAMETERS.index("B_in")
 """The axis that the DTE does not depend on. Its noise does, node by node."""
-
-
-def share_of_noise(order: int, variables: int = len(PARAMETERS)) -> float:
-    """Return the variance of an interpolant's noise, averaged over the cube, for noise of size 1.
-
-    At p Chebyshev nodes the squares of the cardinal functions sum to
-    (1 + 2 sum_m T_m^2) / p, m = 1 .. p - 1. The average of T_m^2 over -1 .. 1 is
-    (1 - 1 / (4 m^2 - 1)) / 2, and those fractions sum to (p - 1) / (2 p - 1). One variable
-    therefore gives 1 - (p - 1) / (p (2 p - 1)), and several variables its power.
-    """
-    p = order + 1
-    return float((1.0 - (p - 1) / (p * (2 * p - 1))) ** variables)
 
 
 LARGEST = TABLE_5[ORDER].rmse_arcsec / (1.0 + share_of_noise(ORDER)) ** 0.5

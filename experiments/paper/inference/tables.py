@@ -20,7 +20,7 @@ from experiments.paper.inference.likelihood import (
     box_axes,
 )
 from experiments.paper.inference.moments import TensorSurrogate
-from experiments.paper.inference.node_noise import LARGEST, growth_of_rmse, share_of_noise
+from experiments.paper.inference.node_noise import LARGEST, growth_of_rmse
 from experiments.paper.inference.rungs import COLUMNS, Rung, dte_arcsec, is_stable
 from experiments.paper.inference.verdicts import (
     PRESET,
@@ -42,6 +42,7 @@ from experiments.paper.inference.verdicts import (
     with_noise,
     without_noise,
 )
+from experiments.paper.node_faults import share_of_noise
 from experiments.published_values import TABLE_5, TABLE_6
 from pymoo_hdte._runner.result import Cell, Column, Finding, Table, significant
 from pymoo_hdte.surrogate import ChebyshevSurrogate, latin_hypercube
