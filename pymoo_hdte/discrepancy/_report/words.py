@@ -51,10 +51,6 @@ _SENTENCES: dict[str, Callable[[Reason, Label], str]] = {
     codes.ABOVE_NOISE: lambda reason, label: (
         f"the unexplained residual is {dict(reason.numbers)['times_noise']:.3g} times the noise"
     ),
-    codes.MORE_MISSING: lambda reason, label: (
-        "it leaves something, which is outside the library with a probability of "
-        f"{100.0 * dict(reason.numbers)['outside']:.0f} %"
-    ),
     codes.NEEDS_ANOTHER_FORM: lambda reason, label: (
         f"{label(reason.effect)} needs another form to explain the residual"
     ),
