@@ -245,7 +245,10 @@ def _changed(
     found: tuple[DriveEffect, ...],
 ) -> DriveModel:
     """Return the drive after changes, with what was found."""
-    drive = changed_drive(page, figures, settings)
+    return _with(changed_drive(page, figures, settings), found)
+
+
+def _with(drive: DriveModel, found: tuple[DriveEffect, ...]) -> DriveModel:
     return replace(drive, effects=(*drive.effects, *found))
 
 
@@ -255,8 +258,8 @@ def _outcome(
     settings: Mapping[str, float],
     found: tuple[DriveEffect, ...],
 ) -> Outcome:
-    cost = _cost(changed_drive(page, figures, settings), settings)
-    drive = _changed(page, figures, settings, found)
+    changed = changed_drive(page, figures, settings)
+    cost, drive = _cost(changed, settings), _with(changed, found)
     dte = drive.dte_where_found(_drives(drive))
     return Outcome(
         cost.starting, cost.efficiency, cost.stress, float(dte.mean()), float(dte.std(ddof=1))
