@@ -20,6 +20,8 @@ from scipy.stats import chi2
 from pymoo_hdte.discrepancy._evidence.order_lines.folded_lines import orders_that_fold
 from pymoo_hdte.discrepancy._evidence.order_lines.prediction import Conditions, Prediction
 from pymoo_hdte.discrepancy._evidence.order_lines.wander import (
+    NEIGHBOURS,
+    WHOLE,
     line_variances,
     wander_of_lines,
 )
@@ -35,13 +37,8 @@ from pymoo_hdte.discrepancy._records.records import RunningRecord
 from pymoo_hdte.discrepancy._records.residual_spectrum import residual_spectrum
 from pymoo_hdte.discrepancy._selection.rules import RULES, Rules
 
-_NEIGHBOURS = 4
-"""Multiples of 1/N on either side of a line that tell the noise there: a mean of sixteen squares,
-which is known to a quarter."""
 _GUARD = 2
 """Neighbours on either side that a line may leak into."""
-_WHOLE = 1e-6
-"""Distance from a whole order by rounding."""
 MEANS = (0, 1)
 """Channels whose mean is a feature; the others' means are conditions."""
 
@@ -264,7 +261,7 @@ def unexpected_lines(
         power = amplitudes**2
         threshold = np.log(power.size * len(features.records) / rules.unexpected_line_chance)
         seen = (power[:3] > threshold).any(axis=0)
-        for place in np.flatnonzero(np.abs(orders - orders.round()) < _WHOLE).tolist():
+        for place in np.flatnonzero(np.abs(orders - orders.round()) < WHOLE).tolist():
             seen[place] |= power[3, place] > _threshold_at(place, power[3], threshold)
         beyond = np.flatnonzero(seen)
         sizes = power[:, beyond].sum(axis=0)
@@ -278,8 +275,8 @@ def _threshold_at(place: int, power: NDArray[np.float64], threshold: float) -> f
     Where its neighbours show more than noise, their mean is the measure. Of n of them it is not
     exact: a line exceeds c times it by chance in (1 + c / n)^-n of all cases, not in exp(-c).
     """
-    below = power[max(place - _GUARD - _NEIGHBOURS, 0) : max(place - _GUARD, 0)]
-    near = np.concatenate([below, power[place + _GUARD + 1 :][:_NEIGHBOURS]])
+    below = power[max(place - _GUARD - NEIGHBOURS, 0) : max(place - _GUARD, 0)]
+    near = np.concatenate([below, power[place + _GUARD + 1 :][:NEIGHBOURS]])
     n = near.size
     if not n or near.sum() <= chi2.isf(np.exp(-threshold), 2 * n) / 2.0:
         return threshold

@@ -22,12 +22,12 @@ from pymoo_hdte.discrepancy._selection.rules import Rules
 
 Values = NDArray[np.float64]
 
-_NEIGHBOURS = 4
+NEIGHBOURS = 4
 """Multiples of 1/N on either side of a line that tell what is there: a mean of sixteen squares,
 which is known to a quarter."""
 _WITHIN = 2.0
 """Cycles in a record within which a tone may be hidden by a line and the one beside it."""
-_WHOLE = 1e-6
+WHOLE = 1e-6
 """Distance from a whole order by rounding; these are the motor's."""
 
 
@@ -56,7 +56,7 @@ class _Beside(NamedTuple):
     def tones(self, threshold: float) -> tuple[Values, Values]:
         """Return frequencies, Hz, and variances over the mean speed of what exceeds a power."""
         orders = self.orders
-        beside = np.abs(orders - orders.round()) > _WHOLE
+        beside = np.abs(orders - orders.round()) > WHOLE
         strong = beside & (self.power > threshold)
         variances = (self.power[strong] - 1.0) * np.median(self.noise) * orders[strong] ** 2
         return orders[strong] * self.turns_per_second, variances
@@ -115,7 +115,7 @@ def _of_neighbours(beside: _Beside, orders: Values, rules: Rules) -> Values:
     excess, seen = np.zeros(len(orders)), np.zeros(len(orders), dtype=bool)
     for place, order in enumerate(orders):
         middle = int(np.searchsorted(searched, order))
-        near = slice(max(middle - _NEIGHBOURS, 0), middle + _NEIGHBOURS)
+        near = slice(max(middle - NEIGHBOURS, 0), middle + NEIGHBOURS)
         count = len(searched[near])
         if not count:
             continue
