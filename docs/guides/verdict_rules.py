@@ -305,7 +305,7 @@ for one in sorted([verdict.chosen, *verdict.alternatives], key=lambda one: one.b
 # Change a rule
 # -------------
 #
-# `analyse` and `read_campaign` take rules of your own. If a name should remove nearly all of a
+# `analyse` takes rules of your own. If a name should remove nearly all of a
 # misfit, and not only the better half, ask for it:
 
 measured = MeasuredMechanism(joint, [record_of(0.3)])
