@@ -132,6 +132,12 @@ def divide_or_zero(
     return np.divide(numerator, denominator, out=np.zeros_like(numerator), where=denominator != 0.0)
 
 
+def deviation(expansion: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the standard deviation, shape (...), of orthonormal expansions of shape (..., q)."""
+    others = expansion[..., 1:]
+    return np.sqrt(np.einsum("...q,...q->...", others, others))
+
+
 def _square_root(variance: NDArray[np.float64]) -> NDArray[np.float64]:
     # Rounding can leave a variance of zero slightly negative.
     return np.sqrt(np.maximum(variance, 0.0))

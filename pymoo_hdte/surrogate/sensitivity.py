@@ -19,7 +19,7 @@ from pymoo_hdte.checks import InvalidInput, finite_array
 from pymoo_hdte.surrogate.box import Box
 from pymoo_hdte.surrogate.chebyshev import ChebyshevSurrogate
 from pymoo_hdte.surrogate.inputs import UncertainInput
-from pymoo_hdte.surrogate.tensor import chebyshev_basis
+from pymoo_hdte.surrogate.tensor import to_orthonormal
 
 Rule = tuple[NDArray[np.float64], NDArray[np.float64]]
 """Values of one variable, shape (q,), and their weights, which sum to one."""
@@ -178,18 +178,10 @@ def _indices(surrogate: ChebyshevSurrogate, rules: Sequence[Rule]) -> SobolIndic
 def _orthonormal_coefficients(
     surrogate: ChebyshevSurrogate, rules: Sequence[Rule]
 ) -> NDArray[np.float64]:
-    """Return the surrogate's coefficients in polynomials orthonormal under the rules.
-
-    In one variable T_a = sum_b R_ba phi_b, where R is the triangular factor of the weighted basis
-    at the nodes. Unlike a Cholesky factor of its moments, this keeps all digits of a narrow
-    distribution, and works for one of no width.
-    """
+    """Return the surrogate's coefficients in polynomials orthonormal under the rules."""
     box, coefficients = surrogate.box, surrogate.coefficients
     for axis, (values, weights) in enumerate(rules):
         cube = (values - box.centre[axis]) / box.half_width[axis]
-        basis = chebyshev_basis(cube, coefficients.shape[axis])
-        change = np.array(np.linalg.qr((basis * np.sqrt(weights)).T, mode="r"))
-        # phi_0 is the constant 1: T_0 = phi_0, whatever sign the factorisation gave it.
-        change[0] *= np.sign(change[0, 0])
+        change = to_orthonormal(cube, weights, coefficients.shape[axis])
         coefficients = np.moveaxis(np.tensordot(change, coefficients, axes=(1, axis)), 0, axis)
     return coefficients

@@ -36,6 +36,19 @@ def chebyshev_basis(x: NDArray[np.float64], size: int) -> NDArray[np.float64]:
     return basis
 
 
+def to_orthonormal(
+    x: NDArray[np.float64], weights: NDArray[np.float64], size: int
+) -> NDArray[np.float64]:
+    """Return R, shape (size, size), of T_a = sum_b R_ba phi_b, the phi orthonormal under a rule.
+
+    The triangular factor of the weighted basis at the values ``x``, shape (q,). Unlike a Cholesky
+    factor of its moments, it keeps all digits of a narrow distribution, and is there for one of no
+    width. phi_0 is the constant 1.
+    """
+    change = np.array(np.linalg.qr((chebyshev_basis(x, size) * np.sqrt(weights)).T, mode="r"))
+    return change * np.sign(change[0, 0])
+
+
 def coefficients_from_nodes(values: NDArray[np.float64]) -> NDArray[np.float64]:
     """Turn values on a tensor grid of Chebyshev nodes into the coefficients of the interpolant.
 

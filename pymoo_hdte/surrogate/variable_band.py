@@ -14,8 +14,8 @@ from pymoo_hdte.checks import InvalidInput, real_number
 from pymoo_hdte.surrogate.box import Box
 from pymoo_hdte.surrogate.chebyshev import ChebyshevSurrogate
 from pymoo_hdte.surrogate.inputs import TruncatedNormal, UncertainInput, Uncertainty, UniformBand
-from pymoo_hdte.surrogate.moments import divide_or_zero
-from pymoo_hdte.surrogate.tensor import chebyshev_basis
+from pymoo_hdte.surrogate.moments import deviation, divide_or_zero
+from pymoo_hdte.surrogate.tensor import chebyshev_basis, to_orthonormal
 
 _AT_ONCE = 2**15
 """Numbers in one array: more exceed the processor's cache, fewer cost numpy overhead."""
@@ -98,7 +98,7 @@ class VariableBandMoments:
         for block in self._blocks(len(points)):
             rows = [values for values, _, _ in self._rows(points[block])]
             expansion = self._expand(rows)[-1]
-            mean[block], std[block] = expansion[:, 0], _deviation(expansion)
+            mean[block], std[block] = expansion[:, 0], deviation(expansion)
         return mean, std
 
     def gradient(self, designs: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -114,7 +114,7 @@ class VariableBandMoments:
             stages = self._expand([values for values, _, _ in rows])
             of_mean, others = np.zeros_like(stages[-1]), stages[-1].copy()
             of_mean[:, 0], others[:, 0] = 1.0, 0.0
-            std = _deviation(stages[-1])[:, None]
+            std = deviation(stages[-1])[:, None]
             dmean[block] = _pulled_back(of_mean, stages, rows)
             dstd[block] = divide_or_zero(_pulled_back(others, stages, rows), std)
         return dmean, dstd
@@ -169,10 +169,6 @@ def _legendre_rule(size: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]
     return nodes, normalised * (weights[:, None] / 2.0)
 
 
-def _deviation(expansion: NDArray[np.float64]) -> NDArray[np.float64]:
-    return np.sqrt(np.einsum("nr,nr->n", expansion[:, 1:], expansion[:, 1:]))
-
-
 def _pulled_back(
     weights: NDArray[np.float64],
     stages: Arrays,
@@ -208,11 +204,9 @@ def _with_noise_expanded(
     for axis in noise_axes:
         size = coefficients.shape[axis]
         values, weights = uncertainty.inputs[axis].quadrature(2 * (size - 1))
-        basis = chebyshev_basis((values - box.centre[axis]) / box.half_width[axis], size)
-        _, triangle = np.linalg.qr((basis * np.sqrt(weights)).T)
-        # The constant polynomial shall be 1; QR may return it as -1.
-        expanded = np.tensordot(triangle * np.sign(triangle[0, 0]), coefficients, (1, axis))
-        coefficients = np.moveaxis(expanded, 0, axis)
+        cube = (values - box.centre[axis]) / box.half_width[axis]
+        change = to_orthonormal(cube, weights, size)
+        coefficients = np.moveaxis(np.tensordot(change, coefficients, (1, axis)), 0, axis)
     designed = [coefficients.shape[axis] for axis in uncertainty.design_axes]
     ordered = coefficients.transpose(*uncertainty.design_axes, *noise_axes)
     return ordered.reshape(*designed, prod(ordered.shape[len(designed) :]))

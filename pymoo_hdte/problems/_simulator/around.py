@@ -16,10 +16,10 @@ from pymoo_hdte.problems._simulator.crashes import SuccessAround
 from pymoo_hdte.problems._simulator.replicates import OwnScatter
 from pymoo_hdte.problems._simulator.tails import NormalScatter, Tail
 from pymoo_hdte.problems._simulator.worst import largest_in_box
-from pymoo_hdte.surrogate._sparse.moments import SparseMoments, deviation
+from pymoo_hdte.surrogate._sparse.moments import SparseMoments
 from pymoo_hdte.surrogate._sparse.success import STUDENT_OF_DRAWS
 from pymoo_hdte.surrogate.box import corners
-from pymoo_hdte.surrogate.moments import divide_or_zero
+from pymoo_hdte.surrogate.moments import deviation, divide_or_zero
 
 Array = NDArray[np.float64]
 
@@ -39,6 +39,11 @@ MOST_CORNERS = 256
 """Corners of the box of the scatter at which a search for the extreme begins, at most."""
 _INSIDE, _LINE = 64, 33
 """Points within at which it begins besides, and points on a line through the box."""
+
+
+def sampling_error(parts: Array) -> Array:
+    """Return the 95 % half-width of a mean, shape (n,), from its independent parts, (4, n)."""
+    return np.asarray(STUDENT * parts.std(axis=0, ddof=1) / np.sqrt(PARTS))
 
 
 class CommonSamples(Unchanging):
@@ -152,11 +157,6 @@ class Around:
         moments = self._common.moments
         return Tail(self._common.normal_scatter, moments.basis, expansions, margin, target)
 
-    @property
-    def size(self) -> int:
-        """The number q of terms."""
-        return self.expansion.shape[1]
-
     @cached_property
     def weights(self) -> Array | None:
         """What the samples count, shape (n, k), their mean 1; None if all count alike."""
@@ -208,9 +208,8 @@ class Around:
         own = value(self._with(self.success, part))
         others = [value(self._with(draw, part)) for draw in self.success.drawn()]
         parts = np.array([value(quarter) for quarter in self.quarters()])
-        sampling = STUDENT * parts.std(axis=0, ddof=1) / np.sqrt(PARTS)
         posterior = np.sqrt(np.mean((np.array(others) - own) ** 2, axis=0))
-        return STUDENT_OF_DRAWS * posterior + sampling
+        return STUDENT_OF_DRAWS * posterior + sampling_error(parts)
 
     def _with(self, success: SuccessAround | None, part: slice) -> Around:
         """Return all responses with another probability of success and a part of the samples."""

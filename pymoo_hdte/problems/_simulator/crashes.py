@@ -129,10 +129,9 @@ class CrashProbability(Probability):
         """It belongs to no response alone."""
         return ()
 
-    def _of(self, around: Around) -> tuple[Array, Array]:
+    def _value(self, around: Around) -> tuple[Array, Array]:
         return 1.0 - around.success_share, np.zeros((0, 0))
 
-    def _error(self, mean_error: Array, std_error: Array, around: Around) -> Array:
-        if around.success is None:
-            return np.full(len(mean_error), NONE_OF / max(around.n_runs, NONE_OF))
-        return np.zeros_like(mean_error)
+    def _half_width(self, around: Around) -> Array:
+        none = NONE_OF / max(around.n_runs, NONE_OF) if around.success is None else 0.0
+        return np.full_like(around.mean_error, none)

@@ -15,7 +15,7 @@ from pymoo.core.problem import Problem
 from pymoo.core.variable import Real
 
 from pymoo_hdte.checks import InvalidInput, real_number
-from pymoo_hdte.problems._simulator.around import PARTS, STUDENT
+from pymoo_hdte.problems._simulator.around import PARTS, sampling_error
 from pymoo_hdte.problems._simulator.requested import requested_of
 from pymoo_hdte.problems._simulator.runs import SimulatorFailed
 from pymoo_hdte.problems._simulator.sampled_statistics import FEWEST, FailureProbability
@@ -60,11 +60,6 @@ class Drawn:
         return np.column_stack([self.mean, apart / np.sqrt(self._values.shape[1])])
 
     @property
-    def size(self) -> int:
-        """The number of terms."""
-        return self._values.shape[1] + 1
-
-    @property
     def samples(self) -> tuple[Array, Array]:
         """Values at the draws, shape (n, k), and no polynomials there, shape (k, 0)."""
         return self._values, np.empty((self._values.shape[1], 0))
@@ -81,12 +76,12 @@ class Drawn:
     @cached_property
     def mean_error(self) -> Array:
         """95 % half-width of the error of the mean, shape (n,)."""
-        return self._error(np.array([part.mean for part in self.quarters()]))
+        return sampling_error(np.array([part.mean for part in self.quarters()]))
 
     @cached_property
     def std_error(self) -> Array:
         """95 % half-width of the error of the standard deviation, shape (n,)."""
-        return self._error(np.array([part.std for part in self.quarters()]))
+        return sampling_error(np.array([part.std for part in self.quarters()]))
 
     @property
     def success_share(self) -> Array:
@@ -97,10 +92,6 @@ class Drawn:
     def n_runs(self) -> int:
         """Runs behind it, at every design."""
         return self._values.shape[1]
-
-    @staticmethod
-    def _error(parts: Array) -> Array:
-        return np.asarray(STUDENT * parts.std(axis=0, ddof=1) / np.sqrt(PARTS))
 
 
 class DirectProblem(Problem):
@@ -201,19 +192,15 @@ class DirectProblem(Problem):
     def _block(self, x: Any, banded: bool) -> dict[str, Array]:
         around = self._around(x)
         columns = [
-            sign * statistic.value(around[place])[0] - bound
+            sign * statistic._value(around[place])[0] - bound
             for statistic, sign, bound, place in self._requested
         ]
         F, G = np.split(np.column_stack(columns), [self.n_obj], axis=1)
         outputs = {"F": F, "G": G} if self.n_ieq_constr else {"F": F}
         if banded:
-            requested = [(row[0], around[row[3]]) for row in self._requested[: self.n_obj]]
-            outputs["F_band"] = np.column_stack(
-                [
-                    statistic.half_width(response.mean_error, response.std_error, response)
-                    for statistic, response in requested
-                ]
-            )
+            objectives = self._requested[: self.n_obj]
+            bands = [statistic._half_width(around[place]) for statistic, _, _, place in objectives]
+            outputs["F_band"] = np.column_stack(bands)
         return outputs
 
     def _around(self, x: Any) -> list[Any]:

@@ -14,7 +14,7 @@ from pymoo.core.problem import Problem
 from pymoo_hdte.checks import InvalidInput, finite_array
 from pymoo_hdte.problems._simulator import plots
 from pymoo_hdte.problems._simulator.around import RESOLVED, Around, CommonSamples
-from pymoo_hdte.problems._simulator.crashes import CrashProbability, SuccessMoments
+from pymoo_hdte.problems._simulator.crashes import SuccessMoments
 from pymoo_hdte.problems._simulator.data import Runs
 from pymoo_hdte.problems._simulator.inputs import Inputs
 from pymoo_hdte.problems._simulator.replicates import OwnMoments
@@ -227,41 +227,13 @@ class SimulatorProblem(Problem):
         return np.column_stack(columns)
 
     def _bands(self, X: Array, requested: Sequence[Requested]) -> Array:
-        parts = []
-        for start in range(0, len(X), _AT_ONCE):
-            around = self._around(X[start : start + _AT_ONCE])
-            parts.append(self._band(around, requested))
-        return np.concatenate(parts) if parts else np.empty((0, len(requested)))
-
-    def crash_probability(self, designs: ArrayLike) -> tuple[Array, Array]:
-        """Return how likely a run around each design fails, and the half-width of its error.
-
-        Parameters
-        ----------
-        designs : array_like, shape (n, n_var)
-            In the variables' units.
-
-        Returns
-        -------
-        probability, half_width : ndarray, shape (n,)
-            Dimensionless; the band is of 95 %.
-
-        Raises
-        ------
-        ExtrapolationError
-            If a design lies outside the box.
-        InvalidInput
-            If ``designs`` is no array of numbers of shape (n, n_var).
-        """
-        X, statistic = self.design_box.settle(designs), CrashProbability()
-        if self._intervals is not None:
-            X = self._at_worst(X, (statistic, 1.0, 0.0, 0))
-        parts = []
-        for start in range(0, len(X), _AT_ONCE):
-            around = self._around(X[start : start + _AT_ONCE])[0]
-            parts.append([statistic.value(around)[0], _half_width(statistic, around)])
-        probability, half_width = np.concatenate(parts, axis=1) if parts else np.empty((2, 0))
-        return probability, half_width
+        blocks = map(self._around, _blocks(X))
+        return np.concatenate(
+            [
+                np.column_stack([_half_width(row[0], around[row[3]]) for row in requested])
+                for around in blocks
+            ]
+        )
 
     def predict(self, values: ArrayLike) -> Array:
         """Return the surrogate of all responses, shape (n, r), in their units.
@@ -436,17 +408,12 @@ class SimulatorProblem(Problem):
             response.beside, response.n_runs = beside, self.n_runs
         return around
 
-    @staticmethod
-    def _band(around: list[Around], requested: Sequence[Requested]) -> Array:
-        columns = [_half_width(statistic, around[place]) for statistic, _, _, place in requested]
-        return np.column_stack(columns)
-
     @cached_property
     def accuracy(self) -> Array:
         """Estimated error of each objective, as the class says, shape (n_obj,)."""
         designs = draw_designs(self._inputs.axes, _JUDGED, np.random.default_rng(1))
         around = self._around(designs)
-        shares = self._band(around, self._requested[: self.n_obj])
+        shares = self._bands(designs, self._requested[: self.n_obj])
         for column, (statistic, _, _, place) in enumerate(self._requested[: self.n_obj]):
             if statistic.relative_to_scatter:
                 least = self._fit.smallest_scatter[place]
@@ -496,8 +463,7 @@ class SimulatorProblem(Problem):
             quick = by_moments(requested, self._fit.moments, x)
             if quick is not None:
                 return quick, np.empty((len(x), len(requested), 0))
-        starts = range(0, len(x), _AT_ONCE)
-        parts = [self._block(x[start : start + _AT_ONCE], requested, sloped) for start in starts]
+        parts = [self._block(block, requested, sloped) for block in _blocks(x)]
         values, gradients = zip(*parts, strict=True)
         return np.concatenate(values), np.concatenate(gradients)
 
@@ -505,7 +471,7 @@ class SimulatorProblem(Problem):
         around = self._around(x)
         values, gradients = [], [np.empty((len(x), 0))] * len(requested)
         for row, (statistic, sign, bound, place) in enumerate(requested):
-            value, slope = statistic.value(around[place])
+            value, slope = statistic._value(around[place])
             values.append(sign * value - bound)
             if sloped:
                 gradient = self._gradient(x, statistic, slope, around[place], place)
@@ -536,6 +502,11 @@ class SimulatorProblem(Problem):
         return gradient + self._own.moments.pulled_back(x, weights)[:, place]
 
 
+def _blocks(X: Array) -> list[Array]:
+    """Return the designs in groups that are evaluated at once; of no designs, one empty group."""
+    return np.split(X, range(_AT_ONCE, len(X), _AT_ONCE))
+
+
 def _half_width(statistic: Statistic, around: Around) -> Array:
     """Return the half-width of a statistic's band, what is not known of failures included.
 
@@ -543,5 +514,5 @@ def _half_width(statistic: Statistic, around: Around) -> Array:
     """
     if around.common_alone and statistic.relative_to_scatter and statistic.rarest() < RESOLVED:
         return np.full(len(around.mean), np.inf)
-    uncertain = around.error_of_success(lambda other: statistic.value(other)[0])
-    return statistic.half_width(around.mean_error, around.std_error, around) + uncertain
+    uncertain = around.error_of_success(lambda other: statistic._value(other)[0])
+    return statistic._half_width(around) + uncertain

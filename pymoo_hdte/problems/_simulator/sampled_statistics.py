@@ -15,12 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pymoo_hdte.checks import InvalidInput, real_number
-from pymoo_hdte.problems._simulator.around import PARTS, STUDENT, Around
+from pymoo_hdte.problems._simulator.around import Around, sampling_error
 from pymoo_hdte.problems._simulator.crashes import NONE_OF
 from pymoo_hdte.problems._simulator.statistics import Probability, Statistic, reach_of
 from pymoo_hdte.problems._simulator.tails import SMALLEST, Tail, Z, near_quantile, quantile_above
 from pymoo_hdte.surrogate._rare.events import Event, Limit
-from pymoo_hdte.surrogate.moments import divide_or_zero
 
 Array = NDArray[np.float64]
 
@@ -60,7 +59,7 @@ class _TailStatistic(Statistic):
         """
         return min(self.p, 1.0 - self.p)
 
-    def _of(self, around: Around) -> tuple[Array, Array]:
+    def _value(self, around: Around) -> tuple[Array, Array]:
         if around.weights is not None:
             return self._of_weighted(*around.samples, around.weights / len(around.samples[1]))
         if self._common_serve(around):
@@ -69,18 +68,18 @@ class _TailStatistic(Statistic):
         values, slopes, _ = zip(*tails, strict=True)
         return np.array(values), np.array(slopes)
 
-    def _error(self, mean_error: Array, std_error: Array, around: Around) -> Array:
+    def _half_width(self, around: Around) -> Array:
         if around.weights is not None:
-            # `half_width` adds the error of sampling.
-            value, sampling = self._of(around)[0], np.zeros_like(mean_error)
+            # What is open about success has the error of sampling.
+            value, sampling = self._value(around)[0], np.zeros_like(around.mean)
         elif self._common_serve(around):
             value = self._of_common(around)[0]
             parts = np.array([self._of_common(part)[0] for part in around.quarters()])
-            sampling = STUDENT * parts.std(axis=0, ddof=1) / np.sqrt(PARTS)
+            sampling = sampling_error(parts)
         else:
             tails = [self._of_tail(*self._tail(around, row)) for row in range(len(around.mean))]
             value, sampling = (np.array([tail[place] for tail in tails]) for place in (0, 2))
-        return mean_error + reach_of(value, around) * std_error + sampling
+        return around.mean_error + reach_of(value, around) * around.std_error + sampling
 
     def _common_serve(self, around: Around) -> bool:
         return 1.0 - self.p >= around.resolved
@@ -328,7 +327,7 @@ class FailureProbability(Probability):
         """
         return UNBOUNDED if bound is None else min(bound, 1.0 - bound)
 
-    def _of(self, around: Around) -> tuple[Array, Array]:
+    def _value(self, around: Around) -> tuple[Array, Array]:
         return self._shares(around)[0], np.zeros((0, 0))
 
     def _bound(self, bound: float) -> float:
@@ -364,18 +363,14 @@ class FailureProbability(Probability):
     def _signed(self, side: float, values: Mapping[str | None, Array]) -> Array:
         return side * self.failure.margin(values)
 
-    def _error(self, mean_error: Array, std_error: Array, around: Around) -> Array:
+    def _half_width(self, around: Around) -> Array:
         # How far it moves if the responses are off by their errors, plus the error of sampling.
         nearer: dict[str | None, Array] = {}
         for limit in self.failure.limits:
-            name = limit.response
-            response = around.beside[name]
-            own = (mean_error, std_error)
-            if response is not around:
-                own = response.mean_error, response.std_error
-            apart = np.abs(divide_or_zero(limit.bound - response.mean, response.std))
-            off = own[0] + np.maximum(apart, 1.0) * own[1]
-            nearer[name] = np.maximum(nearer.get(name, 0.0), off)
+            response = around.beside[limit.response]
+            apart = np.maximum(reach_of(limit.bound, response), 1.0)
+            off = response.mean_error + apart * response.std_error
+            nearer[limit.response] = np.maximum(nearer.get(limit.response, 0.0), off)
         slacks = [None, nearer, {name: -off for name, off in nearer.items()}]
         shares, errors = self._shares(around, slacks)
         moved = np.max(np.abs(shares[1:] - shares[0]), axis=0)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, ClassVar, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,10 +31,19 @@ class Statistic:
         Name of the response; None for the only one.
     sign : float
         Dimensionless factor: -1 to maximise, which ``-statistic`` sets.
+
+    Attributes
+    ----------
+    has_gradient : bool
+        Whether it is smooth enough for a gradient in the design.
+    relative_to_scatter : bool
+        Whether its error is reported as a share of the scatter.
     """
 
     response: str | None = field(default=None, kw_only=True)
     sign: float = field(default=1.0, kw_only=True, repr=False)
+    has_gradient: ClassVar[bool] = True
+    relative_to_scatter: ClassVar[bool] = True
 
     def __neg__(self: S) -> S:
         return replace(self, sign=-self.sign)
@@ -69,17 +78,7 @@ class Statistic:
         words = [type(self).__name__.lower(), *([self.response] if self.response else [])]
         return ("-" if self.sign < 0 else "") + "_".join(words)
 
-    @property
-    def has_gradient(self) -> bool:
-        """Whether the statistic is smooth enough for a gradient in the design."""
-        return True
-
-    @property
-    def relative_to_scatter(self) -> bool:
-        """Whether its error is reported as a share of the scatter."""
-        return True
-
-    def value(self, around: Around) -> tuple[Array, Array]:
+    def _value(self, around: Around) -> tuple[Array, Array]:
         """Return its values, without the sign, and their slopes in the response's expansion.
 
         Parameters
@@ -94,45 +93,24 @@ class Statistic:
         slope : ndarray, shape (n, q)
             In its coefficients, dimensionless.
         """
-        return self._of(around)
+        raise NotImplementedError
 
-    def half_width(self, mean_error: Array, std_error: Array, around: Around) -> Array:
-        """Return the half-width of its error band, shape (n,), in its unit; NaN if it has none.
-
-        Parameters
-        ----------
-        mean_error, std_error : ndarray, shape (n,)
-            Errors of mean and standard deviation in the response's unit.
-        around : Around
-            The response around n designs.
-        """
-        return self._error(mean_error, std_error, around)
+    def _half_width(self, around: Around) -> Array:
+        """Return the half-width of its error band, shape (n,), in its unit; NaN if it has none."""
+        return around.mean_error
 
     @property
     def weights(self) -> tuple[float, float] | None:
         """Weights of mean and standard deviation, dimensionless; None if it is no such sum."""
         return None
 
-    def _of(self, around: Around) -> tuple[Array, Array]:
-        raise NotImplementedError
-
-    def _error(self, mean_error: Array, std_error: Array, around: Around) -> Array:
-        return mean_error
-
 
 @dataclass(frozen=True)
 class Probability(Statistic):
     """A share of what scatters: it has no unit, and that of a sample jumps."""
 
-    @property
-    def has_gradient(self) -> bool:
-        """False: a share jumps."""
-        return False
-
-    @property
-    def relative_to_scatter(self) -> bool:
-        """False: a probability has no unit."""
-        return False
+    has_gradient = False
+    relative_to_scatter = False
 
 
 @dataclass(frozen=True)
@@ -164,8 +142,27 @@ class RobustConstraint:
         return self.statistic.rarest(self.bound)
 
 
+class _WeightedMoments(Statistic):
+    """A weighted sum of mean and standard deviation, exact for the surrogate."""
+
+    @property
+    def weights(self) -> tuple[float, float]:
+        """Weights of mean and standard deviation, dimensionless."""
+        raise NotImplementedError
+
+    def _value(self, around: Around) -> tuple[Array, Array]:
+        of_mean, of_std = self.weights
+        slope = of_std * divide_or_zero(around.expansion, around.std[:, None])
+        slope[:, 0] = of_mean
+        return of_mean * around.mean + of_std * around.std, slope
+
+    def _half_width(self, around: Around) -> Array:
+        of_mean, of_std = self.weights
+        return of_mean * around.mean_error + abs(of_std) * around.std_error
+
+
 @dataclass(frozen=True)
-class Mean(Statistic):
+class Mean(_WeightedMoments):
     """The mean of a response, exact for the surrogate.
 
     Parameters
@@ -184,11 +181,6 @@ class Mean(Statistic):
     1.0033
     """
 
-    def _of(self, around: Around) -> tuple[Array, Array]:
-        slope = np.zeros_like(around.expansion)
-        slope[:, 0] = 1.0
-        return around.mean, slope
-
     @property
     def weights(self) -> tuple[float, float]:
         """Weights of mean and standard deviation, dimensionless."""
@@ -196,7 +188,7 @@ class Mean(Statistic):
 
 
 @dataclass(frozen=True)
-class Std(Statistic):
+class Std(_WeightedMoments):
     """The standard deviation of a response, exact for the surrogate.
 
     Parameters
@@ -212,22 +204,14 @@ class Std(Statistic):
     'stress'
     """
 
-    def _of(self, around: Around) -> tuple[Array, Array]:
-        slope = divide_or_zero(around.expansion, np.repeat(around.std[:, None], around.size, 1))
-        slope[:, 0] = 0.0
-        return around.std, slope
-
     @property
     def weights(self) -> tuple[float, float]:
         """Weights of mean and standard deviation, dimensionless."""
         return 0.0, 1.0
 
-    def _error(self, mean_error: Array, std_error: Array, around: Around) -> Array:
-        return std_error
-
 
 @dataclass(frozen=True)
-class MeanPlusStd(Statistic):
+class MeanPlusStd(_WeightedMoments):
     """Mean plus k standard deviations of a response, exact for the surrogate.
 
     Parameters
@@ -255,17 +239,10 @@ class MeanPlusStd(Statistic):
     def __post_init__(self) -> None:
         object.__setattr__(self, "k", real_number("k", self.k))
 
-    def _of(self, around: Around) -> tuple[Array, Array]:
-        parts = [moment.value(around) for moment in (Mean(), Std())]
-        return parts[0][0] + self.k * parts[1][0], parts[0][1] + self.k * parts[1][1]
-
     @property
     def weights(self) -> tuple[float, float]:
         """Weights of mean and standard deviation, dimensionless."""
         return 1.0, self.k
-
-    def _error(self, mean_error: Array, std_error: Array, around: Around) -> Array:
-        return mean_error + abs(self.k) * std_error
 
 
 @dataclass(frozen=True)
@@ -301,13 +278,13 @@ class WorstCase(Statistic):
     def __post_init__(self) -> None:
         one_of("side", self.side, ("largest", "smallest"))
 
-    def _of(self, around: Around) -> tuple[Array, Array]:
+    def _value(self, around: Around) -> tuple[Array, Array]:
         return around.extreme(1.0 if self.side == "largest" else -1.0)
 
-    def _error(self, mean_error: Array, std_error: Array, around: Around) -> Array:
-        return np.full_like(mean_error, np.nan)
+    def _half_width(self, around: Around) -> Array:
+        return np.full_like(around.mean_error, np.nan)
 
 
-def reach_of(values: Array, around: Around) -> Array:
+def reach_of(values: Array | float, around: Around) -> Array:
     """Return how many deviations values lie from the mean, shape (n,), 0 without scatter."""
     return np.abs(divide_or_zero(values - around.mean, around.std))

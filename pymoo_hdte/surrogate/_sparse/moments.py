@@ -22,7 +22,7 @@ from pymoo_hdte.surrogate._sparse.index_set import AxisMap
 from pymoo_hdte.surrogate._sparse.many_designs import ManyDesigns
 from pymoo_hdte.surrogate._sparse.measures import Measure, OrthonormalPolynomials
 from pymoo_hdte.surrogate._sparse.polynomial import SparsePolynomial
-from pymoo_hdte.surrogate.moments import divide_or_zero
+from pymoo_hdte.surrogate.moments import deviation, divide_or_zero
 from pymoo_hdte.surrogate.tensor import chebyshev_basis
 from pymoo_hdte.surrogate.threads import ENOUGH_FOR_THREADS, ENOUGH_TO_COMPILE, in_blocks
 
@@ -183,9 +183,3 @@ class SparseMoments(Unchanging):
             slopes = np.tensordot(derivative, basis[: len(derivative)], axes=(0, 0))
         slopes *= d_offset[:, None] + d_factor[:, None] * family.nodes
         return matrix, np.einsum("knq,ql->nlk", slopes, rule, optimize=True)
-
-
-def deviation(expansion: Array) -> Array:
-    """Return the standard deviation, shape (...), of expansions of shape (..., q)."""
-    others = expansion[..., 1:]
-    return np.sqrt(np.einsum("...q,...q->...", others, others))
