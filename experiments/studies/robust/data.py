@@ -52,24 +52,19 @@ class Grown:
 
     function: str
     seed: int
-    whole_curve: bool
     budget: int = BUDGET
 
     @property
     def key(self) -> str:
         """All settings in one name."""
-        curve = "_curve" * self.whole_curve
-        return f"{self.function}_{OURS}_{self.budget}_{self.seed}{curve}".replace(" ", "_")
+        return f"{self.function}_{OURS}_{self.budget}_{self.seed}".replace(" ", "_")
 
     def execute(self) -> Run:
-        """Return the columns of `STEP` of every fit, and beside each the numbers of the stop.
-
-        Without the curve there is one row, and its `STEP` is NaN.
-        """
+        """Return the columns of `STEP` of every fit, and beside each the numbers of the stop."""
         task, started = Task(self.function), time.perf_counter()
-        growth = Growth(task, ACCURACY, self.budget, self.seed, self.whole_curve)
+        growth = Growth(task, ACCURACY, self.budget, self.seed)
         stop = growth.band()
-        steps = np.array(growth.steps, dtype=float) if growth.steps else np.full((1, 3), np.nan)
+        steps = np.array(growth.steps, dtype=float)
         rows = np.column_stack([steps, np.tile([*stop.values()], (len(steps), 1))])
         columns = (*STEP, *(f"stop_{name}" for name in stop))
         return Run(columns, rows, time.perf_counter() - started)
@@ -143,7 +138,7 @@ class Outcome:
         By function, method and way: runs and both errors.
     stops : dict of dict
         By function and seed: the numbers of `STOP_NUMBERS`; ``needed`` is infinite where the error
-        did not stay below the bound within the budget, and NaN where it was not looked at.
+        did not stay below the bound within the budget.
     rare : dict of ndarray
         By limit state, probability and method: rows of the columns of a `RareJob`, one for each
         seed.
@@ -173,12 +168,10 @@ class Outcome:
 
         Ours is the median of its seeds, as far as they were run.
         """
-        if method == OURS and column == 1:
-            seeds = [stop["needed"] for stop in self.stops_of(function)]
-            looked_at = [count for count in seeds if not np.isnan(count)]
-            if looked_at:
-                median = float(np.median(looked_at))
-                return int(np.ceil(median)) if np.isfinite(median) else None
+        seeds = [stop["needed"] for stop in self.stops_of(function)]
+        if method == OURS and column == 1 and seeds:
+            median = float(np.median(seeds))
+            return int(np.ceil(median)) if np.isfinite(median) else None
         counts = [
             runs_needed(steps, ACCURACY, column)
             for (name, who, _), steps in self.curves.items()
@@ -205,7 +198,7 @@ def outcome_for(context: Context) -> Outcome:
     require("sklearn", "uq")
     names = [function.name for function in FUNCTIONS] if context.full else QUICK_FUNCTIONS
     budget, seeds = (BUDGET, SEEDS) if context.full else (QUICK_BUDGET, SEEDS[:1])
-    ours = [Grown(name, seed, True, budget) for name in names for seed in seeds]
+    ours = [Grown(name, seed, budget) for name in names for seed in seeds]
     grown = dict(zip(ours, context.campaign.run(ours, "ours"), strict=True))
     needed = gathered(grown, {}).needed
     # Whether another needs no more runs shows when it is given as many.
@@ -248,12 +241,10 @@ def gathered(
     curves: dict[tuple[str, str, str], list[Step]] = {}
     stops = {}
     for growth, run in grown.items():
-        needed = np.nan
-        if growth.whole_curve:
-            rows = run.values[:, : len(STEP)].tolist()
-            steps = [(int(runs), step, overall) for runs, step, overall in rows]
-            needed = runs_needed(steps, ACCURACY) or np.inf
-            curves.setdefault((growth.function, OURS, OURS), steps)
+        rows = run.values[:, : len(STEP)].tolist()
+        steps = [(int(runs), step, overall) for runs, step, overall in rows]
+        needed = runs_needed(steps, ACCURACY) or np.inf
+        curves.setdefault((growth.function, OURS, OURS), steps)
         numbers = [needed, *run.values[0, len(STEP) :].tolist()]
         stops[growth.function, growth.seed] = dict(zip(STOP_NUMBERS, numbers, strict=True))
     for job, run in rivals.items():

@@ -32,8 +32,8 @@ class _Enough(Exception):
 class Growth:
     """A growth that is watched: every fit is judged, and nothing is fitted twice.
 
-    It goes on until it would have stopped by itself and, if the curve is asked for, until the error
-    has stayed below the bound for a while, or until the budget is spent.
+    It goes on until it would have stopped by itself and the error has stayed below the bound for a
+    while, or until the budget is spent.
 
     Parameters
     ----------
@@ -44,32 +44,20 @@ class Growth:
         Most runs.
     seed : int
         Of the runs.
-    whole_curve : bool
-        Whether the errors of every fit are wanted.
-    process : bool
-        Whether a normal process is tried, too.
 
     Attributes
     ----------
     steps : list of Step
-        Of every fit; none without ``whole_curve``.
+        Of every fit.
     stop : AdaptiveFit
         With which it would have stopped; the last one where it would not have.
     stopped : bool
         Whether it would have.
     """
 
-    def __init__(
-        self,
-        task: Task,
-        accuracy: float,
-        budget: int,
-        seed: int = 1,
-        whole_curve: bool = True,
-        process: bool = False,
-    ) -> None:
+    def __init__(self, task: Task, accuracy: float, budget: int, seed: int = 1) -> None:
         self._task, self._accuracy, self._budget = task, accuracy, budget
-        self._whole_curve, self._points = whole_curve, _cube(task)
+        self._points = _cube(task)
         self.steps: list[Step] = []
         self.stopped, self._passed = False, 0
 
@@ -79,9 +67,7 @@ class Growth:
         rng = np.random.default_rng(seed)
         # An infinite accuracy has every fit shown, and `_watch` accepts none.
         with suppress(_Enough):
-            fit_adaptively(
-                task.inputs.axes, function, np.inf, budget, rng, self._watch, process=process
-            )
+            fit_adaptively(task.inputs.axes, function, np.inf, budget, rng, self._watch)
 
     def _watch(self, fit: AdaptiveFit) -> bool:
         if not self.stopped:
@@ -90,10 +76,9 @@ class Growth:
             self._passed = self._passed + 1 if good else 0
             enough = fit.n_runs >= least_runs(len(self._task.names))
             self.stopped = enough and self._passed >= IN_A_ROW
-        if self._whole_curve:
-            values = fit.polynomial(self._points).reshape(self._task.judged[1].shape)
-            self.steps.append((fit.n_runs, *self._task.errors(values)))
-        if self.stopped and (not self._whole_curve or self._stays(fit.n_runs)):
+        values = fit.polynomial(self._points).reshape(self._task.judged[1].shape)
+        self.steps.append((fit.n_runs, *self._task.errors(values)))
+        if self.stopped and self._stays(fit.n_runs):
             raise _Enough
         return False
 

@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 
 from experiments.studies.robust.functions import Normal, Uniform
 from experiments.studies.robust.task import Task
-from pymoo_hdte.surrogate._sparse.adaptive import DEGREES
+from pymoo_hdte.surrogate._sparse.kernel import DEGREES
 
 Array = NDArray[np.float64]
 Step = tuple[int, float, float]

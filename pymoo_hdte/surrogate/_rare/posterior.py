@@ -13,8 +13,6 @@ from pymoo_hdte.surrogate._sparse.regression import Regression
 
 Array = NDArray[np.float64]
 
-DEGREES = (6, 40)
-"""Least and largest degree in one variable; between them a third of the runs."""
 _AT_ONCE = 4096
 """Points whose covariances with the runs are held in memory together."""
 
@@ -38,8 +36,7 @@ class Posterior:
     """
 
     def __init__(self, points: Array, values: Array, start: Array | None = None) -> None:
-        degree = int(np.clip(len(points) // 3, *DEGREES))
-        self._polynomials = EvenPolynomials(degree)
+        self._polynomials = EvenPolynomials.for_runs(len(points))
         self._features = self._polynomials(points)
         self._regression = Regression(self._features, values, np.ones(len(values)), start)
         self.parameters = self._regression.parameters

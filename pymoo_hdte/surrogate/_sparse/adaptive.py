@@ -54,8 +54,6 @@ IN_A_ROW = 2
 JUDGED_DESIGNS = 32
 JUDGED_DRAWS = 128
 """Designs, and draws of the scatter at each, at which errors are judged."""
-DEGREES = (6, 40)
-"""Least and largest degree in one variable; between them a third of the runs."""
 OTHERS_AGAIN = 1.5
 """Ratio of runs from where no other surrogate was better to where one is tried again."""
 DENSE = 3000
@@ -205,8 +203,8 @@ class _SurrogateBuild:
         points, truth = self.points[good], self.truth[good]
         count = truth.shape[1] // 2 if self.is_random else truth.shape[1]
         truth, own_truth = truth[:, :count], truth[:, count:]
-        polynomials = EvenPolynomials(
-            int(np.clip(len(points) // 3, *DEGREES)),
+        polynomials = EvenPolynomials.for_runs(
+            len(points),
             [None if axis.discrete is None else len(axis.discrete.values) for axis in self.axes],
         )
         shares, weights_of_draws, drawn = self._successes(good, polynomials)

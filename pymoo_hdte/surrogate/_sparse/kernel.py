@@ -16,9 +16,12 @@ from numpy.polynomial.legendre import leggauss
 from numpy.typing import NDArray
 
 from pymoo_hdte.surrogate._sparse.measures import Measure, OrthonormalPolynomials
+from pymoo_hdte.surrogate.tensor import chebyshev_nodes, coefficients_from_nodes
 
 Array = NDArray[np.float64]
 
+DEGREES = (6, 40)
+"""Least and largest degree in one variable; between them a third of the runs."""
 PARAMETERS = 3
 """Number of parameters of an axis: the logarithm of s, and the logits of q and of the share of
 even degrees."""
@@ -48,6 +51,11 @@ class EvenPolynomials:
         nodes, weights = leggauss(degree + 4)
         self._family = OrthonormalPolynomials(Measure(nodes, 0.5 * weights), degree)
 
+    @classmethod
+    def for_runs(cls, count: int, values: Sequence[int | None] = ()) -> EvenPolynomials:
+        """Return them up to the degree that so many runs may tell of."""
+        return cls(int(np.clip(count // 3, *DEGREES)), values)
+
     def __call__(self, points: Array) -> list[Array]:
         """Return p_1 .. p_k of every axis at points of shape (n, d), each of shape (k, n)."""
         features = [self._family(z)[1:] for z in points.T]
@@ -58,12 +66,8 @@ class EvenPolynomials:
 
     def to_chebyshev(self) -> Array:
         """Return the triangular matrix, shape (k + 1, k + 1), of p_j in T_0 .. T_k: column j."""
-        size = self.degree + 1
-        angles = (2 * np.arange(size) + 1) * np.pi / (2 * size)
-        values = self._family(np.cos(angles))
-        matrix = 2.0 / size * np.cos(np.outer(np.arange(size), angles)) @ values.T
-        matrix[0] *= 0.5
-        return np.triu(matrix)
+        values = self._family(chebyshev_nodes(self.degree + 1))
+        return np.triu(np.column_stack([coefficients_from_nodes(row) for row in values]))
 
 
 def variances(parameters: Array, degree: int) -> tuple[Array, Array]:
@@ -109,3 +113,18 @@ def covariance(features: list[Array], others: list[Array], variance: Array) -> A
     for factor in remaining:
         product *= factor
     return product
+
+
+def slope_by_axes(
+    features: list[Array], of_axes: list[Array], slopes: Array, outer: Array
+) -> Array:
+    """Return the slope in the parameters of every axis, shape (d, 3), of a sum over the covariance.
+
+    ``outer`` is its slope in every covariance times the covariance, (n, n); ``slopes`` those of the
+    variances, and ``of_axes`` the `factors`.
+    """
+    gradient = np.empty((len(features), PARAMETERS))
+    for j, (feature, factor) in enumerate(zip(features, of_axes, strict=True)):
+        by_degree = np.einsum("kn,kn->k", feature @ (outer / factor), feature)
+        gradient[j] = slopes[:, j] @ by_degree
+    return gradient

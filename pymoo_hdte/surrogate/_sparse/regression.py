@@ -22,6 +22,7 @@ from pymoo_hdte.surrogate._sparse.kernel import (
     START,
     covariance,
     factors,
+    slope_by_axes,
     variances,
 )
 
@@ -240,10 +241,6 @@ def _misfit(
     whole = scipy.linalg.lapack.dpotri(lower, lower=True)[0].T
     whole[np.diag_indices(len(whole))] *= 0.5
     whole -= np.outer(0.5 / size * weights, weights)
-    outer = whole * product
-    gradient = np.empty_like(parameters)
-    for j, (feature, factor) in enumerate(zip(features, of_axes, strict=True)):
-        by_degree = np.einsum("kn,kn->k", feature @ (outer / factor), feature)
-        gradient[j] = slopes[:, j] @ by_degree
+    gradient = slope_by_axes(features, of_axes, slopes, whole * product)
     of_noise = noise * float(np.diag(whole) @ shares)
     return value, np.append(gradient.ravel(), of_noise)

@@ -14,7 +14,13 @@ from numpy.typing import NDArray
 from pymoo_hdte.surrogate._sparse.kernel import EvenPolynomials
 from pymoo_hdte.surrogate._sparse.regression import Regression, with_nugget
 from pymoo_hdte.surrogate._sparse.second import Linked, Process, Surrogate, better
-from pymoo_hdte.surrogate._sparse.terms import closed, largest, likely_terms, products
+from pymoo_hdte.surrogate._sparse.terms import (
+    closed,
+    largest,
+    likely_terms,
+    prior_of_terms,
+    products,
+)
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int_]
@@ -267,9 +273,7 @@ def _std(values: Array, weights: Array) -> float:
 
 
 def _posterior(regression: Regression, features: list[Array], indices: Indices) -> Array:
-    prior = np.ones(len(indices))
-    for of_axis, degrees in zip(regression.variance, indices.T, strict=True):
-        prior *= np.append(1.0, of_axis)[degrees]
+    prior = prior_of_terms(regression.variance, indices)
     posterior = regression.unit * prior * (regression.weights @ products(features, indices))
     posterior[0] += regression.centre
     return posterior

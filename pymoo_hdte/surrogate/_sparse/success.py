@@ -25,11 +25,18 @@ from pymoo_hdte.surrogate._sparse.kernel import (
     START,
     EvenPolynomials,
     factors,
+    slope_by_axes,
     variances,
 )
 from pymoo_hdte.surrogate._sparse.polynomial import SparsePolynomial
 from pymoo_hdte.surrogate._sparse.regression import MOST_LEARNT
-from pymoo_hdte.surrogate._sparse.terms import closed, largest, likely_terms, products
+from pymoo_hdte.surrogate._sparse.terms import (
+    closed,
+    largest,
+    likely_terms,
+    prior_of_terms,
+    products,
+)
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int_]
@@ -106,7 +113,7 @@ def fit_success(
     size = float(np.exp(parameters[-1]))
     # One set of terms for all that follows: the runs know nothing of others.
     drawn = likely_terms(variance, _MOST_DRAWN)
-    prior, at_runs = size * _prior(variance, drawn), products(features, drawn)
+    prior, at_runs = size * prior_of_terms(variance, drawn), products(features, drawn)
     mode = _Mode((at_runs * prior) @ at_runs.T, sign)
     matrices = [polynomials.to_chebyshev()] * inputs
 
@@ -157,14 +164,6 @@ def _posterior_draws(start: Array, prior: Array, signed_terms: Array) -> Array:
         if step > _BURN_IN and not (step - _BURN_IN) % _THINNED:
             draws.append(now)
     return np.array(draws)
-
-
-def _prior(variance: Array, indices: Indices) -> Array:
-    """Return the prior variance of terms, shape (p,), as shares of the constant's."""
-    prior = np.ones(len(indices))
-    for of_axis, degrees in zip(variance, indices.T, strict=True):
-        prior *= np.append(1.0, of_axis)[degrees]
-    return prior
 
 
 def rows_of(indices: Indices) -> Any:
@@ -262,8 +261,5 @@ def _misfit(features: list[Array], sign: Array, parameters: Array) -> tuple[floa
     outer = 0.5 * (np.outer(slope, slope) - inner)
     outer += 0.5 * (np.outer(implicit, slope) + np.outer(slope, implicit))
     outer *= -matrix
-    gradient = np.empty((len(features), 3))
-    for j, (feature, factor) in enumerate(zip(features, of_axes, strict=True)):
-        by_degree = np.einsum("kn,kn->k", feature @ (outer / factor), feature)
-        gradient[j] = slopes[:, j] @ by_degree
+    gradient = slope_by_axes(features, of_axes, slopes, outer)
     return -mode.evidence, np.append(gradient, outer.sum())

@@ -58,6 +58,14 @@ def _above(envelope: Array, threshold: float, most: int) -> Indices | None:
     return indices
 
 
+def prior_of_terms(variance: Array, indices: Indices) -> Array:
+    """Return the prior variance of terms, shape (p,), as shares of the constant's."""
+    prior = np.ones(len(indices))
+    for of_axis, degrees in zip(variance, indices.T, strict=True):
+        prior *= np.append(1.0, of_axis)[degrees]
+    return prior
+
+
 def products(features: list[Array], indices: Indices) -> Array:
     """Return the terms at points, shape (n, p), from the polynomials of every axis there."""
     values = np.ones((len(indices), features[0].shape[1]))
