@@ -14,12 +14,19 @@ from pymoo_hdte.surrogate.box import corners
 
 Array = NDArray[np.float64]
 
-_SWEEPS, _NEARER = 8, 0.25
-"""Sweeps along all axes, and what shortens a line from one to the next.
+_SWEEPS, _NEARER, _LEAST = 16, 0.25, 0.25**8
+"""Most sweeps along all axes, what shortens a line from one to the next, and where they end.
 
 With 9 points on a line, the last are 1/8 * 0.25^7 = 8e-6 of an axis apart: a smooth maximum between
-them is missed by some 1e-11 of what the value varies by. The second line reaches as far as the
-neighbours of the best point of the first.
+them is missed by some 1e-11 of what the value varies by. A line at whose end the best lies is not
+shortened: where axes are linked, the next one moves it on. Shortened all the same, 500 quadratic
+functions of two axes with a correlation of 0.5 were missed by up to 1.5 % of an axis squared.
+"""
+_FURTHER = (0.125, 16.0)
+"""Shortest and longest step on along what a sweep has moved, as shares of that.
+
+With a correlation of 0.9 a sweep goes a fifth of the way; by such steps the largest error of these
+functions is 2e-5, 2e-2 without.
 """
 _CORNERS, _INSIDE, _LINE = 64, 16, 9
 """Corners of the intervals, points within, and points on a line at which a goal is looked at.
@@ -50,15 +57,30 @@ def largest_in_box(
         Values of the axes that take no others.
     """
     width, steps = ends[:, 1] - ends[:, 0], np.linspace(-0.5, 0.5, line)
+    widths = np.tile(width, (len(optima), 1))
+    further = np.append(0.0, np.geomspace(*_FURTHER, line))[:, None]
     for sweep in range(_SWEEPS):
+        before = optima
         for j in np.flatnonzero(width > 0.0).tolist():
             # The first sweep looks along the whole line, later ones ever nearer.
             centre = optima[:, j] if sweep else np.full(len(optima), ends[j].mean())
-            along = np.add.outer(centre, _NEARER**sweep * width[j] * steps)
-            if discrete and j in discrete:
+            along = centre[:, None] + widths[:, j, None] * steps
+            free = not (discrete and j in discrete)
+            if discrete and not free:
                 along = np.tile(discrete[j], (len(optima), 1))
             tried = np.repeat(optima[:, None], along.shape[1] + 1, axis=1)
             tried[:, 1:, j] = np.clip(along, *ends[j])
+            best = np.argmax(value(tried), axis=1)
+            optima = tried[np.arange(len(tried)), best]
+            at_end = free and sweep > 0 and np.isin(best, (1, line))
+            widths[:, j] *= np.where(at_end, 1.0, _NEARER)
+        if np.all(widths <= _LEAST * width):
+            break
+        if sweep:
+            moved = optima - before
+            if discrete:
+                moved[:, list(discrete)] = 0.0
+            tried = np.clip(optima[:, None] + further * moved[:, None], *ends.T)
             optima = best_of(tried, value(tried))
     return optima
 

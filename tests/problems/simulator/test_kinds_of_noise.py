@@ -166,7 +166,7 @@ def test_every_goal_has_its_own_worst_values_of_an_interval():
 def test_the_worst_of_two_intervals_may_lie_inside_them():
     def simulator(x, a, b, load):
         apart, beside = a - x, b - 0.5 * x
-        return (1.0 + load) * (1.0 - apart**2 - beside**2 + apart * beside)
+        return (1.0 + load) * (1.0 - apart**2 - beside**2 + 1.4 * apart * beside)
 
     noise = {"a": Interval(-0.5, 1.5), "load": norm(0.0, 0.1), "b": Interval(-1.0, 1.0)}
     problem = made(simulator, noise, -Mean(), Mean())
