@@ -3,7 +3,8 @@ Mathematics: the rules of a verdict
 ===================================
 
 ``pymoo-hdte discrepancy`` says whether a model lacks something that its measurements show, and
-what. This page gives the rules and the statistics behind them. All thresholds are in
+what. This page gives the rules for machines other than a drive, and the statistics behind them; of
+a drive :ref:`the score <sphx_glr_auto_guides_verdict_score.py>` decides. All thresholds are in
 `pymoo_hdte.discrepancy._selection.rules.Rules`, from which this page reads them.
 """
 

@@ -77,6 +77,7 @@ def test_guide_runs_and_its_checks_hold(guide):
         ("drive_data_sheet", "model #, surrogate # arcsec", 0.1),
         ("verdict_rules", "standard deviation #, ordinary least squares #", 2e-4),
         ("verdict_rules", "evidence #, by integration #", 0.1),
+        ("verdict_score", "score #, by brute force #", 0.6),
     ],
 )  # fmt: skip
 def test_two_ways_to_one_number_agree(guide, pattern, tolerance):

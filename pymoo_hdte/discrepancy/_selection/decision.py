@@ -109,7 +109,8 @@ def log_prior(names: Sequence[Name], forms: Sequence[int], outside: bool) -> flo
 def decide(explanations: Sequence[Explanation], priors: Sequence[float]) -> Decision:
     """Return what is said of explanations with their logarithms of prior odds.
 
-    - ``"adequate"``: nothing is missing, and that is sure.
+    - ``"adequate"``: that nothing is missing is likelier than not. Of who claims nothing no more is
+      asked: with `SURE` one clean campaign in twenty would be said to lack something.
     - ``"named"``, ``"parameter"``: one set is sure, and that nothing is outside of the library.
     - ``"class"``: one of a few sets is sure, and something outside is less likely than not.
     - ``"partial"``: some names are sure, and no more than these.
@@ -132,7 +133,7 @@ def decide(explanations: Sequence[Explanation], priors: Sequence[float]) -> Deci
         marginal = {name: float(share) for name, share in of_names.most_common()}
         return Decision(status, tuple(members), probability, outside, possible, marginal)
 
-    if possible and of_nothing >= SURE:
+    if possible and of_nothing > 0.5:
         return said("adequate", [], of_nothing)
     members = _fewest(ranked, of_sets)
     sure = possible and bool(members) and frozenset() not in members

@@ -197,7 +197,8 @@ class Growth:
 
     def decide(self) -> tuple[Decision, list[Weighed]]:
         """Return what is said, and all sets with and without something outside of the library."""
-        ranked = self.ranked
+        lacking = [weighed for weighed in self.ranked if self._lacks_evident(weighed.candidates)]
+        ranked = [weighed for weighed in self.ranked if weighed not in lacking] or lacking
         best = ranked[0]
         # Far behind the likeliest set only one without some of its members may gain by that.
         near = [
@@ -272,6 +273,13 @@ class Growth:
             for candidate in self.candidates
             if not candidate.instead_of and all(candidate.goes_with(member) for member in members)
         ]
+        if self._lacks_evident(members):
+            # To first order what parts now and then does nothing.
+            for candidate in candidates:
+                for start in candidate.starts if candidate.name in self.data.evident else ():
+                    values = np.append(weighed.fit.values, start)
+                    self._fit((*members, candidate), values, again=True)
+            return
         integral = Integral(weighed.linearised)
         integral.score()
         n = len(weighed.linearised.residuals)
@@ -366,14 +374,17 @@ class Growth:
             return
         linearised = self.errors.linearised(fitted)
         score = Integral(linearised).score()
-        evident = self.data.evident
-        lacking = evident and not evident & {member.name for member in fitted.candidates}
-        if score.invisible or (lacking and fitted.candidates):
+        if score.invisible or (fitted.candidates and self._lacks_evident(fitted.candidates)):
             self._invisible.add(label)
             return
         prior = self._prior(fitted.candidates)
         chance = score.worst_chance(self.errors.groups)
         self._known[label] = Weighed(fitted, linearised, score, prior, chance)
+
+    def _lacks_evident(self, members: Sequence[Candidate]) -> bool:
+        """Tell whether some effect is evident, and no member is one that it may be."""
+        evident = self.data.evident
+        return bool(evident) and not evident & {member.name for member in members}
 
     def _with_outside(self, weighed: Weighed) -> Weighed:
         """Return a set with something outside of the library as well."""

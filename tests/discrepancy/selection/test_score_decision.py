@@ -39,6 +39,7 @@ def said(*shares, worst_chance=1.0):
     ("shares", "status", "members"),
     [
         ([(NOTHING, False, 0.97), (A, False, 0.03)], "adequate", ()),
+        ([(NOTHING, False, 0.6), (A, False, 0.4)], "adequate", ()),
         ([(NOTHING, False, 0.02), (A, False, 0.98)], "named", (A,)),
         ([(A, False, 0.9), (A, True, 0.1)], "partial", (A,)),
         ([(A, False, 0.3), (B, False, 0.66), (C, False, 0.04)], "class", (B, A)),

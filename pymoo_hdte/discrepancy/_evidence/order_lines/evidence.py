@@ -174,6 +174,15 @@ class Data(Observations):
             features = features.rows(np.flatnonzero(held))
         return replace(self, features=features, torsion=()) if features.records else None
 
+    @property
+    def with_held_out(self) -> Data:
+        """The data with the records that are kept out of fits."""
+        if (held_out := self.held_out) is None:
+            return self
+        records = (*self.features.records, *held_out.features.records)
+        orders = self.features.orders.tolist()
+        return replace(self, features=measure(self.campaign, records, orders, self.rules))
+
     def with_noise_of(self, fitted: Fit) -> Data | None:
         """Return the data with the noise of another model, or None where the noise hardly grows.
 
