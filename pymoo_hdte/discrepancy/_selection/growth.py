@@ -9,7 +9,7 @@ nothing is compared but probabilities.
 
 from __future__ import annotations
 
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Protocol
@@ -57,6 +57,9 @@ TRUSTED = 3.0
 logs: a width of the search."""
 OF_ONE_NAME = 2
 """Most of them that have one name."""
+FEWEST = 4
+"""Single effects that are fitted at least: a base at its bounds may leave a thousand times what it
+does beside the true effect, of which the first order knows nothing."""
 MOST_OUTSIDE = 6
 """Sets beside which something outside of the library is looked for, the likeliest without it."""
 
@@ -155,6 +158,7 @@ class Growth:
     _complete: set[frozenset[str]] = field(default_factory=set)
     _signatures: dict[str, Screened] = field(default_factory=dict)
     _outside: dict[Weighed, Weighed] = field(default_factory=dict)
+    _pruned: defaultdict[frozenset[str], set[Fit]] = field(default_factory=lambda: defaultdict(set))
 
     def __post_init__(self) -> None:
         self.counts = Counter(candidate.name for candidate in self.candidates)
@@ -307,7 +311,8 @@ class Growth:
                 continue
             prior = self._prior((effect.candidate,))
             most = TRUSTED * max(gains[place] - prior, 0.0) + prior
-            if weighed.weight + most < self.ranked[0].weight - WINDOW:
+            tried = bool(members) or taken.total() >= FEWEST
+            if tried and weighed.weight + most < self.ranked[0].weight - WINDOW:
                 break
             taken[effect.candidate.name] += 1
             self._fit((*members, effect.candidate), np.append(weighed.fit.values, effect.start))
@@ -343,14 +348,16 @@ class Growth:
         """Return a set without a member, fitted to the end; None if that is not to be seen."""
         members = tuple(candidate for candidate in weighed.candidates if candidate is not member)
         label = label_of(members)
-        if label not in self._known:
+        if weighed.fit not in self._pruned[label] and label not in self._invisible:
+            # An earlier fit of these may have ended at a worse minimum, or before it was there.
+            self._pruned[label].add(weighed.fit)
             values = [weighed.fit.values[: weighed.fit.n_base]]
             values += [
                 weighed.fit.values[place]
                 for candidate, place in weighed.fit.places
                 if candidate is not member
             ]
-            self._fit(members, np.concatenate(values))
+            self._weigh(fit(self.data, members, np.concatenate(values)))
         return self._known.get(label)
 
     def _fit(self, members: Sequence[Candidate], start: Vector, again: bool = False) -> None:
