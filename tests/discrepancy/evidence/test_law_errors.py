@@ -7,7 +7,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pymoo_hdte.discrepancy._evidence.force_balances.law_errors import BalanceErrors, _turns_of
+from pymoo_hdte.discrepancy._evidence.force_balances.law_errors import (
+    BalanceErrors,
+    _of_turn,
+    _turns_of,
+)
 from pymoo_hdte.discrepancy._evidence.order_lines.law_errors import ScaledLaw
 from pymoo_hdte.discrepancy._selection.process import TERMS, sine_of, sines_of
 from pymoo_hdte.effects.law import PortState, periodic_phase
@@ -46,6 +50,15 @@ def test_a_motion_turns_stops_and_starts():
     assert turn == (9.5, -1.0)
     assert rest == [(20.5, 1.0), (23.5, 1.0), (26.5, 1.0), (29.5, 1.0)]
     assert _turns_of(np.ones(10), 0.5, 4.0) == []
+
+
+def test_dry_friction_may_turn_at_any_moment_around_a_turn_that_is_seen(rng):
+    places = np.array([-1.5, -0.7, -0.4, -0.1, 0.1, 0.3, 0.6, 0.9, 1.2])
+    turns = rng.uniform(-1.0, 1.0, (40_000, 1))
+    between = np.sign(places) * ((places * turns > 0.0) & (np.abs(places) < np.abs(turns)))
+    wanted = 4.0 * between.T @ between / len(turns)
+    pulses = np.array(list(_of_turn(places)))
+    assert pulses.T @ pulses * np.outer(*2 * [np.sign(places)]) == pytest.approx(wanted, abs=0.15)
 
 
 def balances(residuals, frequency, parts=1):

@@ -1,14 +1,14 @@
 """Relative errors of laws in force balances, and what no law of the library holds.
 
-Both are Gaussian processes over the motion at a port: over its position, over its speed, over its
-load and over the time. What a real machine leaves is coloured: each band of frequencies has a
+Both are Gaussian processes over the motion at a port: over its position and its speed, the latter
+over the time as well. What a real machine leaves is coloured: each band of frequencies has a
 noise of its own.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
 
@@ -32,6 +32,8 @@ NOISE = float(np.log(10.0))
 """Standard deviation of the logarithm of the noise, which nobody states of a balance."""
 TURNS = (1e-3, 1.0)
 """Range of the force around a turn that is not known, as a share of what holds a port at rest."""
+_OF_TURN = 3
+"""Functions on each side of a turn, which hold 93 % of the variance of what it may do."""
 _SMOOTHED = 9
 """Coefficients over which a spectrum is smoothed, to see how coloured it is."""
 _FEWEST = 20
@@ -104,6 +106,18 @@ class BalanceErrors:
                     shares[rows] = smooth.mean() ** 2 / np.mean(smooth**2)
         return shares
 
+    @cached_property
+    def least_noise(self) -> Matrix:
+        """Noise of the sensors as a share of what counts as noise, shape (n_channels,)."""
+        shares = np.concatenate(
+            [
+                (balance.noise / deviation)[balance.kept]
+                for balance, deviation in zip(self.data.spectra, self.data.deviation, strict=True)
+            ]
+        )
+        power = np.bincount(self.channels, shares**2) / np.bincount(self.channels)
+        return np.asarray(np.sqrt(power))
+
     def linearised(self, fitted: Fit) -> Linearised:
         """Return a fit as a hypothesis."""
 
@@ -119,33 +133,32 @@ class BalanceErrors:
             ]
             return np.column_stack(columns)
 
-        return linearise(fitted, self.channels, errors, NOISE, self.shares).beside(
-            *self._turning(fitted)
-        )
+        hypothesis = linearise(fitted, self.channels, errors, NOISE, self.shares)
+        return replace(hypothesis, least_noise=self.least_noise).beside(*self._turning(fitted))
 
     def _turning(self, fitted: Fit) -> Iterator[Sized]:
         """Yield what dry friction may do where a port turns, starts or stops.
 
-        When it does is known to a part of the time over which the motion is smoothed only. What
-        smoothing does to a kink of the motion is the same at every turn, but for its size: so a
-        part is common to all turns, and another one is each turn's own.
+        The motion is smoothed over a period of the cutoff, in which it may turn at any moment, or
+        rest for a while. What smoothing does to a kink of the motion is the same at every turn, but
+        for its size: so a part is common to all turns, and another one is each turn's own.
         """
         for effect in fitted.effects:
             if not (effect.law.breakaway and (columns := self._turns(effect.port)).size):
                 continue
             label = f"{effect.name}:{effect.port}"
+            by_turn = columns.reshape(len(columns), -1, 2 * _OF_TURN)
             for name, part in (
-                (f"all turns of {label}", columns.reshape(len(columns), -1, 2).sum(axis=1)),
-                (f"turns of {label}", columns),
+                (f"all turns of {label}", by_turn.sum(axis=1)),
+                (f"turns of {label}", by_turn[:, :, :2].reshape(len(columns), -1)),
             ):
                 none = np.zeros(part.shape[1])
                 yield Sized(name, effect.law.breakaway * part, *TURNS, none, none > 0.0)
 
     def _turns(self, port: str) -> Matrix:
-        """Return whitened balances of a unit force around each turn of a port, (n, 2 n_turns).
+        """Return whitened balances of a unit force around each turn of a port.
 
-        First that of a turn that is early or late, then that of one that takes its time; both with
-        the sign of the speed after the turn.
+        Shape (n, 2 _OF_TURN n_turns): see `_of_turn`.
         """
         if port not in self._of_turns:
             self._of_turns[port] = np.column_stack(
@@ -157,13 +170,13 @@ class BalanceErrors:
         ends = np.cumsum([0, *(int(balance.kept.sum()) for balance in self.data.spectra)])
         for number, balance in enumerate(self.data.spectra):
             speed, step = balance.ports[port].speed, float(balance.time[1] - balance.time[0])
-            smoothed = 1.0 / (balance.cutoff * step)
+            half = 0.5 / (balance.cutoff * step)
             still = speed_noise(balance.mechanism.port(port), balance.record, balance.cutoff)
-            for turn, after in _turns_of(speed, STILL * still, smoothed / 2.0):
+            for turn, after in _turns_of(speed, STILL * still, half):
                 if not balance.moving.weight[int(turn)]:
                     continue
-                place = (np.arange(len(speed)) - turn) / (smoothed / 4.0)
-                for pulse in (np.exp(-0.5 * place**2), place * np.exp(-0.5 * place**2)):
+                rows = np.arange(len(speed), dtype=np.float64)
+                for pulse in _of_turn((rows - turn) / half):
                     column = np.zeros(len(self.channels))
                     force = balance.of_port(port, after * pulse) / self.data.deviation[number]
                     column[ends[number] : ends[number + 1]] = force[balance.kept]
@@ -195,11 +208,10 @@ class BalanceErrors:
         return tuple(self._outside())
 
     def _outside(self) -> Iterator[Sized]:
+        # Not over the load: what it does alone is a gain of the input, and as the load is what the
+        # inputs do as measured, a steep function of it would cancel their noise.
         for port in self.data.mechanism.ports:
-            overs = ["position", "speed", "time"]
-            if all(balance.ports[port.name].load is not None for balance in self.data.spectra):
-                overs.append("load")
-            for over in overs:
+            for over in ("position", "speed", "time"):
                 columns = np.column_stack(
                     [self._column(port.name, over, number) for number in range(1, TERMS + 1)]
                 )
@@ -215,6 +227,21 @@ class BalanceErrors:
                     none,
                     none > 0.0,
                 )
+
+
+def _of_turn(place: Matrix) -> Iterator[Matrix]:
+    """Yield by what dry friction of 1 may differ from what the sign of a smoothed speed says.
+
+    If the port turns at any moment up to a unit of ``place`` (n,) before or after, the force has
+    the other sign up to then. The covariance of this at s and t is 2 (1 - max(s, t)) on each side,
+    that of Brownian motion from its end, whose Karhunen-Loeve functions are cosines. A rest is a
+    mean of such turns.
+    """
+    for number in range(_OF_TURN):
+        rate = np.pi * (number + 0.5)
+        pulse = 2.0 * np.cos(rate * place) / rate
+        for side in (place < 0.0, place >= 0.0):
+            yield pulse * (side & (np.abs(place) < 1.0))
 
 
 def _turns_of(speed: Matrix, still: float, apart: float) -> list[tuple[float, float]]:
