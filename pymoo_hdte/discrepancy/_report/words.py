@@ -54,16 +54,6 @@ _SENTENCES: dict[str, Callable[[Reason, Label], str]] = {
     codes.NEEDS_ANOTHER_FORM: lambda reason, label: (
         f"{label(reason.effect)} needs another form to explain the residual"
     ),
-    codes.EXPLAINS_TOO_LITTLE: lambda reason, label: (
-        f"it explains {100.0 * dict(reason.numbers)['share']:.0f} % of the misfit, "
-        "too little to name it alone"
-    ),
-    codes.RICHER_AT_BOUND: lambda reason, label: (
-        f"{label(reason.effect)} fits better, but its {', '.join(reason.names)} ended at a bound"
-    ),
-    codes.AT_TOLERANCE: lambda reason, label: (
-        f"{reason.effect} ended at the bound of its tolerance"
-    ),
 }
 
 

@@ -26,12 +26,6 @@ ABOVE_NOISE = "above_noise"
 """More than noise is left: ``times_noise``."""
 NEEDS_ANOTHER_FORM = "needs_another_form"
 """Effects need another form than the listed one to explain the misfit."""
-EXPLAINS_TOO_LITTLE = "explains_too_little"
-"""The effects explain a smaller ``share`` of the misfit than a name requires."""
-RICHER_AT_BOUND = "richer_at_bound"
-"""Another set leaves less, but its unknowns ended at a bound; the numbers are their values."""
-AT_TOLERANCE = "at_tolerance"
-"""The base value that ``effect`` names ended at the bound of its tolerance."""
 
 
 SAME_READING = "same_reading"

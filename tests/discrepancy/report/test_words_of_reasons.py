@@ -11,7 +11,7 @@ from pymoo_hdte.discrepancy._selection.reason import Reason
 CODES = [value for name, value in vars(codes).items() if name.isupper()]
 NUMBERS = {
     codes.ABOVE_NOISE: {"times_noise": 3.0},
-    codes.EXPLAINS_TOO_LITTLE: {"share": 0.6},
+    codes.MORE_MISSING: {"outside": 0.6},
     codes.HARMONIC_OF_ANOTHER: {"backlash:mesh@1": 2.0},
     codes.SENSOR_OFF: {"fitted": 0.1, "stated": 0.01},
     codes.LINES_ABOVE: {"20": 20.0, "highest": 18.0},

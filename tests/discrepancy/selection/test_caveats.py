@@ -6,7 +6,6 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from made_verdicts import made_verdict
 
 from pymoo_hdte.discrepancy._selection import choice
 from pymoo_hdte.discrepancy._selection.candidate import Candidate, Layout
@@ -21,7 +20,6 @@ from pymoo_hdte.discrepancy._selection.hypothesis import (
 )
 from pymoo_hdte.discrepancy._selection.rules import RULES
 from pymoo_hdte.discrepancy._selection.search import Search
-from pymoo_hdte.discrepancy._verdicts import mechanism_choice as measured
 from pymoo_hdte.effects.unknowns import Parameter, unknown
 
 FREEDOM = 1000
@@ -456,20 +454,6 @@ def test_a_richer_law_that_leaves_a_misfit_is_no_more_certain_than_its_special_c
     special = set_of(a_law("hysteresis"), left=special_left)
     ((chosen, _),) = choice.simpler_law(search_among(rich, special), rich).names
     assert chosen == name
-
-
-def test_another_choice_keeps_the_rivals_that_name_as_much(monkeypatch):
-    """A set with fewer values out of tolerance lost its rivals with more, and its class."""
-    monkeypatch.setattr(measured, "_reasons", lambda data, base, one: [])
-    chosen = set_of(a_law("richer"), *freed("a", "b"), left=1.0)
-    simpler = set_of(a_law("play"), *freed("a"), left=1.0)
-    rival = set_of(a_law("soft"), *freed("a", "b"), left=1.0)
-    larger = set_of(a_law("soft"), a_law("play"), *freed("a"), left=1.0)
-    verdict = made_verdict(
-        "class", None, chosen, (simpler, rival, larger), (rival, larger), FREEDOM
-    )
-    found = measured._choosing(None, verdict, simpler)
-    assert (found.status, found.chosen, found.equivalent) == ("class", simpler, (rival,))
 
 
 def denials(change, share, misfit=1.0):

@@ -13,7 +13,7 @@ from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy._records.rig_files import read_rig
 from pymoo_hdte.discrepancy._records.rig_model import model_text, read_mechanism_model
 from pymoo_hdte.discrepancy._report.mechanism_values import effects, quantities
-from pymoo_hdte.discrepancy._selection.reason import AT_BOUND, AT_TOLERANCE, Reason
+from pymoo_hdte.discrepancy._selection.reason import AT_BOUND
 from pymoo_hdte.discrepancy._verdicts.mechanism import examine_mechanism
 from pymoo_hdte.effects.gravity import Gravity
 from pymoo_hdte.effects.law import PortState, periodic_phase
@@ -208,11 +208,12 @@ def test_at_the_bound_of_a_form_no_name_is_plain():
         ),
     ],
 )
-def test_a_belief_that_ends_at_its_tolerance_is_a_caveat(believed, stuck):
+def test_a_belief_out_of_its_tolerance_is_named_beside_an_effect(believed, stuck):
     finding = found(dry, mechanism=believed)
-    assert finding.verdict.status == "partial"
-    assert Reason(AT_TOLERANCE, stuck) in finding.verdict.reasons
-    assert quantities(finding)[stuck]["at_bound"]
+    assert finding.verdict.status == "named"
+    released = {candidate.releases for candidate in finding.accepted.candidates} - {None}
+    assert released == {stuck}
+    assert not quantities(finding)[stuck]["at_bound"]
     assert "coulomb_friction" in names(finding)
 
 
