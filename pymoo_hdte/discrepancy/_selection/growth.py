@@ -169,9 +169,16 @@ class Growth:
         """All sets that were weighed, the likeliest first."""
         return sorted(self._known.values(), key=lambda weighed: -weighed.weight)
 
-    def grow(self) -> None:
-        """Extend, exchange and prune sets until none could become as likely as the best."""
+    def begin(self) -> Fit:
+        """Weigh nothing and single effects, and return the fit of the likeliest one."""
         self._weigh(self.base)
+        self._extend(self.ranked[-1])
+        return self.ranked[0].fit
+
+    def grow(self) -> Fit:
+        """Extend, exchange and prune sets until none could become as likely as the best."""
+        if not self._known:
+            self._weigh(self.base)
         self._settle()
         for _ in range(MOST_FIRSTS):
             further = [weighed for weighed in self.ranked if self._may_be_extended(weighed)]
@@ -179,6 +186,7 @@ class Growth:
                 break
             self._extend(further[0])
             self._settle()
+        return self.ranked[0].fit
 
     def _settle(self) -> None:
         """Extend the likeliest sets, and exchange members of the best one, until it stays best."""

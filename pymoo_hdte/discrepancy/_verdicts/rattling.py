@@ -28,6 +28,8 @@ SUMMED = 8
 """Most lines whose sums and differences a steady motion is taken to have."""
 LEAKED = 0.01
 """Share of a record's strongest line, in power, up to which a line may be what that one leaks."""
+MOST_RENEWED = 2
+"""Times that the noise may be renewed; sets that take turns in being the likeliest end it."""
 SAME_ORDER = 0.6
 """Cycles of an output turn up to which a line is of a steady order, which may lie between lines.
 
@@ -76,14 +78,33 @@ def _judged_on(data: Data, base: Fit, candidates: list[Candidate]) -> tuple[Data
     """
     every = data.with_held_out
     of_every = base if every is data else fit(every, start=base.values)
-    growth = Growth(every, of_every, candidates, LawErrors(every, of_every))
-    growth.grow()
+    known, growth = _grown(every, of_every, candidates)
     decision, sets = growth.decide()
     likeliest, bench = sets[0].fit, data
+    if known is not every:
+        bench = replace(data, reference=known.reference, reference_effects=known.reference_effects)
     for nuisance, place in likeliest.places:
         if nuisance.nuisance:
             bench = bench.on_bench(nuisance, likeliest.values[place].tolist())
     return bench, verdict_of(bench, decision, sets, base if bench is data else None)
+
+
+def _grown(data: Data, base: Fit, candidates: Sequence[Candidate]) -> tuple[Data, Growth]:
+    """Return the sets of effects grown with the noise of the likeliest one, and the data with it.
+
+    An effect that moves a resonance changes what an error that does not repeat brings to each
+    channel. Where the likeliest set does so, the sets are compared anew.
+    """
+    for _ in range(MOST_RENEWED):
+        growth = Growth(data, base, candidates, LawErrors(data, base))
+        renewed = data.with_noise_of(growth.begin()) or data.with_noise_of(growth.grow())
+        if renewed is None:
+            break
+        data, base = renewed, fit(renewed, start=base.values)
+    else:
+        growth = Growth(data, base, candidates, LawErrors(data, base))
+        growth.grow()
+    return data, growth
 
 
 def _explains_by_a_clearance(verdict: Verdict) -> bool:
