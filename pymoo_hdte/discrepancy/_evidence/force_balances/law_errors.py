@@ -7,7 +7,7 @@ noise of its own.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
@@ -23,6 +23,7 @@ from pymoo_hdte.discrepancy._selection.linearised import linearise
 from pymoo_hdte.discrepancy._selection.process import TERMS, sine_of
 from pymoo_hdte.discrepancy._selection.score import Linearised, Sized
 from pymoo_hdte.effects.law import Law
+from pymoo_hdte.mechanism.balances import ForceBalance
 from pymoo_hdte.mechanism.port_motion import PortMotion, law_force
 from pymoo_hdte.mechanism.rests import STILL, speed_noise
 
@@ -140,60 +141,62 @@ class BalanceErrors:
         """Yield what dry friction may do where a port turns, starts or stops.
 
         The motion is smoothed over a period of the cutoff, in which it may turn at any moment, or
-        rest for a while. What smoothing does to a kink of the motion is the same at every turn, but
-        for its size: so a part is common to all turns, and another one is each turn's own.
+        rest for a while. What smoothing does to a kink of the motion is the same at every turn; by
+        what it is not, turns add to the noise.
         """
         for effect in fitted.effects:
-            if not (effect.law.breakaway and (columns := self._turns(effect.port)).size):
+            if not effect.law.breakaway or not (columns := self._turns(effect.port)).any():
                 continue
-            label = f"{effect.name}:{effect.port}"
-            by_turn = columns.reshape(len(columns), -1, 2 * _OF_TURN)
-            for name, part in (
-                (f"all turns of {label}", by_turn.sum(axis=1)),
-                (f"turns of {label}", by_turn[:, :, :2].reshape(len(columns), -1)),
-            ):
-                none = np.zeros(part.shape[1])
-                yield Sized(name, effect.law.breakaway * part, *TURNS, none, none > 0.0)
+            none = np.zeros(columns.shape[1])
+            yield Sized(
+                f"turns of {effect.name}:{effect.port}",
+                effect.law.breakaway * columns,
+                *TURNS,
+                none,
+                none > 0.0,
+            )
 
     def _turns(self, port: str) -> Matrix:
-        """Return whitened balances of a unit force around each turn of a port.
-
-        Shape (n, 2 _OF_TURN n_turns): see `_of_turn`.
-        """
+        """Return whitened balances of a unit force around the turns of a port: see `_of_turn`."""
         if port not in self._of_turns:
+            signals = [self._pulses(balance, port) for balance in self.data.spectra]
             self._of_turns[port] = np.column_stack(
-                [np.empty((len(self.channels), 0)), *self._pulses(port)]
+                [self._whitened(port, pulses) for pulses in zip(*signals, strict=True)]
             )
         return self._of_turns[port]
 
-    def _pulses(self, port: str) -> Iterator[Matrix]:
-        ends = np.cumsum([0, *(int(balance.kept.sum()) for balance in self.data.spectra)])
-        for number, balance in enumerate(self.data.spectra):
-            speed, step = balance.ports[port].speed, float(balance.time[1] - balance.time[0])
-            half = 0.5 / (balance.cutoff * step)
-            still = speed_noise(balance.mechanism.port(port), balance.record, balance.cutoff)
-            for turn, after in _turns_of(speed, STILL * still, half):
-                if not balance.moving.weight[int(turn)]:
-                    continue
-                rows = np.arange(len(speed), dtype=np.float64)
-                for pulse in _of_turn((rows - turn) / half):
-                    column = np.zeros(len(self.channels))
-                    force = balance.of_port(port, after * pulse) / self.data.deviation[number]
-                    column[ends[number] : ends[number + 1]] = force[balance.kept]
-                    yield column
+    @staticmethod
+    def _pulses(balance: ForceBalance, port: str) -> Matrix:
+        """Return the force around all turns of a port, (2 _OF_TURN, n)."""
+        speed, step = balance.ports[port].speed, float(balance.time[1] - balance.time[0])
+        half = 0.5 / (balance.cutoff * step)
+        still = speed_noise(balance.mechanism.port(port), balance.record, balance.cutoff)
+        pulses = np.zeros((2 * _OF_TURN, len(speed)))
+        for turn, after in _turns_of(speed, STILL * still, half):
+            if balance.moving.weight[int(turn)]:
+                near = slice(max(int(turn - half), 0), int(turn + half) + 2)
+                place = (np.arange(len(speed), dtype=np.float64)[near] - turn) / half
+                pulses[:, near] += after * np.array(list(_of_turn(place)))
+        return pulses
+
+    def _whitened(self, port: str, signals: Sequence[Matrix]) -> Matrix:
+        """Return whitened balances, (n,), of a force at a port in each record."""
+        parts = zip(self.data.spectra, self.data.deviation, signals, strict=True)
+        return np.concatenate(
+            [
+                (balance.of_port(port, signal) / deviation)[balance.kept]
+                for balance, deviation, signal in parts
+            ]
+        )
 
     def _column(self, port: str, over: str, number: int, law: Law | None = None) -> Matrix:
         """Return whitened balances of a function over something, times a law's force, (n,)."""
-        parts = []
-        reach = self._reach(port, over)
+        signals, reach = [], self._reach(port, over)
         stiffness = self.data.mechanism.port(port).stiffness.value
-        for balance, deviation in zip(self.data.spectra, self.data.deviation, strict=True):
-            motion = balance.ports[port]
+        for motion in (balance.ports[port] for balance in self.data.spectra):
             signal = sine_of(number, _argument(motion, over) / reach)[0]
-            if law is not None:
-                signal = signal * law_force(law, motion, stiffness)
-            parts.append((balance.of_port(port, signal) / deviation)[balance.kept])
-        return np.concatenate(parts)
+            signals.append(signal if law is None else signal * law_force(law, motion, stiffness))
+        return self._whitened(port, signals)
 
     def _reach(self, port: str, over: str) -> float:
         peaks = [
