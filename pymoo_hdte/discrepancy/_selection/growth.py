@@ -60,6 +60,9 @@ OF_ONE_NAME = 2
 FEWEST = 4
 """Single effects that are fitted at least: a base at its bounds may leave a thousand times what it
 does beside the true effect, of which the first order knows nothing."""
+HOPELESS = 9.0
+"""Chi-square, as a multiple of that of the likeliest set, at which a fit is given up. With free
+noise it costs half the logarithm of this a residual; errors of laws made that 70 at the least."""
 MOST_OUTSIDE = 6
 """Sets beside which something outside of the library is looked for, the likeliest without it."""
 
@@ -272,7 +275,8 @@ class Growth:
                 for start in candidate.starts:
                     values = np.append(without.fit.values, start)
                     self._fit((*without.candidates, candidate), values, again=True)
-        if self._may_be_extended(without):
+        far = without.fit.chi_square > self._hopeless and _size(without.candidates) > 1
+        if self._may_be_extended(without) and not far:
             self._extend(without)
 
     def _extend(self, weighed: Weighed) -> None:
@@ -353,7 +357,7 @@ class Growth:
         return gains + np.array(priors)
 
     def _without(self, weighed: Weighed, member: Candidate) -> Weighed | None:
-        """Return a set without a member, fitted to the end; None if that is not to be seen."""
+        """Return a set without a member; None if that is not to be seen."""
         members = tuple(candidate for candidate in weighed.candidates if candidate is not member)
         label = label_of(members)
         if weighed.fit not in self._pruned[label] and label not in self._invisible:
@@ -365,7 +369,7 @@ class Growth:
                 for candidate, place in weighed.fit.places
                 if candidate is not member
             ]
-            self._weigh(fit(self.data, members, np.concatenate(values)))
+            self._trial(members, np.concatenate(values))
         return self._known.get(label)
 
     def _fit(self, members: Sequence[Candidate], start: Vector, again: bool = False) -> None:
@@ -379,7 +383,17 @@ class Growth:
             return
         if _size(members) > MOST_MEMBERS:
             return
-        self._weigh(fit(self.data, members, start, settled=self.data.rules.trial_gain))
+        self._trial(members, start)
+
+    @property
+    def _hopeless(self) -> float:
+        """Chi-square with which a set is nowhere near the likeliest one."""
+        return HOPELESS * self.ranked[0].fit.chi_square
+
+    def _trial(self, members: Sequence[Candidate], start: Vector) -> None:
+        """Fit a set just enough to rank it, and weigh it."""
+        settled, hopeless = self.data.rules.trial_gain, self._hopeless
+        self._weigh(fit(self.data, members, start, settled=settled, hopeless=hopeless))
 
     def _weigh(self, fitted: Fit) -> None:
         """Keep a fit with its probability, unless one of its effects would be invisible."""
