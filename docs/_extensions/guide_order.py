@@ -13,7 +13,6 @@ ORDER = (
     "exact_moments.py",
     "steady_state.py",
     "verdict_score.py",
-    "verdict_rules.py",
 )
 
 

@@ -18,6 +18,7 @@ from pymoo_hdte.discrepancy._evidence.order_lines.torsion_curve import TorsionPo
 from pymoo_hdte.discrepancy._selection.candidate import Layout
 from pymoo_hdte.discrepancy._selection.fitting import fit
 from pymoo_hdte.discrepancy._selection.hypothesis import Hypothesis
+from pymoo_hdte.discrepancy._verdicts import rattling
 from pymoo_hdte.discrepancy._verdicts.drive_finding import DriveFinding
 from pymoo_hdte.drive import mean_torsion
 from pymoo_hdte.units import ARCSEC, REVOLUTION_PER_MINUTE
@@ -125,3 +126,8 @@ def analysed(data, status="unlisted", candidate=None, start=()):
         chosen = Hypothesis(fit(data, (candidate,), np.concatenate([base.values, start])), 0.0, 1.0)
     verdict = made_verdict(status, base, chosen, freedom=len(base.residuals) - len(base.values))
     return DriveFinding(data.campaign, data, verdict, ())
+
+
+def judged(data, candidates):
+    """Return the verdict on planted data."""
+    return rattling._judged_on(data, fit(data), candidates)[1]

@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections import Counter, defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from itertools import combinations
 from typing import Protocol
 
 import numpy as np
@@ -25,7 +26,6 @@ from pymoo_hdte.discrepancy._selection.decision import (
     decide,
     log_prior,
 )
-from pymoo_hdte.discrepancy._selection.fitted_sets import may_be_together
 from pymoo_hdte.discrepancy._selection.fitting import Evidence, Fit, fit
 from pymoo_hdte.discrepancy._selection.hypothesis import Hypothesis, hypothesis_of, label_of
 from pymoo_hdte.discrepancy._selection.released import gain_of_released, released_together
@@ -379,7 +379,7 @@ class Growth:
         """
         label = label_of(members)
         known = label in self._known or label in self._invisible
-        if (known and not again) or not may_be_together(tuple(members)):
+        if (known and not again) or not _may_be_together(members):
             return
         if _size(members) > MOST_MEMBERS:
             return
@@ -438,6 +438,13 @@ class Growth:
     def _as_hypothesis(self, fitted: Fit) -> Hypothesis:
         excess = max(self.base.chi_square - len(self.base.residuals), 1.0)
         return hypothesis_of(fitted, excess)
+
+
+def _may_be_together(members: Sequence[Candidate]) -> bool:
+    """Tell whether a machine may have all these effects together, none of them twice."""
+    twice = len(label_of(members)) < len(members)
+    pairs = combinations(members, 2)
+    return not twice and all(effect.goes_with(partner) for effect, partner in pairs)
 
 
 def _size(members: Sequence[Candidate]) -> int:

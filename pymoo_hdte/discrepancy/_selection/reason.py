@@ -6,26 +6,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-AT_BOUND = "at_bound"
-"""Unknowns of an effect ended at a bound; the numbers are their values, SI."""
-ZERO_IN_INTERVAL = "zero_in_interval"
-"""The strength of an effect may be zero."""
-FREED_AT_BOUND = "freed_at_bound"
-"""A base value out of tolerance ended at ten times or a tenth of its nominal value."""
-SENSOR_AT_BOUND = "sensor_at_bound"
-"""The gain or zero that ``effect`` names ended far beyond what is stated of it."""
-STANDS_FOR_FORM = "stands_for_form"
-"""Values out of tolerance may stand for what the listed form of an effect leaves."""
-HARMONIC_OF_ANOTHER = "harmonic_of_another"
-"""An effect may be a harmonic of another; the number is the multiple of its order."""
 NOT_VALIDATED = "not_validated"
 """The error on held-out records does not shrink as it should."""
 HELD_OUT_ERROR_GROWS = "held_out_error_grows"
 """Errors on held-out records grow; the numbers are their ratios, after to before."""
-ABOVE_NOISE = "above_noise"
-"""More than noise is left: ``times_noise``."""
-NEEDS_ANOTHER_FORM = "needs_another_form"
-"""Effects need another form than the listed one to explain the misfit."""
+MORE_MISSING = "more_missing"
+"""The effects leave something; ``outside`` is the probability that no effect of the library can."""
 
 
 SAME_READING = "same_reading"

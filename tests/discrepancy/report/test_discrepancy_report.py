@@ -25,7 +25,7 @@ from pymoo_hdte.discrepancy._report.optimum import OptimumShift
 from pymoo_hdte.discrepancy._report.tables import parameter_rows
 from pymoo_hdte.discrepancy._report.write import validation_sentence, write_report
 from pymoo_hdte.discrepancy._robust_optimum import optimum_shift
-from pymoo_hdte.discrepancy._selection.reason import AT_BOUND, SENSOR_OFF, Reason
+from pymoo_hdte.discrepancy._selection.reason import MORE_MISSING, SENSOR_OFF, Reason
 from pymoo_hdte.discrepancy._verdicts.validation_drive import validate_drive
 from pymoo_hdte.drive import (
     LawAtPort,
@@ -347,7 +347,7 @@ def test_words_of_a_user_s_effect_are_no_lines_of_the_static_error(ripple, locat
     verdict = replace(
         ripple.verdict,
         chosen=replace(chosen, fit=alone),
-        reasons=(Reason.of(AT_BOUND, own.label, {unknown.name: unknown.upper}),),
+        reasons=(Reason.of(MORE_MISSING, numbers={"outside": 0.5}),),
     )
     document = write_report(
         replace(ripple, verdict=verdict), location, None, PROPOSAL, not_tried, tmp_path / "own"

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from pymoo_hdte.discrepancy._evidence.order_lines.candidates import out_of_tolerance
 from pymoo_hdte.discrepancy._evidence.order_lines.features import MEANS, Features, measure
-from pymoo_hdte.discrepancy._evidence.order_lines.forms import Ranges, corrections
 from pymoo_hdte.discrepancy._evidence.order_lines.objective import Objective
 from pymoo_hdte.discrepancy._evidence.order_lines.observations import (
     Observations,
@@ -25,7 +24,7 @@ from pymoo_hdte.discrepancy._evidence.order_lines.torsion_curve import torsion_p
 from pymoo_hdte.discrepancy._records.campaign import Campaign
 from pymoo_hdte.discrepancy._records.line_fit import CHANNELS
 from pymoo_hdte.discrepancy._selection.candidate import Candidate, Layout
-from pymoo_hdte.discrepancy._selection.excess import Excess, HeldOutTest
+from pymoo_hdte.discrepancy._selection.excess import Excess
 from pymoo_hdte.discrepancy._selection.fitting import Fit, Response
 from pymoo_hdte.discrepancy._selection.rules import RULES, Rules
 from pymoo_hdte.drive import DriveEffect
@@ -51,11 +50,6 @@ class Data(Observations):
 
     rules: Rules = RULES
     evident: frozenset[str] = frozenset()
-
-    @property
-    def model_error_share(self) -> float:
-        """Share of the base's excess up to which a residual counts as the model's own error."""
-        return self.rules.model_accuracy**2
 
     def objective(self, candidates: Sequence[Candidate]) -> Objective:
         """Return whitened residuals of the drive with candidates."""
@@ -87,10 +81,6 @@ class Data(Observations):
             return np.concatenate([running, np.nan_to_num(torsion[0]), priors])
 
         return change
-
-    def corrections(self, candidate: Candidate) -> list[DriveEffect]:
-        """Return the corrections of a law's form: see `forms.corrections`."""
-        return corrections(candidate, _ranges_of(self))
 
     def rows_of_parts(self) -> list[NDArray[np.int_]]:
         """Return the indices of the residuals of each channel, and of the sweeps."""
@@ -131,34 +121,6 @@ class Data(Observations):
             self.base, at_bounds, believed.error_orders, together, believed.effects
         )
 
-    def held_out_test(self, base: Fit, fitted: Fit) -> HeldOutTest | None:
-        """Return what the records kept out of the fit say of two fits; None without any.
-
-        Creep in these records is noise or an error of the model: as noise it covers most of what a
-        loop that forgets does, and as an error it outweighs that. The version that speaks better
-        for the change counts, so that a change is denied only if both deny it.
-        """
-        if (data := self.held_out) is None:
-            return None
-        if not self.creep:
-            return data._held_out_test(base, fitted)
-        settled = replace(data.features.conditions, fading=None)
-        versions = data, replace(data, features=replace(data.features, conditions=settled))
-        tests = [version._held_out_test(base, fitted) for version in versions]
-        return max(tests, key=lambda test: (test.before - test.after) / max(test.change, 1e-300))
-
-    def _held_out_test(self, base: Fit, fitted: Fit) -> HeldOutTest:
-        """Return what these records say of two fits."""
-        before, after = (
-            self.whiten(
-                self.predict(fit.values[None, : len(self.base)], fit.effects)[0]
-                - self.features.values
-            )
-            for fit in (base, fitted)
-        )
-        change = after - before
-        return HeldOutTest(float(before @ before), float(after @ after), float(change @ change))
-
     @cached_property
     def held_out(self) -> Data | None:
         """Features of the records kept out of the fit, or None without such records.
@@ -183,18 +145,6 @@ class Data(Observations):
         orders = self.features.orders.tolist()
         return replace(self, features=measure(self.campaign, records, orders, self.rules))
 
-    def with_noise_of(self, fitted: Fit) -> Data | None:
-        """Return the data with the noise of another model, or None where the noise hardly grows.
-
-        The non-repeatable error is a motion, which reaches all channels through the response of
-        the drive, its effects included.
-        """
-        base = fitted.values[: len(self.base)]
-        renewed = replace(self, reference=base, reference_effects=fitted.effects)
-        variances = (np.diagonal(data.covariance, axis1=1, axis2=2) for data in (renewed, self))
-        ratio = np.divide(*variances).max()
-        return renewed if ratio > self.rules.changed_noise_ratio else None
-
     @property
     def loaded(self) -> Data:
         """The data without records whose load does not hold the tooth flanks together.
@@ -205,29 +155,6 @@ class Data(Observations):
         if np.all(held) or held.sum() < self.rules.fewest_records:
             return self
         return replace(self, features=self.features.rows(np.flatnonzero(held)))
-
-
-def _ranges_of(data: Data) -> Ranges:
-    """Return the ranges of speed, torque and time of the records."""
-    when, believed = data.features.conditions, data.campaign.believed
-    torques = [
-        np.abs(when.output_torque).max(),
-        *(np.abs(points.path).max() for points in data.torsion),
-    ]
-    lines = zip(believed.error_orders, believed.error_amplitudes, strict=True)
-    return Ranges(
-        np.abs(when.input_speed),
-        float(max(torques)),
-        float(max(torques)) / believed.stiffness,
-        float(np.ptp(when.elapsed)),
-        believed.ratio,
-        believed.stiffness,
-        believed.damping,
-        max(believed.load_inertia, believed.output_inertia),
-        tuple(order for order, amplitude in lines if amplitude > 0.0),
-        tuple(data.features.orders.tolist()),
-        data.rules.form_terms,
-    )
 
 
 def flanks_held(features: Features, torque_scale: float, rules: Rules) -> NDArray[np.bool_]:
