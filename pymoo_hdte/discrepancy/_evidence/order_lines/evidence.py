@@ -32,6 +32,11 @@ from pymoo_hdte.effects.unknowns import Parameter
 
 Vector = NDArray[np.float64]
 
+CHANGED_NOISE = 1.5
+"""Ratio of variances from which on the noise of another model counts as another one.
+
+Set by hand: chi-square of what changes most is then off by half.
+"""
 PARTS = (*CHANNELS, "torsion_sweep")
 """Parts of the data, as in `Excess`: channels of the running records, and the sweeps."""
 
@@ -144,6 +149,17 @@ class Data(Observations):
         records = (*self.features.records, *held_out.features.records)
         orders = self.features.orders.tolist()
         return replace(self, features=measure(self.campaign, records, orders, self.rules))
+
+    def with_noise_of(self, fitted: Fit) -> Data | None:
+        """Return the data with the noise of another model, or None where the noise hardly grows.
+
+        The non-repeatable error is a motion, which reaches all channels through the response of
+        the drive, its effects included.
+        """
+        base = fitted.values[: len(self.base)]
+        renewed = replace(self, reference=base, reference_effects=fitted.effects)
+        variances = (np.diagonal(data.covariance, axis1=1, axis2=2) for data in (renewed, self))
+        return renewed if np.divide(*variances).max() > CHANGED_NOISE else None
 
     @property
     def loaded(self) -> Data:
