@@ -266,7 +266,7 @@ def _shown(unit: str) -> str:
 def _role(verdict: Verdict, hypothesis: Hypothesis) -> str:
     if hypothesis is verdict.chosen:
         return "nearest, not enough" if verdict.status == "unlisted" else "chosen"
-    return "indistinguishable" if verdict.is_equivalent(hypothesis) else "rejected"
+    return "indistinguishable" if hypothesis in verdict.equivalent else "rejected"
 
 
 _MOST_FAULTS = 50

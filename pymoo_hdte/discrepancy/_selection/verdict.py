@@ -97,15 +97,6 @@ class Verdict:
         degrees_of_freedom, rules = self.degrees_of_freedom, self.rules
         return chosen is not None and not down_to_noise(chosen.fit, degrees_of_freedom, rules)
 
-    def is_equivalent(self, hypothesis: Hypothesis) -> bool:
-        """Tell whether a set is of the class, or an order or form away from one and as likely."""
-        named = () if self.chosen is None else (self.chosen, *self.equivalent)
-        distance = self.rules.evidence_distance
-        return hypothesis in self.equivalent or any(
-            hypothesis.names == member.names and hypothesis.bic - member.bic < distance
-            for member in named
-        )
-
     def has_reason(self, code: str) -> bool:
         """Tell whether any of its reasons has a code."""
         return any(reason.code == code for reason in self.reasons)

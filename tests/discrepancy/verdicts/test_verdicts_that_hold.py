@@ -117,7 +117,7 @@ def said(analysis):
 
 def near(verdict):
     """Return the sets that the report calls alike."""
-    return [one for one in verdict.alternatives if verdict.is_equivalent(one)]
+    return [one for one in verdict.alternatives if one in verdict.equivalent]
 
 
 def member_with(verdict, label):
