@@ -175,8 +175,9 @@ def _any_of(explanations: Sequence[Explanation], shares: NDArray[np.float64]) ->
     any_of, rest = frozenset[Name](), np.ones(len(shares), dtype=bool)
     while float(shares[rest].sum()) > 1.0 - SURE:
         of_names = Counter[Name]()
-        for place in np.flatnonzero(rest):
-            of_names.update(dict.fromkeys(explanations[place].names, float(shares[place])))
+        for item, share, remains in zip(explanations, shares.tolist(), rest.tolist(), strict=True):
+            if remains:
+                of_names.update(dict.fromkeys(item.names, share))
         if not of_names or len(any_of) == MOST_IN_CLASS:
             return frozenset()
         any_of |= {of_names.most_common(1)[0][0]}
