@@ -26,7 +26,7 @@ LEAST_ERROR, MOST_ERROR = 1e-3, 0.3
 the upper end it is another law."""
 _LEAST_SHARE = 1e-3
 """Least of a further line or level of an effect, as a share of its largest: it may be as good as
-absent. Each size of a law has to be visible: a law without it has another name."""
+absent. Any other size of a law has to be visible: a law without it has another name."""
 _BY_LOGARITHM = 5.0
 """Ratio of a shape's bounds from which on it is known by its logarithm."""
 
@@ -68,7 +68,7 @@ def linearise(
             parameters = [candidate.parameters[row] for row in rows]
             at = [place.start + row for row in rows]
             if _is_size(parameters[0]):
-                further = rows[0] > 0 and candidate.linear
+                further = parameters[0].may_vanish or (rows[0] > 0 and candidate.linear)
                 sized.append(
                     _size(candidate, parameters, columns[:, at], fitted.values[at], further)
                 )

@@ -257,7 +257,7 @@ class LawErrors:
         """What no law holds: a process over speed and load at each line and mean of a channel.
 
         And a torque at each port and order, as it shows in all channels. Each has a scale from
-        what is visible up to the misfit of the base.
+        what is visible up to all that is measured.
         """
         return tuple(self._outside())
 
@@ -352,13 +352,20 @@ class LawErrors:
             columns = self.data.whiten(change.reshape(-1, *features.values.shape)).T
             yield self._place(f"response of {name}", columns, 2 * place.size)
 
+    @cached_property
+    def _measured(self) -> float:
+        """Square of all that is measured, or of the misfit if that is larger, in its noise."""
+        measured = float(np.sum(self.data.whiten(self.data.features.values) ** 2))
+        return max(measured, self.base.chi_square)
+
     def _place(self, name: str, columns: Matrix, n_rows: int) -> Sized:
-        """Return what may be at a place: from as large as the noise of its rows to the misfit."""
+        """Return what may be at a place: from as large as the noise of its rows to all there is.
+
+        Up to the misfit only, it would lose nothing where that is small, and come for nothing
+        beside every effect.
+        """
         whole, m = self._whole(columns), columns.shape[1]
         size = max(float(np.sum(whole**2)), 1e-24)
-        least, most = (
-            np.sqrt(n_rows / size),
-            np.sqrt(max(self.base.chi_square, 4.0 * n_rows) / size),
-        )
+        least, most = np.sqrt(n_rows / size), np.sqrt(self._measured / size)
         none = np.zeros(m)
         return Sized(f"outside: {name}", whole, float(least), float(most), none, none > 0.0)
