@@ -87,7 +87,9 @@ def measured(effects=(), rng=None, data=None, **changes):
     values = data.predict(truth[None], effects)[0]
     if rng is not None:
         noise = rng.standard_normal(values.shape)
-        values = values + np.einsum("rij,rj->ri", data.whiteners, noise)
+        # An error that does not repeat is a motion: what it brings to a channel is the true drive's.
+        true_noise = replace(data, reference=truth, reference_effects=tuple(effects)).whiteners
+        values = values + np.einsum("rij,rj->ri", true_noise, noise)
     return replace(data, features=replace(data.features, values=values)), truth
 
 
