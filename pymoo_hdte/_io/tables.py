@@ -58,9 +58,9 @@ class Columns:
     length: int
     above: int = 0
 
-    def si(self, channel: Channel, rows: slice = slice(None)) -> NDArray[np.float64]:
+    def si(self, channel: Channel) -> NDArray[np.float64]:
         """Return a channel in SI, shape (n,); values that are not finite are interpolated."""
-        raw = self.raw[channel.column][rows]
+        raw = self.raw[channel.column]
         at = np.flatnonzero(np.isfinite(raw))
         if at.size == 0:
             return np.full(raw.size, np.nan)

@@ -23,19 +23,17 @@ FILTER_ORDER = 4
 """Order of the Butterworth filter, run forward and backward; the paper prints no type or order."""
 
 
-def low_pass(
-    signal: ArrayLike, sampling_rate: float = SAMPLING_RATE, cutoff: float = CUTOFF
-) -> NDArray[np.float64]:
+def low_pass(signal: ArrayLike, sampling_rate: float = SAMPLING_RATE) -> NDArray[np.float64]:
     """Return the signal after the zero-phase low pass of Section 4.
 
-    Forward and backward passes square the gain: at the cutoff it is 1/2, at 67 Hz 0.96.
+    Forward and backward passes square the gain: at `CUTOFF` it is 1/2, at 67 Hz 0.96.
 
     Parameters
     ----------
     signal : array_like, shape (n_times,)
         Equally spaced samples, any unit.
-    sampling_rate, cutoff : float
-        Hz; the cutoff lies below half the sampling rate.
+    sampling_rate : float
+        Hz, above twice `CUTOFF`.
 
     Returns
     -------
@@ -45,7 +43,7 @@ def low_pass(
     Raises
     ------
     InvalidInput
-        For a wrong rate or cutoff, or a signal that is not finite or too short to filter.
+        For a wrong rate, or a signal that is not finite or too short to filter.
 
     Examples
     --------
@@ -55,10 +53,9 @@ def low_pass(
     >>> bool(abs(low_pass(noisy) - slow)[200:-200].max() < 0.01)
     True
     """
-    real_number("sampling_rate", sampling_rate, above=0.0)
-    real_number("cutoff", cutoff, above=0.0, below=sampling_rate / 2.0)
+    real_number("sampling_rate", sampling_rate, above=2.0 * CUTOFF)
     samples = finite_array("signal", signal, (None,))
-    sections = scipy.signal.butter(FILTER_ORDER, cutoff, fs=sampling_rate, output="sos")
+    sections = scipy.signal.butter(FILTER_ORDER, CUTOFF, fs=sampling_rate, output="sos")
     shortest = 3 * (2 * len(sections) + 1) + 1
     if len(samples) < shortest:
         raise InvalidInput("length of signal", len(samples), f"at least {shortest} samples")
@@ -70,7 +67,6 @@ def measured_dte(
     output_angle: ArrayLike,
     ratio: float,
     sampling_rate: float = SAMPLING_RATE,
-    cutoff: float = CUTOFF,
 ) -> float:
     """Return the DTE of a record in rad: filtered transmission error, peak-to-peak of one turn.
 
@@ -83,7 +79,7 @@ def measured_dte(
         Encoder angles in rad, unwrapped, equally spaced in time.
     ratio : float
         Transmission ratio N, dimensionless.
-    sampling_rate, cutoff : float
+    sampling_rate : float
         Hz.
 
     Raises
@@ -102,7 +98,7 @@ def measured_dte(
     real_number("ratio", ratio, above=0.0)
     driving = finite_array("input_angle", input_angle, (None,))
     driven = finite_array("output_angle", output_angle, driving.shape)
-    error = low_pass(driving / ratio - driven, sampling_rate, cutoff)
+    error = low_pass(driving / ratio - driven, sampling_rate)
     travel = abs(driving[-1] - driving[0])
     turn = 2.0 * np.pi * ratio
     # One sample short of a turn is a whole turn: its end point repeats its start.

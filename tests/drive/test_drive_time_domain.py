@@ -123,8 +123,8 @@ def test_a_record_shorter_than_a_turn_or_not_finite_is_refused():
         low_pass([0.0, 0.0, 0.0, np.nan] * 20)
     with pytest.raises(InvalidInput, match="length of signal"):
         low_pass(np.zeros(5))
-    with pytest.raises(InvalidInput, match="cutoff"):
-        low_pass(np.zeros(100), cutoff=600.0)
+    with pytest.raises(InvalidInput, match="sampling_rate"):
+        low_pass(np.zeros(100), sampling_rate=200.0)
 
 
 def test_the_middle_turn_of_a_record_is_evaluated():

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from pymoo_hdte.discrepancy._answers.separation import noncentrality_for, power
 from pymoo_hdte.discrepancy._plan.signatures import Counts, Signatures, is_rival
-from pymoo_hdte.discrepancy._selection.rules import Rules
+from pymoo_hdte.discrepancy._selection.rules import RULES
 
 Values = NDArray[np.float64]
 
@@ -21,17 +21,16 @@ _GAIN = 1e-9
 class Aims:
     """What a set of tests should reach: each effect detected, and separated from its rivals.
 
+    `Rules.single_effect_gain` detects an effect, `Rules.evidence_distance` separates two.
+
     Attributes
     ----------
     signatures : Signatures
-    rules : Rules
-        `Rules.single_effect_gain` detects an effect, `Rules.evidence_distance` separates two.
     power : float
         Wanted probability of each detection and separation.
     """
 
     signatures: Signatures
-    rules: Rules
     power: float
 
     @property
@@ -51,15 +50,15 @@ class Aims:
         """
         alone, beside = self.signatures.noncentralities(counts)
         return (
-            power(alone, self.rules.single_effect_gain),
-            power(beside, self.rules.evidence_distance),
+            power(alone, RULES.single_effect_gain),
+            power(beside, RULES.evidence_distance),
         )
 
     def shares(self, counts: Counts) -> Values:
         """Return the share of each aim that a set of tests reaches, at most 1; shape (n_aims,)."""
         alone, beside = self.signatures.noncentralities(counts)
-        detected = alone / noncentrality_for(self.power, self.rules.single_effect_gain)
-        apart = beside / noncentrality_for(self.power, self.rules.evidence_distance)
+        detected = alone / noncentrality_for(self.power, RULES.single_effect_gain)
+        apart = beside / noncentrality_for(self.power, RULES.evidence_distance)
         return np.minimum(np.concatenate([detected, apart[self.pairs]]), 1.0)
 
 

@@ -26,7 +26,7 @@ from pymoo_hdte.discrepancy._records.believed import BelievedDrive
 from pymoo_hdte.discrepancy._records.campaign import Campaign
 from pymoo_hdte.discrepancy._records.line_fit import CHANNELS
 from pymoo_hdte.discrepancy._records.records import RunningRecord, TorsionRecord
-from pymoo_hdte.discrepancy._selection.rules import RULES, Rules
+from pymoo_hdte.discrepancy._selection.rules import RULES
 from pymoo_hdte.discrepancy._verdicts.drive import expected_orders, highest_order
 from pymoo_hdte.drive import DriveEffect, mean_torsion
 
@@ -81,7 +81,6 @@ def imagined_campaign(
     tests: Sequence[PlannedTest],
     rng: np.random.Generator,
     effects: Sequence[DriveEffect] = (),
-    rules: Rules = RULES,
 ) -> Campaign:
     """Return the records that tests would give, in their order, all with the role to be fitted.
 
@@ -95,7 +94,6 @@ def imagined_campaign(
         Generator for phases of the static error, and noise.
     effects : sequence of DriveEffect
         Effects that the drive has besides the nominal ones.
-    rules : Rules
 
     Raises
     ------
@@ -129,9 +127,7 @@ def imagined_campaign(
         _swept(f"sweep_{k:03d}", test.load, believed, limits, values, effects, rng)
         for k, test in enumerate(sweeps)
     ]
-    return Campaign(
-        "planned", "believed", believed, limits.rig, tuple(records), tuple(swept), rules
-    )
+    return Campaign("planned", "believed", believed, limits.rig, tuple(records), tuple(swept))
 
 
 def _travel(limits: PlanLimits, ratio: float) -> float:
@@ -147,18 +143,16 @@ def _orders(believed: BelievedDrive) -> list[float]:
     return sorted({round(order, 9) for order in orders if order < _ROWS_A_TURN / 2})
 
 
-def imagined_data(
-    campaign: Campaign, limits: PlanLimits, orders: Sequence[float], rules: Rules
-) -> Data:
+def imagined_data(campaign: Campaign, limits: PlanLimits, orders: Sequence[float]) -> Data:
     """Return the features of a campaign at the usual orders and at those of stated effects."""
-    looked_at = expected_orders(campaign, rules)
-    apart = rules.line_separation / campaign.believed.ratio
+    looked_at = expected_orders(campaign, RULES)
+    apart = RULES.line_separation / campaign.believed.ratio
     for order in orders:
         distance = min(abs(order - known) for known in looked_at)
-        if distance >= apart and order <= highest_order(campaign, rules):
+        if distance >= apart and order <= highest_order(campaign, RULES):
             looked_at.append(order)
     features = measure(campaign, campaign.running, sorted(looked_at))
-    return training_data(campaign, _measured_only(features, limits), rules)
+    return training_data(campaign, _measured_only(features, limits), RULES)
 
 
 def _measured_only(features: Features, limits: PlanLimits) -> Features:

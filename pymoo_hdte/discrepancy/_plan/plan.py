@@ -20,7 +20,7 @@ from pymoo_hdte.discrepancy._plan.imagined import (
 )
 from pymoo_hdte.discrepancy._plan.limits import PlanLimits
 from pymoo_hdte.discrepancy._plan.signatures import Counts
-from pymoo_hdte.discrepancy._selection.rules import RULES, Rules
+from pymoo_hdte.discrepancy._selection.rules import RULES
 from pymoo_hdte.drive import DriveModel
 from pymoo_hdte.units import REVOLUTION_PER_MINUTE
 
@@ -113,10 +113,7 @@ class Plan:
 
 @ONE_THREAD
 def plan_tests(
-    model: DriveModel,
-    limits: PlanLimits,
-    rng: np.random.Generator | None = None,
-    rules: Rules = RULES,
+    model: DriveModel, limits: PlanLimits, rng: np.random.Generator | None = None
 ) -> Plan:
     """Return the smallest set of tests that separates the effects that matter.
 
@@ -130,7 +127,6 @@ def plan_tests(
     limits : PlanLimits
     rng : Generator, optional
         Generator for phases and noise of the imagined records; by default with seed 0.
-    rules : Rules
 
     Returns
     -------
@@ -148,12 +144,12 @@ def plan_tests(
     """
     rng = np.random.default_rng(0) if rng is None else rng
     believed, tests = limits.believed(model), possible_tests(limits)
-    campaign = imagined_campaign(believed, limits, tests, rng, rules=rules)
-    data = imagined_data(campaign, limits, stated_orders(limits.effects, believed.ratio), rules)
-    aims = Aims(signatures_of(data, limits, model.sheet.load_torque), rules, limits.power)
+    campaign = imagined_campaign(believed, limits, tests, rng)
+    data = imagined_data(campaign, limits, stated_orders(limits.effects, believed.ratio))
+    aims = Aims(signatures_of(data, limits, model.sheet.load_torque), limits.power)
     most = limits.most_records - limits.held_out
     counts = smallest_set(aims, most)
-    counts = _enough(counts, tests, min(rules.fewest_records, most))
+    counts = _enough(counts, tests, min(RULES.fewest_records, most))
     made = tuple(tests[k] for k in np.repeat(np.arange(len(tests)), counts))
     detected, separated = _chances(aims, counts, most)
     held_out = _held_out(made, tests, limits.held_out)

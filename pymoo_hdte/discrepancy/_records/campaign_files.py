@@ -41,13 +41,11 @@ from pymoo_hdte.discrepancy._records.campaign_records import (
     record_table,
 )
 from pymoo_hdte.discrepancy._records.records import RunningRecord, TorsionRecord
-from pymoo_hdte.discrepancy._selection.rules import RULES, Rules
+from pymoo_hdte.discrepancy._selection.rules import RULES
 from pymoo_hdte.drive._effects import effect_from_fields
 
 
-def read_campaign(
-    folder: str | Path, rules: Rules = RULES, progress: Progress | None = None
-) -> Campaign:
+def read_campaign(folder: str | Path, progress: Progress | None = None) -> Campaign:
     """Read and check a campaign.
 
     Parameters
@@ -55,8 +53,6 @@ def read_campaign(
     folder : str or Path
         With ``campaign.toml`` and a file for each record, as ``docs/campaign_format.md`` says; or
         the path of its ``campaign.toml``.
-    rules : Rules
-        Thresholds of what `Campaign` refuses.
     progress : callable, optional
         Called with the number of bytes of the records read so far, and of all.
 
@@ -112,7 +108,7 @@ def read_campaign(
         running = tuple(record for record in records if isinstance(record, RunningRecord))
         torsion = tuple(record for record in records if isinstance(record, TorsionRecord))
         try:
-            campaign = Campaign(title, drive, believed, rig, running, torsion, rules, **enough)
+            campaign = Campaign(title, drive, believed, rig, running, torsion, RULES, **enough)
         except InvalidInput as error:
             for complaint in complaints_of(error):
                 with complaints.noted():

@@ -22,7 +22,6 @@ from pymoo_hdte.discrepancy._plan.imagined import (
 from pymoo_hdte.discrepancy._plan.limits import PlanLimits, read_limits
 from pymoo_hdte.discrepancy._plan.plan import chance_words, plan_tests
 from pymoo_hdte.discrepancy._plan.signatures import Signatures, is_rival
-from pymoo_hdte.discrepancy._selection.rules import RULES
 from pymoo_hdte.drive import preset
 from pymoo_hdte.drive._effects import LawAtPort
 from pymoo_hdte.effects.friction import CoulombFriction
@@ -144,16 +143,16 @@ def test_the_smallest_set_leaves_out_what_tells_nothing():
     """Test 0 tells nothing, 1 shows the effect, 2 tells it from the rival; 2 does both."""
     effect = np.array([[0.0, 0.0], [9.0, 0.0], [9.0, 9.0]])
     rival = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 0.0]])
-    aims = Aims(made([effect], [[([rival], True)]]), RULES, 0.9)
+    aims = Aims(made([effect], [[([rival], True)]]), 0.9)
     assert smallest_set(aims, 5).tolist() == [0, 0, 1]
     # A third of it leaves 9 a test beside the rival; a power of 0.9 takes (10^0.5 + 1.28)^2 = 19.7.
-    third = Aims(made([effect / 3.0], [[([rival], True)]]), RULES, 0.9)
+    third = Aims(made([effect / 3.0], [[([rival], True)]]), 0.9)
     assert smallest_set(third, 5).tolist() == [0, 0, 3]
 
 
 def test_nothing_is_measured_for_what_no_test_tells():
     effect = np.array([[0.1], [0.2]])
-    aims = Aims(made([effect]), RULES, 0.9)
+    aims = Aims(made([effect]), 0.9)
     assert smallest_set(aims, 5).tolist() == [0, 0]
 
 
@@ -177,8 +176,8 @@ def only(monkeypatch):
         tests = possible_tests(limits)
         rng = np.random.default_rng(0)
         campaign = imagined_campaign(BELIEVED, limits, tests, rng)
-        found = signatures_of(imagined_data(campaign, limits, (), RULES), limits, 40.0)
-        alone, beside = Aims(found, RULES, 0.9).powers(np.ones(len(tests), dtype=int))
+        found = signatures_of(imagined_data(campaign, limits, ()), limits, 40.0)
+        alone, beside = Aims(found, 0.9).powers(np.ones(len(tests), dtype=int))
         monkeypatch.undo()
         shown = dict(zip(found.effects, alone, strict=True))
         pairs = {
