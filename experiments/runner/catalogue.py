@@ -104,8 +104,8 @@ EXPERIMENTS = (
     Experiment(
         "inference",
         "paper.inference.experiment",
-        "Whether any model gives the published trade-off, and what is known of its parameters",
-        "Does any model give the paper's trade-off, and how far can its optimum move?",
+        "Whether any model gives the published trade-off",
+        "Does any model give the paper's trade-off?",
         reads_outcome=True,
     ),
     Experiment(

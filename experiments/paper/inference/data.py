@@ -1,4 +1,4 @@
-"""Outcomes of searches, profiles and posteriors: as objects, and as the CSV that is kept."""
+"""Outcomes of searches: as objects, and as the CSV that is kept."""
 
 from __future__ import annotations
 
@@ -8,12 +8,10 @@ from functools import cached_property
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from experiments.paper.calibrating.ladder import EFFECTS, NARROW, Candidate
 from experiments.paper.inference.closures import CLOSURES
 from experiments.paper.inference.likelihood import OBSERVED, Evaluation, evaluate
-from experiments.paper.inference.posterior import OPTIMA, Posterior, Profile
 from experiments.paper.inference.rungs import Rung, rung_named
 from experiments.paper.inference.search import BASIN, Search
 from experiments.runner.committed import read_rows, table_with_origin
@@ -21,8 +19,6 @@ from pymoo_hdte._runner.campaign import Run
 
 PARAMETERS = tuple(Rung(Candidate(EFFECTS, "semi_amplitude", NARROW), tuple(CLOSURES)).bounds)
 _FIT = ("target", "rung", "seed", "effort", "starts", "followed", "reached", "deviance")
-_DRAW = ("target", "rung", "deviance")
-_PROFILE = ("target", "rung", "parameter", "value", "deviance")
 
 
 @dataclass(frozen=True)
@@ -58,26 +54,6 @@ class Fit:
     def bic(self) -> float:
         """Deviance and the price of the parameters, k ln n, for nine numbers."""
         return self.deviance + self.n_parameters * float(np.log(len(OBSERVED)))
-
-
-@dataclass(frozen=True)
-class Draws:
-    """Draws of a posterior: n values of each parameter, physical, and of `OPTIMA`, by name."""
-
-    target: str
-    rung: Rung
-    deviance: NDArray[np.float64]
-    parameters: dict[str, NDArray[np.float64]]
-    optima: dict[str, NDArray[np.float64]]
-
-
-@dataclass(frozen=True)
-class Profiled:
-    """Least deviances over values of each parameter on the searched scale, (n, 2) by name."""
-
-    target: str
-    rung: Rung
-    curves: dict[str, NDArray[np.float64]]
 
 
 def fits_of(jobs: Sequence[Search], runs: Sequence[Run]) -> list[Fit]:
@@ -127,65 +103,6 @@ def read_fits(path: Path) -> list[Fit]:
             )
         )
     return fits
-
-
-def format_draws(jobs: Sequence[Posterior], runs: Sequence[Run]) -> str:
-    """Return the CSV text of posteriors, a row a draw."""
-    rows = []
-    for job, run in zip(jobs, runs, strict=True):
-        size = len(job.rung.bounds)
-        for values in run.values:
-            parameters = job.rung.physical(values[1 : 1 + size])
-            rows.append([job.target, job.rung.name, f"{values[0]:.7g}", *_cells(parameters),
-                         *(f"{value:.7g}" for value in values[1 + size :])])  # fmt: skip
-    return table_with_origin([*_DRAW, *PARAMETERS, *OPTIMA], rows)
-
-
-def read_draws(path: Path) -> list[Draws]:
-    """Read what `format_draws` wrote, in its order."""
-    groups: dict[tuple[str, str], list[dict[str, str]]] = {}
-    for row in read_rows(path):
-        groups.setdefault((row["target"], row["rung"]), []).append(row)
-    draws = []
-    for (target, name), rows in groups.items():
-        rung = rung_named(name)
-
-        def column(key: str, rows: list[dict[str, str]] = rows) -> NDArray[np.float64]:
-            return np.array([float(row[key]) for row in rows])
-
-        parameters = {key: column(key) for key in rung.bounds}
-        optima = {key: column(key) for key in OPTIMA}
-        draws.append(Draws(target, rung, column("deviance"), parameters, optima))
-    return draws
-
-
-def format_profiles(jobs: Sequence[Profile], runs: Sequence[Run]) -> str:
-    """Return the CSV text of profiles, a row a value."""
-    rows = [
-        [
-            job.target,
-            job.rung.name,
-            list(job.rung.bounds)[int(axis)],
-            f"{value:.7g}",
-            f"{least:.7g}",
-        ]
-        for job, run in zip(jobs, runs, strict=True)
-        for axis, value, least in run.values
-    ]  # fmt: skip
-    return table_with_origin(_PROFILE, rows)
-
-
-def read_profiles(path: Path) -> list[Profiled]:
-    """Read what `format_profiles` wrote; values rise in each curve."""
-    groups: dict[tuple[str, str], dict[str, list[tuple[float, float]]]] = {}
-    for row in read_rows(path):
-        curves = groups.setdefault((row["target"], row["rung"]), {})
-        point = (float(row["value"]), float(row["deviance"]))
-        curves.setdefault(row["parameter"], []).append(point)
-    return [
-        Profiled(target, rung_named(name), {key: np.array(sorted(c)) for key, c in curves.items()})
-        for (target, name), curves in groups.items()
-    ]
 
 
 def _cells(parameters: dict[str, float]) -> list[str]:

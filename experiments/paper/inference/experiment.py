@@ -1,9 +1,8 @@
-"""Whether any model gives the published trade-off, and what the numbers say of its parameters.
+"""Whether any model gives the published trade-off.
 
-Without ``--full`` the report is made from ``experiments/data/inference*.csv``, the committed
-outcome of the last full campaign; with it the campaign runs (some half hour of one core, with
-the extra ``posterior``), goes on where it was interrupted, and leaves the files in the results
-folder.
+Without ``--full`` the report is made from ``experiments/data/inference.csv``, the committed
+outcome of the last full campaign; with it the campaign runs (some half hour of one core), goes on
+where it was interrupted, and leaves the file in the results folder.
 """
 
 from __future__ import annotations
@@ -11,31 +10,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from experiments.paper.calibrating.ladder import EFFECTS, LOGARITHMIC, NARROW, WIDE, Candidate
+from experiments.paper.calibrating.ladder import EFFECTS, NARROW, WIDE, Candidate
 from experiments.paper.calibrating.predictions import ORDER
 from experiments.paper.inference.closures import CLOSURES
-from experiments.paper.inference.data import (
-    Draws,
-    Fit,
-    Profiled,
-    fits_of,
-    format_draws,
-    format_fits,
-    format_profiles,
-    read_draws,
-    read_fits,
-    read_profiles,
-)
-from experiments.paper.inference.knowledge import (
-    BOUND,
-    identity_table,
-    optimum_table,
-    parameter_table,
-    title,
-)
+from experiments.paper.inference.data import Fit, fits_of, format_fits, read_fits
 from experiments.paper.inference.likelihood import (
     BAND,
     DEPTH_TOLERANCE,
@@ -46,7 +26,6 @@ from experiments.paper.inference.likelihood import (
 )
 from experiments.paper.inference.moments import TensorSurrogate
 from experiments.paper.inference.node_noise import LARGEST
-from experiments.paper.inference.posterior import Posterior, Profile
 from experiments.paper.inference.rungs import Rung, all_rungs, noisy_rungs
 from experiments.paper.inference.search import Effort, Search
 from experiments.paper.inference.tables import (
@@ -58,9 +37,8 @@ from experiments.paper.inference.tables import (
     steps_table,
 )
 from experiments.paper.inference.verdicts import Named, chosen_fits, noisy_fits
-from experiments.published_values import TABLE_8
 from experiments.runner.committed import committed_file, stored_outcome
-from experiments.runner.registry import Context, require
+from experiments.runner.registry import Context
 from experiments.runner.texts import paragraphs
 from pymoo_hdte._comparing.figures import BLACK, BLUE, GREEN, GREY, ORANGE, PINK, grid
 from pymoo_hdte._runner.result import OF_MODELS, Picture, Result
@@ -72,10 +50,10 @@ BEYOND = 7.0
 """Of the published optima, shown on either side, arcsec."""
 
 
-def objectives(shown: Sequence[Named], draws: Sequence[Draws]) -> Figure:
-    """Draw optima and fronts of the models, and the optima of the posteriors' draws."""
-    figure, axes = grid(1, 2, width=6.6, height=4.6)
-    axis, right = axes.flat
+def objectives(shown: Sequence[Named]) -> Figure:
+    """Draw optima and fronts of the models."""
+    figure, axes = grid(1, 1, width=6.6, height=4.6)
+    axis = axes.flat[0]
     for named, colour in zip(shown, COLOURS, strict=False):
         predicted = named.fit.evaluation.predicted
         axis.plot(*_front(named).T, "-", color=colour, linewidth=1)
@@ -84,35 +62,9 @@ def objectives(shown: Sequence[Named], draws: Sequence[Draws]) -> Figure:
     # A front that the target has drawn close runs on far beyond all others.
     axis.set_xlim(OBSERVED[1] - BEYOND, OBSERVED[3] + BEYOND)
     axis.set_ylim(OBSERVED[7] - 0.3 * BEYOND, OBSERVED[5] + 0.2 * BEYOND)
-    _labels(axis)
-    for drawn, colour in zip(draws, COLOURS, strict=False):
-        values = drawn.optima["mean_balanced"], drawn.optima["std_balanced"]
-        label = f"balanced, {title(drawn.target, drawn.rung)}"
-        right.plot(*values, ".", color=colour, alpha=0.6, label=label)
-    paper = TABLE_8["balanced"]
-    right.plot(paper.mean_arcsec, paper.std_arcsec, "x", color=BLACK, markersize=9,
-               label="balanced, the paper")  # fmt: skip
-    _labels(right)
-    return figure
-
-
-def curves(profiled: Sequence[Profiled]) -> Figure:
-    """Draw the profile of every parameter of every posterior."""
-    names = list(profiled[0].curves)
-    figure, axes = grid(-(-len(names) // 3), 3, width=3.6, height=2.4)
-    for axis, name in zip(axes.flat, names, strict=False):
-        for profile, colour in zip(profiled, COLOURS, strict=False):
-            values, deviance = profile.curves[name].T
-            shown = np.exp(values) if name in LOGARITHMIC else values
-            axis.plot(shown, deviance - deviance.min(), "o-", color=colour, markersize=3,
-                      label=title(profile.target, profile.rung))  # fmt: skip
-        axis.axhline(BOUND, color=GREY, linewidth=1)
-        axis.set_ylim(-0.5, 12.0)
-        axis.set_xlabel(name.replace("_", " "))
-    axes.flat[0].set_ylabel("deviance above the least")
-    # No panel has room for it.
-    handles, labels = axes.flat[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper left", frameon=False, fontsize=8, ncols=2)
+    axis.set_xlabel("mean [arcsec]")
+    axis.set_ylabel("standard deviation [arcsec]")
+    axis.legend(frameon=False, fontsize=7)
     return figure
 
 
@@ -125,21 +77,13 @@ def _front(named: Named) -> np.ndarray:
     return rising[np.concatenate([[True], rising[1:, 1] < lowest[:-1]])]
 
 
-def _labels(axis: Axes) -> None:
-    axis.set_xlabel("mean [arcsec]")
-    axis.set_ylabel("standard deviation [arcsec]")
-    axis.legend(frameon=False, fontsize=7)
-
-
 NAME = "inference"
-FITS, DRAWN, PROFILED = (f"{NAME}{part}.csv" for part in ("", "_posterior", "_profiles"))
+FITS = f"{NAME}.csv"
 SEED = 1
 LARGE, FRONT, MIDDLE, SMALL = Effort(64), Effort(32), Effort(24), Effort(9)
 """Of the models with all effects: theta_s as semi-amplitude, the same with the front as a target,
 and theta_s as peak-to-peak; of all other models, which are special cases of these or one closure
 more."""
-STEPS = 2000
-"""Of each walker of a posterior."""
 FULL = {bands: Rung(Candidate(EFFECTS, "semi_amplitude", bands)) for bands in (NARROW, WIDE)}
 """The rung of ``calibrated``, under either reading of the bands."""
 
@@ -162,10 +106,10 @@ WORDS = (
 
 def run(context: Context) -> Result:
     """Search or read what was found, and say what it means."""
-    fits, draws, profiled = _campaign(context) if context.full else _stored()
+    fits = _campaign(context) if context.full else read_fits(committed_file(FITS, NAME))
     shown = chosen_fits(fits)
     return Result(
-        title="Which model gives the published trade-off, and what is known of its parameters",
+        title="Which model gives the published trade-off",
         command=context.command(NAME),
         answer=opening(fits),
         paragraphs=(*stored_outcome(context, NAME), SETTING, NOISE, DEPTH, WORDS),
@@ -174,25 +118,14 @@ def run(context: Context) -> Result:
             noise_table(fits),
             ladder_table(fits),
             held_out_table([*shown, *noisy_fits(fits)]),
-            optimum_table(draws),
-            parameter_table(fits, draws, profiled),
-            identity_table(fits, draws),
         ),
         pictures=(
             Picture(
                 "objectives",
-                "Left: the three published optima (crosses), where models put the same designs "
-                "(dots), and their fronts (lines). Right: the balanced optimum that draws of the "
-                "posteriors would have one choose.",
-                objectives(shown, draws),
+                "The three published optima (crosses), where models put the same designs (dots), "
+                "and their fronts (lines).",
+                objectives(shown),
                 leading=True,
-            ),
-            Picture(
-                "profiles",
-                "Least deviance over each parameter, all others being fitted, above that of the "
-                "best place; the line at 3.84 bounds a 95 % interval. Points that few steps did "
-                "not bring down bound the profile from above.",
-                curves(profiled),
             ),
         ),
         first_page={OF_MODELS: of_the_first_page(fits)},
@@ -232,13 +165,7 @@ def noisy_effort(rung: Rung) -> Effort:
     return MIDDLE if set(rung.candidate.effects) == set(EFFECTS) else SMALL
 
 
-def _stored() -> tuple[list[Fit], list[Draws], list[Profiled]]:
-    files = [committed_file(name, NAME) for name in (FITS, DRAWN, PROFILED)]
-    return read_fits(files[0]), read_draws(files[1]), read_profiles(files[2])
-
-
-def _campaign(context: Context) -> tuple[list[Fit], list[Draws], list[Profiled]]:
-    require("emcee", "posterior")
+def _campaign(context: Context) -> list[Fit]:
     jobs = searches()
     runs = context.campaign.run(jobs, "searches")
     best = {
@@ -247,16 +174,6 @@ def _campaign(context: Context) -> tuple[list[Fit], list[Draws], list[Profiled]]
     }
     noisy = noisy_searches(best)
     jobs, runs = [*jobs, *noisy], [*runs, *context.campaign.run(noisy, "with node noise")]
-    wanted = [("independent", FULL[NARROW]), ("common", FULL[WIDE])]
-    posteriors = [Posterior(rung, target, best[target, rung], SEED, STEPS)
-                  for target, rung in wanted]  # fmt: skip
-    profiles = [Profile(rung, target, best[target, rung]) for target, rung in wanted]
-    texts = {
-        FITS: format_fits(fits_of(jobs, runs)),
-        DRAWN: format_draws(posteriors, context.campaign.run(posteriors, "posteriors")),
-        PROFILED: format_profiles(profiles, context.campaign.run(profiles, "profiles")),
-    }
-    folder = context.out / NAME
-    for name, text in texts.items():
-        write_atomically(folder / name, text.encode())
-    return read_fits(folder / FITS), read_draws(folder / DRAWN), read_profiles(folder / PROFILED)
+    path = context.out / NAME / FITS
+    write_atomically(path, format_fits(fits_of(jobs, runs)).encode())
+    return read_fits(path)

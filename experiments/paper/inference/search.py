@@ -122,36 +122,23 @@ def _followed(
 
 
 def refine(
-    residuals: Residuals,
-    rung: Rung,
-    start: NDArray[np.float64],
-    steps: int,
-    fixed: int | None = None,
+    residuals: Residuals, rung: Rung, start: NDArray[np.float64], steps: int
 ) -> tuple[float, NDArray[np.float64]]:
     """Return the sum of squares and the place of the local optimum near ``start``.
 
-    Angles may leave their range by a turn. ``fixed`` is the place of a parameter that is held.
+    Angles may leave their range by a turn.
     """
     low, high = rung.limits
     width = high - low
     turning = np.isin(list(rung.bounds), PERIODIC)
     low, high = np.where(turning, low - width, low), np.where(turning, high + width, high)
-    free = np.arange(len(low)) != (-1 if fixed is None else fixed)
-    held = np.array(start, dtype=float)
-
-    def of_free(values: NDArray[np.float64]) -> NDArray[np.float64]:
-        held[free] = values
-        return residuals(held)
-
     inside = np.clip(start, low + 1e-9 * width, high - 1e-9 * width)
     solution = least_squares(
-        of_free,
-        inside[free],
-        bounds=(low[free], high[free]),
-        x_scale=width[free],
-        diff_step=STEP * width[free] / np.maximum(np.abs(inside[free]), 1e-3 * width[free]),
+        residuals,
+        inside,
+        bounds=(low, high),
+        x_scale=width,
+        diff_step=STEP * width / np.maximum(np.abs(inside), 1e-3 * width),
         max_nfev=steps,
     )
-    place = held.copy()
-    place[free] = solution.x
-    return 2.0 * float(solution.cost), place
+    return 2.0 * float(solution.cost), np.asarray(solution.x)

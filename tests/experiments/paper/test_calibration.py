@@ -139,7 +139,7 @@ def test_a_local_fit_recovers_the_model_that_made_the_numbers():
 
 @pytest.mark.nightly
 def test_a_local_fit_with_all_nine_parameters_off_recovers_what_made_the_numbers():
-    """As far as nine numbers tell: `test_inference_posterior` says which directions they do not."""
+    """As far as nine numbers tell: `test_inference_search` says which directions they do not."""
     truth = KNOWN[5]
     targets = predict(FULL_LADDER.model(truth), NARROW, FITS["table8"])
     residuals = _residuals(FULL_LADDER, "table8", targets)

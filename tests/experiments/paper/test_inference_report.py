@@ -1,23 +1,14 @@
 """The stored outcome of the searches, and the report that is made of it."""
 
-import numpy as np
 import pytest
 
 from experiments.paper.calibrating.ladder import WIDE, Candidate
-from experiments.paper.inference import experiment, posterior
-from experiments.paper.inference.data import (
-    fits_of,
-    format_fits,
-    read_draws,
-    read_fits,
-    read_profiles,
-)
+from experiments.paper.inference import experiment
+from experiments.paper.inference.data import fits_of, format_fits, read_fits
 from experiments.paper.inference.experiment import (
-    DRAWN,
     FITS,
     FULL,
     NAME,
-    PROFILED,
     SEED,
     SMALL,
     noisy_searches,
@@ -119,18 +110,6 @@ def test_the_report_says_what_the_fits_say(tmp_path, fits):
     assert heights[0] == 0.0
 
 
-def test_draws_and_profiles_belong_to_the_fits(fits):
-    draws = read_draws(committed_file(DRAWN, NAME))
-    profiled = read_profiles(committed_file(PROFILED, NAME))
-    assert [(one.target, one.rung) for one in draws] == [(one.target, one.rung) for one in profiled]
-    for drawn, curves in zip(draws, profiled, strict=True):
-        (best,) = (one for one in fits if (one.target, one.rung) == (drawn.target, drawn.rung))
-        assert drawn.deviance.min() > best.deviance - 5.0
-        for name, curve in curves.curves.items():
-            assert np.all(np.diff(curve[:, 0]) > 0.0), name
-            assert np.abs(curve[:, 1] - best.deviance).min() < 0.1
-
-
 def test_fits_survive_their_csv(tmp_path):
     rung = FULL["R1"]
     job = Search(rung, "common", 5, Effort(1, (1, 1, 1)))
@@ -144,7 +123,6 @@ def test_fits_survive_their_csv(tmp_path):
 
 @pytest.mark.nightly
 def test_the_full_campaign_leaves_what_the_report_reads(tmp_path, monkeypatch):
-    pytest.importorskip("emcee")
     tiny = Effort(1, (1, 1, 1))
     for name in ("LARGE", "FRONT", "MIDDLE", "SMALL"):
         monkeypatch.setattr(experiment, name, tiny)
@@ -152,9 +130,6 @@ def test_the_full_campaign_leaves_what_the_report_reads(tmp_path, monkeypatch):
     plain = Rung(Candidate((), "semi_amplitude", WIDE), RIGID)
     monkeypatch.setattr(experiment, "all_rungs", lambda: [*FULL.values(), *closed, plain])
     monkeypatch.setattr(experiment, "noisy_rungs", lambda: [plain])
-    monkeypatch.setattr(experiment, "STEPS", 2)
-    monkeypatch.setattr(posterior, "DRAWS", 4)
-    monkeypatch.setattr(posterior, "PROFILE_STEPS", 1)
     context = Context(1, tmp_path, Campaign(tmp_path), full=True)
     first = experiment.run(context)
     assert len(read_fits(tmp_path / NAME / FITS)) == len(searches()) + 1
