@@ -141,11 +141,12 @@ class BalanceErrors:
         """Yield what dry friction may do where a port turns, starts or stops.
 
         The motion is smoothed over a period of the cutoff, in which it may turn at any moment, or
-        rest for a while. What smoothing does to a kink of the motion is the same at every turn; by
-        what it is not, turns add to the noise.
+        rest for a while. What smoothing does to a kink of the motion is the same at every turn, and
+        at every stop or start; by what it is not, turns add to the noise.
         """
         for effect in fitted.effects:
-            if not effect.law.breakaway or not (columns := self._turns(effect.port)).any():
+            columns = self._turns(effect.port)
+            if not effect.law.breakaway or not columns.size:
                 continue
             none = np.zeros(columns.shape[1])
             yield Sized(
@@ -160,24 +161,26 @@ class BalanceErrors:
         """Return whitened balances of a unit force around the turns of a port: see `_of_turn`."""
         if port not in self._of_turns:
             signals = [self._pulses(balance, port) for balance in self.data.spectra]
-            self._of_turns[port] = np.column_stack(
+            columns = np.column_stack(
                 [self._whitened(port, pulses) for pulses in zip(*signals, strict=True)]
             )
+            self._of_turns[port] = columns[:, columns.any(axis=0)]
         return self._of_turns[port]
 
     @staticmethod
     def _pulses(balance: ForceBalance, port: str) -> Matrix:
-        """Return the force around all turns of a port, (2 _OF_TURN, n)."""
+        """Return the force around rests and around turns of a port, (4 _OF_TURN, n)."""
         speed, step = balance.ports[port].speed, float(balance.time[1] - balance.time[0])
         half = 0.5 / (balance.cutoff * step)
         still = speed_noise(balance.mechanism.port(port), balance.record, balance.cutoff)
-        pulses = np.zeros((2 * _OF_TURN, len(speed)))
-        for turn, after in _turns_of(speed, STILL * still, half):
-            if balance.moving.weight[int(turn)]:
+        pulses = np.zeros((2, 2 * _OF_TURN, len(speed)))
+        places = np.arange(len(speed), dtype=np.float64)
+        for turn, *signs in _turns_of(speed, STILL * still, half):
+            if balance.moving.weight[round(turn)]:
                 near = slice(max(int(turn - half), 0), int(turn + half) + 2)
-                place = (np.arange(len(speed), dtype=np.float64)[near] - turn) / half
-                pulses[:, near] += after * np.array(list(_of_turn(place)))
-        return pulses
+                of_turn = _of_turn((places[near] - turn) / half, *signs)
+                pulses[int(signs[0] * signs[1] < 0.0), :, near] += np.array(list(of_turn))
+        return pulses.reshape(-1, len(speed))
 
     def _whitened(self, port: str, signals: Sequence[Matrix]) -> Matrix:
         """Return whitened balances, (n,), of a force at a port in each record."""
@@ -232,33 +235,41 @@ class BalanceErrors:
                 )
 
 
-def _of_turn(place: Matrix) -> Iterator[Matrix]:
+def _of_turn(place: Matrix, before: float, after: float) -> Iterator[Matrix]:
     """Yield by what dry friction of 1 may differ from what the sign of a smoothed speed says.
 
     If the port turns at any moment up to a unit of ``place`` (n,) before or after, the force has
-    the other sign up to then. The covariance of this at s and t is 2 (1 - max(s, t)) on each side,
-    that of Brownian motion from its end, whose Karhunen-Loeve functions are cosines. A rest is a
-    mean of such turns.
+    the other sign than that ``before`` or ``after`` up to then. The covariance of this at s and t
+    is 2 (1 - max(s, t)) on each side, that of Brownian motion from its end, whose Karhunen-Loeve
+    functions are cosines. A rest is a mean of such turns.
     """
     for number in range(_OF_TURN):
         rate = np.pi * (number + 0.5)
         pulse = 2.0 * np.cos(rate * place) / rate
-        for side in (place < 0.0, place >= 0.0):
-            yield pulse * (side & (np.abs(place) < 1.0))
+        for sign, side in ((before, place < 0.0), (after, place >= 0.0)):
+            yield -sign * pulse * (side & (np.abs(place) < 1.0))
 
 
-def _turns_of(speed: Matrix, still: float, apart: float) -> list[tuple[float, float]]:
+def _turns_of(speed: Matrix, still: float, apart: float) -> list[tuple[float, float, float]]:
     """Return the rows, perhaps between two, at which a motion turns, stops or starts.
 
-    Each with the sign of the speed after it. Where a motion is ``still`` for long, it may do so
-    anywhere: at rows that are about so far ``apart``.
+    Each with the signs of the speed before and after it; 0 where that is not known. Where a motion
+    is ``still`` for long, it may do so anywhere: at rows that are about so far ``apart``. It does
+    at the ends of a record as well where it is within so many rows of a rest.
     """
-    turns, moving = list[tuple[float, float]](), np.flatnonzero(np.abs(speed) >= still)
+    turns, moving = list[tuple[float, float, float]](), np.flatnonzero(np.abs(speed) >= still)
+    sign = np.sign(speed)
     for before, after in pairwise(moving.tolist()):
         if after - before > apart or speed[before] * speed[after] < 0.0:
             count = 1 + int((after - before) / apart)
             places = before + (after - before) * (np.arange(count) + 0.5) / count
-            turns += [(place, float(np.sign(speed[after]))) for place in places.tolist()]
+            turns += [(place, sign[before], sign[after]) for place in places.tolist()]
+    last = len(speed) - 1
+    near = min(int(apart), last)
+    if abs(speed[0]) < abs(speed[near] - speed[0]):
+        turns.append((0.0, 0.0, sign[near]))
+    if abs(speed[last]) < abs(speed[last - near] - speed[last]):
+        turns.append((float(last), sign[last - near], 0.0))
     return turns
 
 
