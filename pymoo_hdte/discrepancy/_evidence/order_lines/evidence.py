@@ -18,7 +18,7 @@ from pymoo_hdte.discrepancy._evidence.order_lines.observations import (
     cell_degrees_of_freedom,
 )
 from pymoo_hdte.discrepancy._evidence.order_lines.parameters import base_parameters
-from pymoo_hdte.discrepancy._evidence.order_lines.prediction import with_readings
+from pymoo_hdte.discrepancy._evidence.order_lines.prediction import coefficients_of, with_readings
 from pymoo_hdte.discrepancy._evidence.order_lines.steady_states import SCREENING
 from pymoo_hdte.discrepancy._evidence.order_lines.torsion_curve import torsion_points
 from pymoo_hdte.discrepancy._records.campaign import Campaign
@@ -27,7 +27,9 @@ from pymoo_hdte.discrepancy._selection.candidate import Candidate, Layout
 from pymoo_hdte.discrepancy._selection.excess import Excess
 from pymoo_hdte.discrepancy._selection.fitting import Fit, Response
 from pymoo_hdte.discrepancy._selection.rules import RULES, Rules
-from pymoo_hdte.drive import DriveEffect
+from pymoo_hdte.drive import DriveEffect, SteadyMotion
+from pymoo_hdte.drive._solve.free_angle import torus_of
+from pymoo_hdte.drive._solve.torus import Torus
 from pymoo_hdte.effects.unknowns import Parameter
 
 Vector = NDArray[np.float64]
@@ -63,7 +65,9 @@ class Data(Observations):
     def response(self, fitted: Fit) -> Response:
         """Return how the whitened residuals of a fit respond to further effects."""
         base = fitted.values[None, : len(self.base)]
+        believed, values = self.campaign.believed, self._values_by_name(base)
         unchanged = self.prediction(base, fitted.effects)
+        here, on_torus = unchanged.balance, dict[Torus, SteadyMotion]()
         input_gain = 1.0 + float(base[0, Layout(self.base).index("input_torque_gain")])
         before = self.features.of_prediction(unchanged)
         before_torsion = self.torsion_residuals(base, fitted.effects)
@@ -74,12 +78,16 @@ class Data(Observations):
             if all(effect.only_reads for effect in added):
                 moved = with_readings(
                     unchanged, added, self.features.conditions,
-                    self.features.orders.tolist(), self.campaign.believed.ratio, input_gain,
+                    self.features.orders.tolist(), believed.ratio, input_gain,
                 )  # fmt: skip
             else:
-                moved = self.prediction(base, effects, unchanged.balance, SCREENING)
+                torus = torus_of(coefficients_of(believed, values, effects, 1))
+                moved = self.prediction(base, effects, on_torus.get(torus, here), SCREENING)
+                # Linear systems of many harmonics take longer than all else.
+                if moved.balance.torus is not here.torus and moved.balance.converged.all():
+                    on_torus.setdefault(torus, moved.balance)
             # A record without a steady state says nothing about the effect.
-            steady = (moved.balance.converged & unchanged.balance.converged)[:, None]
+            steady = (moved.balance.converged & here.converged)[:, None]
             changed = self.features.of_prediction(moved) - before
             running = self.whiten(np.where(steady, changed, 0.0))[0]
             torsion = self.torsion_residuals(base, effects) - before_torsion
