@@ -9,8 +9,8 @@ nothing is compared but probabilities.
 
 from __future__ import annotations
 
-from collections import Counter, defaultdict
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import combinations
 from typing import Protocol
@@ -53,8 +53,8 @@ effects may be missing of which each alone explains less than a third one."""
 WIDTH = 8
 """Most extensions of a set that are fitted, the likeliest to first order."""
 TRUSTED = 3.0
-"""Factor by which an effect may remove more than it does to first order, as springs that slip do on
-logs: a width of the search."""
+"""Factor by which an effect may gain more than it does to first order, as springs that slip do on
+logs: a width of the search. What is linear gains no more."""
 OF_ONE_NAME = 2
 """Most of them that have one name."""
 FEWEST = 4
@@ -161,7 +161,8 @@ class Growth:
     _complete: set[frozenset[str]] = field(default_factory=set)
     _signatures: dict[str, Screened] = field(default_factory=dict)
     _outside: dict[Weighed, Weighed] = field(default_factory=dict)
-    _pruned: defaultdict[frozenset[str], set[Fit]] = field(default_factory=lambda: defaultdict(set))
+    _varied: set[frozenset[str]] = field(default_factory=set)
+    _tried: set[tuple[frozenset[str], bytes]] = field(default_factory=set)
 
     def __post_init__(self) -> None:
         self.counts = Counter(candidate.name for candidate in self.candidates)
@@ -172,38 +173,38 @@ class Growth:
         """All sets that were weighed, the likeliest first."""
         return sorted(self._known.values(), key=lambda weighed: -weighed.weight)
 
-    def begin(self) -> Fit:
-        """Weigh nothing and single effects, and return the fit of the likeliest one."""
-        self._weigh(self.base)
-        self._extend(self.ranked[-1])
-        return self.ranked[0].fit
-
-    def grow(self) -> Fit:
+    def grow(self) -> None:
         """Extend, exchange and prune sets until none could become as likely as the best."""
-        if not self._known:
-            self._weigh(self.base)
-        self._settle()
+        for _ in self.steps():
+            pass
+
+    def steps(self) -> Iterator[Fit]:
+        """Grow, and yield the fit of the likeliest set whenever another one is."""
+        self._weigh(self.base)
+        yield from self._settled()
         for _ in range(MOST_FIRSTS):
             further = [weighed for weighed in self.ranked if self._may_be_extended(weighed)]
             if not further or not self._lacks_something(self.ranked[0]):
                 break
             self._extend(further[0])
-            self._settle()
-        return self.ranked[0].fit
+            yield from self._settled()
 
-    def _settle(self) -> None:
-        """Extend the likeliest sets, and exchange members of the best one, until it stays best."""
-        varied = frozenset[str]()
+    def _settled(self) -> Iterator[Fit]:
+        """Extend the likeliest sets, and exchange members of the best one, until it stays best.
+
+        Members are exchanged first: beside a wrong form of a law all else seems to be missing.
+        """
         while True:
-            while (weighed := self._open()) is not None:
-                self._extend(weighed)
-            best = self.ranked[0]
-            if (label := label_of(best.candidates)) == varied:
+            weighed, best = self._open(), self.ranked[0]
+            if (label := label_of(best.candidates)) not in self._varied:
+                self._varied.add(label)
+                yield best.fit
+                for member in best.candidates:
+                    self._exchange(best, member)
+            elif weighed is None:
                 return
-            varied = label
-            for member in best.candidates:
-                if (without := self._without(best, member)) is not None:
-                    self._exchange(without, member)
+            else:
+                self._extend(weighed)
 
     def _lacks_something(self, weighed: Weighed) -> bool:
         """Tell whether it is not sure that a set leaves nothing to something outside."""
@@ -268,16 +269,30 @@ class Growth:
         for member in weighed.candidates if len(weighed.candidates) > 1 else ():
             self._without(weighed, member)
 
-    def _exchange(self, without: Weighed, member: Candidate) -> None:
+    def _exchange(self, weighed: Weighed, member: Candidate) -> None:
         """Fit what a set may have in place of a member: other forms of it, and other effects."""
+        others, values = _others(weighed.fit, member)
         for candidate in self.candidates:
             if candidate.is_form_of(member) or candidate.replaces(member):
-                for start in candidate.starts:
-                    values = np.append(without.fit.values, start)
-                    self._fit((*without.candidates, candidate), values, again=True)
-        far = without.fit.chi_square > self._hopeless and _size(without.candidates) > 1
-        if self._may_be_extended(without) and not far:
+                members = (*others, candidate)
+                if not _may_be_together(members) or self._was_worse(weighed, member, candidate):
+                    continue
+                residuals = self.data.objective(members).residuals
+                starts = [np.append(values, start) for start in candidate.starts]
+                self._fit(members, min(starts, key=lambda s: np.sum(residuals(s) ** 2)), again=True)
+        without = self._without(weighed, member)
+        if without is not None and self._may_be_extended(without):
             self._extend(without)
+
+    def _was_worse(self, weighed: Weighed, member: Candidate, candidate: Candidate) -> bool:
+        """Tell whether a candidate in place of a member was far worse beside some of the others."""
+        whole, old, new = label_of(weighed.candidates), label_of([member]), label_of([candidate])
+        behind = [
+            known.weight - self._known[(label - old) | new].weight
+            for label, known in self._known.items()
+            if old <= label < whole and (label - old) | new in self._known
+        ]
+        return len(behind) > 0 and not self._near(weighed.weight - min(behind) / TRUSTED)
 
     def _extend(self, weighed: Weighed) -> None:
         """Fit a set with each effect that could make it likelier."""
@@ -305,7 +320,7 @@ class Growth:
             candidates = [
                 effect.candidate
                 for effect, gain in zip(before, hopeful, strict=True)
-                if gain >= -WINDOW
+                if gain >= -WINDOW and self._may_reach(weighed.weight, effect, gain)
             ] + [c for c in candidates if c.label not in self._signatures]
         if not candidates:
             return
@@ -321,10 +336,8 @@ class Growth:
                 break
             if taken[effect.candidate.name] == OF_ONE_NAME:
                 continue
-            prior = self._prior((effect.candidate,))
-            most = TRUSTED * max(gains[place] - prior, 0.0) + prior
             tried = bool(members) or taken.total() >= FEWEST
-            if tried and weighed.weight + most < self.ranked[0].weight - WINDOW:
+            if tried and not self._may_reach(weighed.weight, effect, gains[place]):
                 break
             taken[effect.candidate.name] += 1
             self._fit((*members, effect.candidate), np.append(weighed.fit.values, effect.start))
@@ -335,13 +348,29 @@ class Growth:
         already = {candidate.releases for candidate in members} - {None}
         bounded = self.data.out_of_tolerance(weighed.fit.at_bounds, together=bool(already))
         for candidate in bounded:
-            if candidate.releases not in already:
+            if candidate.releases not in already and self._may_release(weighed, [candidate]):
                 self._fit((*members, candidate), weighed.fit.values)
         together = self.data.out_of_tolerance(weighed.fit.at_bounds, True)
-        hopeful = len(together) > 1 and not already
-        if hopeful and gain_of_released(weighed.fit, together) > VISIBLE:
+        if len(together) > 1 and not already and self._may_release(weighed, together):
             released, fitted = released_together(self.data, weighed.fit)
             self._fit((*members, *released), fitted.values)
+
+    def _may_release(self, weighed: Weighed, released: Sequence[Candidate]) -> bool:
+        """Tell whether a set may be seen to come near the likeliest one by released values."""
+        removed = gain_of_released(weighed.fit, released)
+        # A residual beyond the noise counts as noise, as in the covariance of a fit.
+        gain = 0.5 * removed / weighed.fit.misfit
+        return removed > VISIBLE and self._near(weighed.weight + TRUSTED * gain)
+
+    def _near(self, weight: float) -> bool:
+        """Tell whether a set of a weight is within the window of the likeliest one."""
+        return weight >= self.ranked[0].weight - WINDOW
+
+    def _may_reach(self, weight: float, effect: Screened, gain: float) -> bool:
+        """Tell whether a set of a weight may come near the likeliest one by an effect's gain."""
+        prior = self._prior((effect.candidate,))
+        trusted = 1.0 if effect.candidate.linear else TRUSTED
+        return self._near(weight + trusted * max(gain - prior, 0.0) + prior)
 
     def _gains(self, integral: Integral, screened: Sequence[Screened], n: int) -> Vector:
         """Return by how much each effect could raise the probability of a set to first order."""
@@ -357,19 +386,34 @@ class Growth:
         return gains + np.array(priors)
 
     def _without(self, weighed: Weighed, member: Candidate) -> Weighed | None:
-        """Return a set without a member; None if that is not to be seen."""
-        members = tuple(candidate for candidate in weighed.candidates if candidate is not member)
-        label = label_of(members)
-        if weighed.fit not in self._pruned[label] and label not in self._invisible:
-            # An earlier fit of these may have ended at a worse minimum, or before it was there.
-            self._pruned[label].add(weighed.fit)
-            values = [weighed.fit.values[: weighed.fit.n_base]]
-            values += [
-                weighed.fit.values[place]
-                for candidate, place in weighed.fit.places
-                if candidate is not member
+        """Return a set without a member; None if that is not to be seen, or far from all others.
+
+        It is fitted if it could be likelier than a known fit of it, which may have ended at a worse
+        minimum, or near the likeliest set: alone, or with an effect in place of the member.
+        """
+        others, values = _others(weighed.fit, member)
+        label, effects = label_of(others), [effect for effect, _ in weighed.fit.places]
+        if label in self._invisible:
+            return None
+        if member.releases is not None or not self._signatures:
+            self._trial(others, values)
+            return self._known.get(label)
+        linearised = weighed.linearised.without(effects.index(member))
+        integral = Integral(linearised)
+        weight, known = integral.score().ln + self._prior(others), self._known.get(label)
+        if known is not None and known.weight >= weight:
+            return known
+        if known is None and not self._near(weighed.weight - (weighed.weight - weight) / TRUSTED):
+            further = [
+                effect
+                for effect in self._signatures.values()
+                if effect.candidate.name != member.name
+                and all(effect.candidate.goes_with(other) for other in others)
             ]
-            self._trial(members, np.concatenate(values))
+            gains = self._gains(integral, further, len(linearised.residuals)).tolist()
+            if not any(map(self._may_reach, [weight] * len(further), further, gains)):
+                return None
+        self._trial(others, values)
         return self._known.get(label)
 
     def _fit(self, members: Sequence[Candidate], start: Vector, again: bool = False) -> None:
@@ -391,9 +435,14 @@ class Growth:
         return HOPELESS * self.ranked[0].fit.chi_square
 
     def _trial(self, members: Sequence[Candidate], start: Vector) -> None:
-        """Fit a set just enough to rank it, and weigh it."""
+        """Fit a set just enough to rank it, and weigh it, unless it was from there."""
+        label = label_of(members)
+        if (trial := (label, start.tobytes())) in self._tried:
+            return
+        self._tried.add(trial)
         settled, hopeless = self.data.rules.trial_gain, self._hopeless
-        self._weigh(fit(self.data, members, start, settled=settled, hopeless=hopeless))
+        same = [weighed.fit for weighed in self._known.values() if weighed.candidates == members]
+        self._weigh(fit(self.data, members, start, settled=settled, hopeless=hopeless, known=same))
 
     def _weigh(self, fitted: Fit) -> None:
         """Keep a fit with its probability, unless one of its effects would be invisible."""
@@ -438,6 +487,14 @@ class Growth:
     def _as_hypothesis(self, fitted: Fit) -> Hypothesis:
         excess = max(self.base.chi_square - len(self.base.residuals), 1.0)
         return hypothesis_of(fitted, excess)
+
+
+def _others(fitted: Fit, member: Candidate) -> tuple[tuple[Candidate, ...], Vector]:
+    """Return the effects of a fit without a member, and the values of base and these."""
+    values = [fitted.values[: fitted.n_base]]
+    values += [fitted.values[place] for other, place in fitted.places if other is not member]
+    others = tuple(candidate for candidate in fitted.candidates if candidate is not member)
+    return others, np.concatenate(values)
 
 
 def _may_be_together(members: Sequence[Candidate]) -> bool:

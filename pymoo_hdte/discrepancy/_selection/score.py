@@ -21,6 +21,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -106,6 +107,13 @@ alone then makes none as likely as 1 in 20 in 95 % of campaigns; with two standa
 would in half of them. What is smaller is nothing, as far as the data can tell."""
 
 
+class Member(NamedTuple):
+    """Places of what belongs to an effect among the free unknowns and the quantities of a size."""
+
+    free: slice
+    sized: slice
+
+
 @dataclass(frozen=True, eq=False)
 class Linearised:
     """A hypothesis linearised at its fit.
@@ -126,6 +134,8 @@ class Linearised:
     least_noise : ndarray, shape (n_channels,), optional
         Least factor of the noise of each channel, that of its sensors alone. Else what cancels the
         data, with all that is known of them, leaves none.
+    members : tuple of Member
+        What belongs to each effect of the hypothesis.
     """
 
     residuals: Vector
@@ -135,6 +145,19 @@ class Linearised:
     noise: float = float(np.log(2.0))
     shares: Vector | None = None
     least_noise: Vector | None = None
+    members: tuple[Member, ...] = ()
+
+    def without(self, number: int) -> Linearised:
+        """Return it without one of its effects, to first order."""
+        member, free, residuals = self.members[number], self.free, self.residuals
+        for part in self.sized[member.sized]:
+            residuals = residuals - part.columns @ part.at
+        values = {
+            name: np.delete(getattr(free, name), member.free, axis=-1)
+            for name in ("columns", "lower", "upper", "shoulder", "mean", "deviation")
+        }
+        sized = (*self.sized[: member.sized.start], *self.sized[member.sized.stop :])
+        return replace(self, residuals=residuals, free=Free(**values), sized=sized, members=())
 
     def beside(self, *sized: Sized) -> Linearised:
         """Return it with further quantities of unknown size."""

@@ -95,15 +95,15 @@ def _grown(data: Data, base: Fit, candidates: Sequence[Candidate]) -> tuple[Data
     An effect that moves a resonance changes what an error that does not repeat brings to each
     channel. Where the likeliest set does so, the sets are compared anew.
     """
-    for _ in range(MOST_RENEWED):
-        growth = Growth(data, base, candidates, LawErrors(data, base))
-        renewed = data.with_noise_of(growth.begin()) or data.with_noise_of(growth.grow())
+    for renewals in range(MOST_RENEWED + 1):
+        growth, renewed = Growth(data, base, candidates, LawErrors(data, base)), None
+        for likeliest in growth.steps():
+            renewed = data.with_noise_of(likeliest) if renewals < MOST_RENEWED else None
+            if renewed is not None:
+                break
         if renewed is None:
             break
         data, base = renewed, fit(renewed, start=base.values)
-    else:
-        growth = Growth(data, base, candidates, LawErrors(data, base))
-        growth.grow()
     return data, growth
 
 
