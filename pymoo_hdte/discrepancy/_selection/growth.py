@@ -28,6 +28,7 @@ from pymoo_hdte.discrepancy._selection.decision import (
 )
 from pymoo_hdte.discrepancy._selection.fitting import Evidence, Fit, fit
 from pymoo_hdte.discrepancy._selection.hypothesis import Hypothesis, hypothesis_of, label_of
+from pymoo_hdte.discrepancy._selection.levenberg_marquardt import SETTLED_SHARE
 from pymoo_hdte.discrepancy._selection.released import gain_of_released, released_together
 from pymoo_hdte.discrepancy._selection.score import (
     VISIBLE,
@@ -173,14 +174,28 @@ class Growth:
         """All sets that were weighed, the likeliest first."""
         return sorted(self._known.values(), key=lambda weighed: -weighed.weight)
 
+    @property
+    def likeliest(self) -> list[Fit]:
+        """Fits of the likeliest sets, which further sets may come from."""
+        return [weighed.fit for weighed in self.ranked[:MOST_FIRSTS]]
+
     def grow(self) -> None:
         """Extend, exchange and prune sets until none could become as likely as the best."""
         for _ in self.steps():
             pass
 
-    def steps(self) -> Iterator[Fit]:
-        """Grow, and yield the fit of the likeliest set whenever another one is."""
+    def steps(self, likely: Sequence[Fit] = ()) -> Iterator[Fit]:
+        """Grow, and yield the fit of the likeliest set whenever another one is.
+
+        Parameters
+        ----------
+        likely : sequence of Fit
+            Sets that were the `likeliest` with another noise.
+        """
         self._weigh(self.base)
+        for fitted in likely:
+            self._fit(fitted.candidates, fitted.values)
+        self._extend(self._known[frozenset()])
         yield from self._settled()
         for _ in range(MOST_FIRSTS):
             further = [weighed for weighed in self.ranked if self._may_be_extended(weighed)]
@@ -198,9 +213,10 @@ class Growth:
             weighed, best = self._open(), self.ranked[0]
             if (label := label_of(best.candidates)) not in self._varied:
                 self._varied.add(label)
-                yield best.fit
                 for member in best.candidates:
                     self._exchange(best, member)
+                if label_of((likeliest := self.ranked[0]).candidates) == label:
+                    yield likeliest.fit
             elif weighed is None:
                 return
             else:
@@ -419,7 +435,7 @@ class Growth:
     def _fit(self, members: Sequence[Candidate], start: Vector, again: bool = False) -> None:
         """Fit a set just enough to rank it, and weigh it, unless it is known.
 
-        A known set is fitted ``again`` from another start.
+        A known set is fitted ``again`` from another start, and to the end.
         """
         label = label_of(members)
         known = label in self._known or label in self._invisible
@@ -427,22 +443,20 @@ class Growth:
             return
         if _size(members) > MOST_MEMBERS:
             return
-        self._trial(members, start)
+        self._trial(members, start, again)
 
     @property
     def _hopeless(self) -> float:
         """Chi-square with which a set is nowhere near the likeliest one."""
         return HOPELESS * self.ranked[0].fit.chi_square
 
-    def _trial(self, members: Sequence[Candidate], start: Vector) -> None:
-        """Fit a set just enough to rank it, and weigh it, unless it was from there."""
-        label = label_of(members)
-        if (trial := (label, start.tobytes())) in self._tried:
+    def _trial(self, members: Sequence[Candidate], start: Vector, whole: bool = False) -> None:
+        """Weigh a set fitted just enough to rank it, or ``whole``, unless it was from there."""
+        if (trial := (label_of(members), start.tobytes())) in self._tried:
             return
         self._tried.add(trial)
-        settled, hopeless = self.data.rules.trial_gain, self._hopeless
-        same = [weighed.fit for weighed in self._known.values() if weighed.candidates == members]
-        self._weigh(fit(self.data, members, start, settled=settled, hopeless=hopeless, known=same))
+        settled = SETTLED_SHARE if whole else self.data.rules.trial_gain
+        self._weigh(fit(self.data, members, start, settled=settled, hopeless=self._hopeless))
 
     def _weigh(self, fitted: Fit) -> None:
         """Keep a fit with its probability, unless one of its effects would be invisible."""

@@ -19,7 +19,7 @@ from pymoo_hdte.discrepancy._evidence.order_lines.law_errors import LawErrors
 from pymoo_hdte.discrepancy._selection.candidate import Candidate, Layout
 from pymoo_hdte.discrepancy._selection.decided import verdict_of
 from pymoo_hdte.discrepancy._selection.fitting import Fit, fit
-from pymoo_hdte.discrepancy._selection.growth import Growth
+from pymoo_hdte.discrepancy._selection.growth import MOST_MEMBERS, Growth
 from pymoo_hdte.discrepancy._selection.rules import RULES, Rules
 from pymoo_hdte.discrepancy._selection.verdict import Verdict
 from pymoo_hdte.effects.effect import effect_named, known_effects
@@ -28,8 +28,9 @@ SUMMED = 8
 """Most lines whose sums and differences a steady motion is taken to have."""
 LEAKED = 0.01
 """Share of a record's strongest line, in power, up to which a line may be what that one leaks."""
-MOST_RENEWED = 2
-"""Times that the noise may be renewed; sets that take turns in being the likeliest end it."""
+MOST_RENEWED = MOST_MEMBERS + 1
+"""Times that the noise may be renewed: with each effect that is found, and once with another form.
+Sets that take turns in being the likeliest end it."""
 SAME_ORDER = 0.6
 """Cycles of an output turn up to which a line is of a steady order, which may lie between lines.
 
@@ -93,14 +94,17 @@ def _grown(data: Data, base: Fit, candidates: Sequence[Candidate]) -> tuple[Data
     """Return the sets of effects grown with the noise of the likeliest one, and the data with it.
 
     An effect that moves a resonance changes what an error that does not repeat brings to each
-    channel. Where the likeliest set does so, the sets are compared anew.
+    channel, and one that creeps leaves what fades. Where the likeliest set does so, the sets are
+    compared anew: without it, what creeps seemed to be further effects beside a hysteresis.
     """
+    likely: Sequence[Fit] = ()
     for renewals in range(MOST_RENEWED + 1):
         growth, renewed = Growth(data, base, candidates, LawErrors(data, base)), None
-        for likeliest in growth.steps():
-            renewed = data.with_noise_of(likeliest) if renewals < MOST_RENEWED else None
+        for fitted in growth.steps(likely):
+            renewed = data.with_noise_of(fitted) if renewals < MOST_RENEWED else None
             if renewed is not None:
                 break
+        likely = growth.likeliest
         if renewed is None:
             break
         data, base = renewed, fit(renewed, start=base.values)
