@@ -87,7 +87,7 @@ def measured(effects=(), rng=None, data=None, **changes):
     values = data.predict(truth[None], effects)[0]
     if rng is not None:
         noise = rng.standard_normal(values.shape)
-        # An error that does not repeat is a motion: what it brings to a channel is the true drive's.
+        # An error that does not repeat is a motion, and what a channel shows of it the drive's.
         true_noise = replace(data, reference=truth, reference_effects=tuple(effects)).whiteners
         values = values + np.einsum("rij,rj->ri", true_noise, noise)
     return replace(data, features=replace(data.features, values=values)), truth
