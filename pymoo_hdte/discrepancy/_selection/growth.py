@@ -53,9 +53,10 @@ MOST_FIRSTS = 4
 effects may be missing of which each alone explains less than a third one."""
 WIDTH = 8
 """Most extensions of a set that are fitted, the likeliest to first order."""
-TRUSTED = 3.0
-"""Factor by which an effect may gain more than it does to first order, as springs that slip do on
-logs: a width of the search. What is linear gains no more."""
+TRUSTED, OF_LINEAR = 3.0, 1.5
+"""Factors by which an effect may gain more than it does to first order, as springs that slip do on
+logs, and one in which residuals are linear, beside a misfit of a thousand times the noise: widths
+of the search."""
 OF_ONE_NAME = 2
 """Most of them that have one name."""
 FEWEST = 4
@@ -385,7 +386,7 @@ class Growth:
     def _may_reach(self, weight: float, effect: Screened, gain: float) -> bool:
         """Tell whether a set of a weight may come near the likeliest one by an effect's gain."""
         prior = self._prior((effect.candidate,))
-        trusted = 1.0 if effect.candidate.linear else TRUSTED
+        trusted = OF_LINEAR if effect.candidate.linear else TRUSTED
         return self._near(weight + trusted * max(gain - prior, 0.0) + prior)
 
     def _gains(self, integral: Integral, screened: Sequence[Screened], n: int) -> Vector:
