@@ -230,6 +230,7 @@ class Growth:
 
     def decide(self) -> tuple[Decision, list[Weighed]]:
         """Return what is said, and all sets with and without something outside of the library."""
+        self._prune_likeliest()
         lacking = [weighed for weighed in self.ranked if self._lacks_evident(weighed.candidates)]
         ranked = [weighed for weighed in self.ranked if weighed not in lacking] or lacking
         best = ranked[0]
@@ -251,6 +252,18 @@ class Growth:
         )
         explanations = [weighed.explanation for weighed in every]
         return decide(explanations, [weighed.prior for weighed in every]), every
+
+    def _prune_likeliest(self) -> None:
+        """Fit the likeliest set without each member if something else is missing beside it.
+
+        However far behind that is: the member may stand for a part of what is outside.
+        """
+        best = self.ranked[0]
+        if len(best.candidates) > 1 and self._lacks_something(best):
+            for member in best.candidates:
+                others, values = _others(best.fit, member)
+                if label_of(others) not in self._known:
+                    self._trial(others, values)
 
     def _open(self) -> Weighed | None:
         """Return the likeliest set that may be extended, fitted to the end."""
