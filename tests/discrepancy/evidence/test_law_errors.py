@@ -50,7 +50,9 @@ def test_a_motion_turns_stops_and_starts():
     assert turn == (9.5, 1.0, -1.0)
     assert rest == [(place, -1.0, 1.0) for place in (20.5, 23.5, 26.5, 29.5)]
     assert _turns_of(np.ones(10), 0.5, 4.0) == []
-    assert _turns_of(np.abs(np.linspace(-1.0, 1.0, 42)), 0.2, 4.0)[0][1:] == (1.0, 1.0)
+    slows = np.abs(np.linspace(-1.0, 1.0, 41))
+    # However shortly: noise of the speed hides whether it stops there.
+    assert _turns_of(slows, 0.02, 4.0) == [(20.0, 1.0, 1.0)]
     from_rest = np.linspace(0.01, 1.0, 40)
     assert _turns_of(from_rest, 0.0, 4.0) == [(0.0, 0.0, 1.0)]
     assert _turns_of(-from_rest[::-1], 0.0, 4.0) == [(39.0, -1.0, 0.0)]

@@ -254,13 +254,13 @@ def _turns_of(speed: Matrix, still: float, apart: float) -> list[tuple[float, fl
     """Return the rows, perhaps between two, at which a motion turns, stops or starts.
 
     Each with the signs of the speed before and after it; 0 where that is not known. Where a motion
-    is ``still`` for long, it may do so anywhere: at rows that are about so far ``apart``. It does
-    at the ends of a record as well where it is within so many rows of a rest.
+    is ``still``, it may do so anywhere: at rows that are about so far ``apart``. It does at the
+    ends of a record as well where it is within so many rows of a rest.
     """
     turns, moving = list[tuple[float, float, float]](), np.flatnonzero(np.abs(speed) >= still)
     sign = np.sign(speed)
     for before, after in pairwise(moving.tolist()):
-        if after - before > apart or speed[before] * speed[after] < 0.0:
+        if after - before > 1 or speed[before] * speed[after] < 0.0:
             count = 1 + int((after - before) / apart)
             places = before + (after - before) * (np.arange(count) + 0.5) / count
             turns += [(place, sign[before], sign[after]) for place in places.tolist()]
