@@ -12,7 +12,7 @@ from moocore import hv_contributions
 from numpy.typing import NDArray
 
 from pymoo_hdte._compilation import COMPILES, compiled
-from pymoo_hdte.algorithms.spread import most_spread, unlinked
+from pymoo_hdte.algorithms.spread import chain_of, most_spread, unlinked
 
 _REFERENCE = 1.1
 """Reference point with three objectives, in every range of the set, counted from its least value.
@@ -62,11 +62,11 @@ def _selected_of_two(
 ) -> NDArray[np.bool_]:
     """Say which of the rows stay, which ascend in the first objective and are called ``number``."""
     n = len(scaled)
-    stays = np.ones(n, dtype=np.bool_)
-    before, after = np.arange(-1, n - 1), np.arange(1, n + 1)
-    added = np.full(n, np.inf)
-    for row in range(1, n - 1):
-        added[row] = _rectangle(scaled, row - 1, row, row + 1)
+    stays, before, after = chain_of(n)
+    added = np.empty(n)
+    for row in range(n):
+        inside = 0 < row < n - 1
+        added[row] = _rectangle(scaled, row - 1, row, row + 1) if inside else np.inf
     for _ in range(n - size):
         leaving = -1
         for row in range(n):
@@ -149,19 +149,30 @@ def _selected_of_three_compiled(
     and only the row of the lowest one is counted again until it keeps that place.
     """
     n = len(scaled)
-    stays = np.ones(n, dtype=np.bool_)
-    fresh = np.ones(n, dtype=np.bool_)
+    stays, fresh = np.empty(n, dtype=np.bool_), np.empty(n, dtype=np.bool_)
+    for row in range(n):
+        stays[row] = fresh[row] = True
     stairs = np.empty((n + 1, 2))
     for _ in range(n - size):
-        leaving = int(added.argmin())
+        leaving = _least(added)
         while not fresh[leaving]:
             added[leaving] = _added_to_three(scaled, order, stays, leaving, stairs)
             fresh[leaving] = True
-            leaving = int(added.argmin())
+            leaving = _least(added)
         stays[leaving] = False
         added[leaving] = np.inf
-        fresh[:] = added == np.inf
+        for row in range(n):
+            fresh[row] = added[row] == np.inf
     return stays
+
+
+@compiled
+def _least(added: NDArray[np.float64]) -> int:
+    least = 0
+    for row in range(1, len(added)):
+        if added[row] < added[least]:
+            least = row
+    return least
 
 
 @compiled

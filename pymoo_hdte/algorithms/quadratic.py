@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -148,13 +149,23 @@ def _halved(
     least: NDArray[np.float64],
     most: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """Return the shifts (k, 1), between two bounds, that leave a step no longer than its radius."""
-    for _ in range(_HALVINGS):
-        middle = np.sqrt(least * most)
-        lengths = (squares / (values + middle) ** 2).sum(axis=1)
-        long = lengths.reshape(middle.shape) > largest
-        least, most = np.where(long, middle, least), np.where(long, most, middle)
-    return most
+    """Return the shifts (k, 1), between two bounds, that leave a step no longer than its radius.
+
+    In plain loops, which compile in a tenth of the time of array expressions.
+    """
+    shifts = np.empty(most.shape)
+    for row in range(len(squares)):
+        low, high = least[row, 0], most[row, 0]
+        for _ in range(_HALVINGS):
+            middle, length = math.sqrt(low * high), 0.0
+            for column in range(squares.shape[1]):
+                length += squares[row, column] / (values[row, column] + middle) ** 2
+            if length > largest[row, 0]:
+                low = middle
+            else:
+                high = middle
+        shifts[row, 0] = high
+    return shifts
 
 
 class ModelStep:

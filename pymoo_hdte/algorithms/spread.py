@@ -39,9 +39,9 @@ def most_spread(F: NDArray[np.float64], size: int) -> NDArray[np.int_]:
 def _selected(scaled: NDArray[np.float64], order: NDArray[np.int_], size: int) -> NDArray[np.bool_]:
     """Say which rows stay; ``order`` is that of the first objective."""
     n = len(scaled)
-    stays = np.ones(n, dtype=np.bool_)
-    places = np.empty(n, dtype=np.int64)
-    places[order] = np.arange(n)
+    stays, places = np.empty(n, dtype=np.bool_), np.empty(n, dtype=np.int64)
+    for place in range(n):
+        stays[place], places[order[place]] = True, place
     # Of every row the two nearest that stay, and their squared distances.
     neighbours = np.empty((n, 2), dtype=np.int64)
     gaps = np.empty((n, 2))
@@ -68,8 +68,7 @@ def _selected_of_chain(
     There the nearest of all are the nearest along the chain. Rows are called ``number``.
     """
     n = len(scaled)
-    stays = np.ones(n, dtype=np.bool_)
-    before, after = np.arange(-1, n - 1), np.arange(1, n + 1)
+    stays, before, after = chain_of(n)
     gaps = np.empty((n, 2))
     for row in range(n):
         _measure(scaled, before, after, gaps, row)
@@ -92,6 +91,16 @@ def _selected_of_chain(
                 _measure(scaled, before, after, gaps, upper)
                 upper = after[upper]
     return stays
+
+
+@compiled
+def chain_of(n: int) -> tuple[NDArray[np.bool_], NDArray[np.int_], NDArray[np.int_]]:
+    """Return which rows stay, all, and of each its neighbours, -1 and n beyond the ends."""
+    stays = np.empty(n, dtype=np.bool_)
+    before, after = np.empty(n, dtype=np.int64), np.empty(n, dtype=np.int64)
+    for row in range(n):
+        stays[row], before[row], after[row] = True, row - 1, row + 1
+    return stays, before, after
 
 
 @compiled
