@@ -3,9 +3,8 @@ Use the swarms on your own problem
 ==================================
 
 The algorithms of this package know nothing of drives. They take any pymoo problem with real
-variables, finite bounds and two objectives or more, constrained or not. ``ElitistSwarm`` is the one
-to use with two or three objectives: it has nothing to tune. ``AMPMOPSO`` is the paper's algorithm,
-for those who compare with it.
+variables, finite bounds and two objectives or more, constrained or not. :doc:`/which_algorithm`
+says which to take; here it is ``ElitistSwarm``, which follows no schedule and has nothing to tune.
 """
 
 import pickle
@@ -82,8 +81,8 @@ plt.show()
 # Three objectives
 # ----------------
 #
-# Nothing has to be set for three objectives. On DTLZ2 the true front is an eighth of the unit
-# sphere, so the objectives of every solution should have length 1.
+# On DTLZ2 the true front is an eighth of the unit sphere, so the objectives of every solution have
+# length 1. With four objectives or more, take pymoo's ``NSGA3``.
 
 result = minimize(get_problem("dtlz2"), ElitistSwarm(), ("n_gen", 150), seed=1)
 length = np.linalg.norm(result.F, axis=1)
@@ -96,27 +95,12 @@ ax.view_init(elev=25, azim=45)
 plt.show()
 
 # %%
-# With five it is behind already, and it warns: nearly every solution is non-dominated, and what
-# ranks by dominance, as NSGA-II does too, loses its way. Distances to the front (IGD in units of
-# its ranges, smaller is better) on DTLZ2 after 20,000 evaluations:
-#
-# ==========  ============  =======  =============  ===========
-# Objectives  ElitistSwarm  NSGA-II  Random search  AGE-MOEA-II
-# ==========  ============  =======  =============  ===========
-# 5           0.29          0.45     0.38           0.20
-# 6           0.60          1.06     0.45           0.27
-# 8           2.15          1.63     0.63           0.36
-# ==========  ============  =======  =============  ===========
-#
-# (Medians of three seeds, of one with AGE-MOEA-II.) Take pymoo's ``AGEMOEA2`` there.
-
-# %%
 # How long a run has
 # ------------------
 #
-# ``ElitistSwarm`` follows no schedule: stop it or go on whenever you like. ``AMPMOPSO`` makes
-# smaller steps towards the end of a run, so that it has to know the number of generations G_max, as
-# has all of its family. ``("n_gen", n)`` and ``("n_eval", n)`` tell it. A limit of time does not:
+# Stop ``ElitistSwarm`` or go on whenever you like. ``AMPMOPSO``, the paper's algorithm, makes
+# smaller steps towards the end of a run. ``("n_gen", n)`` and ``("n_eval", n)`` tell it how long
+# that is; a limit of time does not:
 
 with warnings.catch_warnings(record=True) as raised:
     warnings.simplefilter("always")

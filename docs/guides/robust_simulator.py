@@ -9,10 +9,6 @@ or other statistics. It builds a polynomial surrogate of the simulator, whose mo
 it needs some hundred runs in all instead of thousands for each design.
 """
 
-import tempfile
-from concurrent.futures import ThreadPoolExecutor
-from pathlib import Path
-
 import chaospy
 import matplotlib.pyplot as plt
 import numpy as np
@@ -32,11 +28,10 @@ from pymoo_hdte.problems import (
 # A simulator
 # -----------
 #
-# Any function of named numbers will do; one that no polynomial follows within the budget is
-# refused, and :ref:`one that fails or is random <sphx_glr_auto_guides_robust_failures.py>` is told
-# to be so. It may return one number, or several by name. Here it is an
-# oscillator that stands on a shaking floor: how much of the shaking gets through, and how far its
-# spring is stretched.
+# Any function of named numbers will do, also
+# :ref:`one that fails or is random <sphx_glr_auto_guides_robust_failures.py>`. It may return one
+# number, or several by name. Here it is an oscillator that stands on a shaking floor: how much of
+# the shaking gets through, and how far its spring is stretched.
 
 
 def mount(stiffness, damping, mass, speed):
@@ -192,19 +187,3 @@ print(f"with logarithms: {wide.n_runs} runs")
 # counts as failed; the coordinates are in ``problem.failed``.
 # :ref:`Three simulators <sphx_glr_auto_guides_robust_examples.py>` shows an equation of motion, a
 # program that is called by `subprocess`, and the drive.
-
-calls = []
-
-
-def costly(x, a):
-    """Stand for a long computation."""
-    calls.append((x, a))
-    return np.exp(x * a)
-
-
-study = {"designs": {"x": Design(0.5, 1.0, deviation=0.05)}, "noise": {"a": norm(1.0, 0.1)}}
-with tempfile.TemporaryDirectory() as folder, ThreadPoolExecutor(2) as workers:
-    settings = {"cache": Path(folder) / "runs.jsonl", "executor": workers, "at_once": 2}
-    for _ in range(2):
-        again = robust_problem(costly, **study, **settings, progress=False)
-        print(f"{again.n_runs} runs used, {len(calls)} made so far")
