@@ -523,6 +523,7 @@ class Integral:
         every = np.column_stack([part.columns for part in places]) / by_row[:, None]
         shared = scaled.T @ every
         followed = covariance @ shared
+        freedom = self._freedom(covariance)
         ends = np.cumsum([0, *(part.columns.shape[1] for part in places)])
         for number, part in enumerate(places):
             place = slice(ends[number], ends[number + 1])
@@ -544,15 +545,17 @@ class Integral:
             if renewed:
                 sizes = vectors @ (projected / (values + np.exp(-2.0 * at)))
                 after = left + columns @ sizes - scaled @ (followed[:, place] @ sizes)
-                gains[number] += self._gain_of_noise(after, covariance)
+                gains[number] += self._gain_of_noise(after, freedom)
         return gains
 
-    def _gain_of_noise(self, left: Vector, covariance: Matrix) -> float:
-        """Return by how much factors that fit residuals (n,), in units of them, are likelier."""
+    def _gain_of_noise(self, left: Vector, freedom: Vector) -> float:
+        """Return by how much factors that fit residuals (n,), in units of them, are likelier.
+
+        ``freedom`` is that of each channel, as of `_freedom`.
+        """
         spread, channels = self.hypothesis.noise, self.hypothesis.channels
         if spread <= 0.0:
             return 0.0
-        freedom = self._freedom(covariance)
         before = np.log(self.factors)
         power = np.zeros_like(before)
         np.add.at(power, channels, left**2)
