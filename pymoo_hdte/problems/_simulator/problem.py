@@ -227,13 +227,7 @@ class SimulatorProblem(Problem):
         return np.column_stack(columns)
 
     def _bands(self, X: Array, requested: Sequence[Requested]) -> Array:
-        blocks = map(self._around, _blocks(X))
-        return np.concatenate(
-            [
-                np.column_stack([_half_width(row[0], around[row[3]]) for row in requested])
-                for around in blocks
-            ]
-        )
+        return np.concatenate([_band(self._around(block), requested) for block in _blocks(X)])
 
     def predict(self, values: ArrayLike) -> Array:
         """Return the surrogate of all responses, shape (n, r), in their units.
@@ -413,7 +407,7 @@ class SimulatorProblem(Problem):
         """Estimated error of each objective, as the class says, shape (n_obj,)."""
         designs = draw_designs(self._inputs.axes, _JUDGED, np.random.default_rng(1))
         around = self._around(designs)
-        shares = self._bands(designs, self._requested[: self.n_obj])
+        shares = _band(around, self._requested[: self.n_obj])
         for column, (statistic, _, _, place) in enumerate(self._requested[: self.n_obj]):
             if statistic.relative_to_scatter:
                 least = self._fit.smallest_scatter[place]
@@ -505,6 +499,11 @@ class SimulatorProblem(Problem):
 def _blocks(X: Array) -> list[Array]:
     """Return the designs in groups that are evaluated at once; of no designs, one empty group."""
     return np.split(X, range(_AT_ONCE, len(X), _AT_ONCE))
+
+
+def _band(around: Sequence[Around], requested: Sequence[Requested]) -> Array:
+    """Return the half-widths of what is requested around n designs, shape (n, len(requested))."""
+    return np.column_stack([_half_width(row[0], around[row[3]]) for row in requested])
 
 
 def _half_width(statistic: Statistic, around: Around) -> Array:
