@@ -61,6 +61,10 @@ _SENTENCES: dict[str, Callable[[Reason, Label], str]] = {
     codes.RICHER_AT_BOUND: lambda reason, label: (
         f"{label(reason.effect)} fits better, but its {', '.join(reason.names)} ended at a bound"
     ),
+    codes.MORE_MISSING: lambda reason, label: (
+        "it leaves something, which is outside the library with a probability of "
+        f"{100.0 * dict(reason.numbers)['outside']:.0f} %"
+    ),
     codes.AT_TOLERANCE: lambda reason, label: (
         f"{reason.effect} ended at the bound of its tolerance"
     ),

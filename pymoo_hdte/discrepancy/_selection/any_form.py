@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pymoo_hdte.discrepancy._selection.candidate import Candidate
-from pymoo_hdte.discrepancy._selection.fitting import Evidence, Fit
+from pymoo_hdte.discrepancy._selection.fitting import Fit, JudgedEvidence
 from pymoo_hdte.discrepancy._selection.hypothesis import (
     Hypothesis,
     adequate,
@@ -59,7 +59,7 @@ class AnyForm:
 
     Parameters
     ----------
-    data : Evidence
+    data : JudgedEvidence
     base : Fit
         Fit without effects.
 
@@ -71,7 +71,7 @@ class AnyForm:
         Chi-square of the base beyond its degrees of freedom.
     """
 
-    def __init__(self, data: Evidence, base: Fit) -> None:
+    def __init__(self, data: JudgedEvidence, base: Fit) -> None:
         self.data, self.base = data, base
         self.degrees_of_freedom = len(base.residuals) - len(base.values)
         self.excess = base.chi_square - self.degrees_of_freedom

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from pymoo_hdte.discrepancy._selection.any_form import AnyForm
 from pymoo_hdte.discrepancy._selection.candidate import Candidate, Layout
 from pymoo_hdte.discrepancy._selection.excess import Excess
-from pymoo_hdte.discrepancy._selection.fitting import Evidence, Fit, Vector, fit
+from pymoo_hdte.discrepancy._selection.fitting import Fit, JudgedEvidence, Vector, fit
 from pymoo_hdte.discrepancy._selection.hypothesis import (
     Hypothesis,
     contains,
@@ -33,7 +33,7 @@ class FittedSets:
 
     Parameters
     ----------
-    data : Evidence
+    data : JudgedEvidence
     base : Fit
         Fit without any effect.
 
@@ -47,7 +47,7 @@ class FittedSets:
         Chi-square of the base beyond its degrees of freedom.
     """
 
-    def __init__(self, data: Evidence, base: Fit) -> None:
+    def __init__(self, data: JudgedEvidence, base: Fit) -> None:
         self.data, self.base = data, base
         self.forms = AnyForm(data, base)
         self.degrees_of_freedom = self.forms.degrees_of_freedom
@@ -341,7 +341,7 @@ def may_be_together(effects: Effects) -> bool:
 
 
 def is_significant(
-    data: Evidence,
+    data: JudgedEvidence,
     base: Fit,
     hypothesis: Hypothesis,
     simpler: Hypothesis,

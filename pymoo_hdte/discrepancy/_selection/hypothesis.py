@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pymoo_hdte.discrepancy._selection.candidate import Candidate, Layout
-from pymoo_hdte.discrepancy._selection.fitting import Evidence, Fit, fit
+from pymoo_hdte.discrepancy._selection.fitting import Evidence, Fit, JudgedEvidence, fit
 from pymoo_hdte.discrepancy._selection.rules import Rules
 from pymoo_hdte.discrepancy._selection.screening import Screened
 
@@ -114,7 +114,7 @@ def down_to_noise(fitted: Fit, degrees_of_freedom: int, rules: Rules) -> bool:
     return fitted.chi_square <= adequate(degrees_of_freedom, rules) * degrees_of_freedom
 
 
-def contradicted_parts(data: Evidence, base: Fit, fitted: Fit) -> NDArray[np.bool_]:
+def contradicted_parts(data: JudgedEvidence, base: Fit, fitted: Fit) -> NDArray[np.bool_]:
     """Tell which parts of the data contradict both the base and a fit, shape (parts,).
 
     If there are several records, the worst of each part is left out: it may be at a resonance,
@@ -179,7 +179,9 @@ def gains_enough(hypothesis: Hypothesis, base: Fit, rules: Rules) -> bool:
     return bool(gain - unknowns * np.log(len(base.residuals)) >= rules.bic_gain)
 
 
-def explains(data: Evidence, hypothesis: Hypothesis, base: Fit, degrees_of_freedom: int) -> bool:
+def explains(
+    data: JudgedEvidence, hypothesis: Hypothesis, base: Fit, degrees_of_freedom: int
+) -> bool:
     """Tell whether a set of effects explains the misfit of the base, in all parts of the data."""
     rules, limit = data.rules, adequate(degrees_of_freedom, data.rules)
     share = rules.exact_share if hypothesis.exact else rules.explained_share

@@ -30,6 +30,8 @@ EXPLAINS_TOO_LITTLE = "explains_too_little"
 """The effects explain a smaller ``share`` of the misfit than a name requires."""
 RICHER_AT_BOUND = "richer_at_bound"
 """Another set leaves less, but its unknowns ended at a bound; the numbers are their values."""
+MORE_MISSING = "more_missing"
+"""The effects leave something; ``outside`` is the probability that no effect of the library can."""
 AT_TOLERANCE = "at_tolerance"
 """The base value that ``effect`` names ended at the bound of its tolerance."""
 

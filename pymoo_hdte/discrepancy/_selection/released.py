@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from pymoo_hdte.discrepancy._selection.candidate import Candidate
-from pymoo_hdte.discrepancy._selection.fitting import Evidence, Fit, fit
+from pymoo_hdte.discrepancy._selection.fitting import Evidence, Fit, JudgedEvidence, fit
 from pymoo_hdte.discrepancy._selection.screening import basis_of
 from pymoo_hdte.effects.unknowns import unknown
 
@@ -23,7 +23,7 @@ _LARGEST_SIZE = 300.0
 took 50 at most."""
 
 
-def in_free_form(data: Evidence, fitted: Fit) -> Fit:
+def in_free_form(data: JudgedEvidence, fitted: Fit) -> Fit:
     """Return a set of effects fitted further with the sizes of its corrections as unknowns.
 
     It is fitted just enough to rank it, since what forms could still do follows to first order. The

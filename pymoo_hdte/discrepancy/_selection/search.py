@@ -18,7 +18,7 @@ from pymoo_hdte.discrepancy._selection.fitted_sets import (
     ill_explained,
     may_be_together,
 )
-from pymoo_hdte.discrepancy._selection.fitting import Evidence, Fit
+from pymoo_hdte.discrepancy._selection.fitting import Fit, JudgedEvidence
 from pymoo_hdte.discrepancy._selection.hypothesis import (
     Hypothesis,
     label_of,
@@ -34,7 +34,7 @@ class Search(FittedSets):
 
     Parameters
     ----------
-    data : Evidence
+    data : JudgedEvidence
     base : Fit
         Fit without any effect.
     candidates : sequence of Candidate
@@ -43,22 +43,18 @@ class Search(FittedSets):
         These candidates as screened beside the base, if they were.
     forms_only : sequence of Candidate
         Further forms of effects, tried only instead of another form.
-    nuisances : sequence of Screened
-        Nuisances of the bench as screened beside the base.
     """
 
     def __init__(
         self,
-        data: Evidence,
+        data: JudgedEvidence,
         base: Fit,
         candidates: Sequence[Candidate],
         screened: Sequence[Screened] = (),
         forms_only: Sequence[Candidate] = (),
-        nuisances: Sequence[Screened] = (),
     ) -> None:
         super().__init__(data, base)
         self.candidates, self.screened, self.forms_only = candidates, screened, forms_only
-        self.nuisances = nuisances
         self._extended: set[frozenset[str]] = set()
 
     def singles(self) -> None:

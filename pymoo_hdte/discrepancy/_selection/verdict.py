@@ -31,13 +31,8 @@ from pymoo_hdte.discrepancy._selection.equivalents import (
 )
 from pymoo_hdte.discrepancy._selection.excess import HeldOutTest
 from pymoo_hdte.discrepancy._selection.fitted_sets import beyond_stated
-from pymoo_hdte.discrepancy._selection.fitting import Evidence, Fit, fit
+from pymoo_hdte.discrepancy._selection.fitting import Fit, JudgedEvidence
 from pymoo_hdte.discrepancy._selection.hypothesis import Hypothesis, down_to_noise
-from pymoo_hdte.discrepancy._selection.nuisances import (
-    leading_group,
-    leading_nuisances,
-    nuisances_beside,
-)
 from pymoo_hdte.discrepancy._selection.reason import (
     HELD_OUT_ERROR_GROWS,
     NOT_VALIDATED,
@@ -81,15 +76,10 @@ class Verdict:
     in_another_form : float or None
         Share of the misfit that another form of the named law removes, where only such a form
         explains it.
-    renewed : Evidence or None
-        The data as they were judged, where their noise is not the one that they came with.
     seen_beyond : tuple of str
         Names of effects that are seen in what no fit holds, as ripple beyond the band of a motion.
     rivals_beyond : tuple of str
         What would explain as much and is in no fit, as the delay of an encoder.
-    of_bench : Fit or None
-        A fit with nuisances of the bench that have to join the base first: see
-        `leading_nuisances`. The verdict without it says nothing then.
     """
 
     base: Fit
@@ -103,10 +93,8 @@ class Verdict:
     shown_in_held_out: bool = True
     probability: float | None = None
     in_another_form: float | None = None
-    renewed: Evidence | None = None
     seen_beyond: tuple[str, ...] = ()
     rivals_beyond: tuple[str, ...] = ()
-    of_bench: Fit | None = None
 
     @property
     def status(self) -> str:
@@ -139,15 +127,6 @@ class Verdict:
         chosen = self.chosen
         degrees_of_freedom, rules = self.degrees_of_freedom, self.rules
         return chosen is not None and not down_to_noise(chosen.fit, degrees_of_freedom, rules)
-
-    def is_equivalent(self, hypothesis: Hypothesis) -> bool:
-        """Tell whether a set is of the class, or an order or form away from one and as likely."""
-        named = () if self.chosen is None else (self.chosen, *self.equivalent)
-        distance = self.rules.evidence_distance
-        return hypothesis in self.equivalent or any(
-            hypothesis.names == member.names and hypothesis.bic - member.bic < distance
-            for member in named
-        )
 
     def has_reason(self, code: str) -> bool:
         """Tell whether any of its reasons has a code."""
@@ -203,7 +182,7 @@ class Verdict:
 
 
 def judge(
-    data: Evidence,
+    data: JudgedEvidence,
     base: Fit,
     candidates: Sequence[Candidate],
     known: Sequence[Hypothesis] = (),
@@ -216,29 +195,21 @@ def judge(
     """
     rules = data.rules
     degrees_of_freedom = len(base.residuals) - len(base.values)
-    possible = [] if known else [candidate for candidate in candidates if candidate.nuisance]
-    candidates = [candidate for candidate in candidates if not candidate.nuisance]
     candidates = [*candidates, *data.out_of_tolerance(base.at_bounds)]
     quiet = down_to_noise(base, degrees_of_freedom, rules) and not data.evident
     # A sensor far from what is stated of it may have taken what is missing.
     quiet = quiet and not beyond_stated(base, rules).any()
     # Screening is slow, and known sets need none unless the base itself may be adequate.
     searched = [candidate for candidate in candidates if not candidate.instead_of]
-    every = screen(data, base, [*searched, *possible]) if quiet or not known else []
-    screened = [effect for effect in every if not effect.candidate.nuisance]
-    nuisances = [effect for effect in every if effect.candidate.nuisance]
+    screened = screen(data, base, searched) if quiet or not known else []
     gain = max((screening.reduction for screening in screened), default=0.0)
     if quiet and gain < rules.single_effect_gain:
         clean = probability.of_nothing(screened, len(base.residuals), rules)
-        of_bench = leading_nuisances(Search(data, base, searched, screened, nuisances=nuisances))
-        return Verdict(
-            base, None, True, (), (), degrees_of_freedom, rules,
-            probability=clean, of_bench=of_bench,
-        )  # fmt: skip
+        return Verdict(base, None, True, (), (), degrees_of_freedom, rules, probability=clean)
     if not screened and not known:
         return Verdict(base, None, False, (), (), degrees_of_freedom, rules)
     forms = [candidate for candidate in candidates if candidate.only_as_form]
-    search = Search(data, base, searched, screened, forms, nuisances)
+    search = Search(data, base, searched, screened, forms)
     if known:
         search.resume(known)
         search.leave_out_lacking()
@@ -250,14 +221,7 @@ def judge(
         search = Search(data, base, searched, screened, forms)
         search.resume(known, go_on=True)
     else:
-        if of_bench := leading_group(search):
-            return _with_nuisances(search, of_bench)
         search.singles()
-        if of_bench := leading_nuisances(search):
-            return _with_nuisances(search, of_bench)
-        search = _renewed_search(search)
-        if of_bench := nuisances_beside(search, search.hypotheses[0]):
-            return _with_nuisances(search, of_bench)
     search.grow()
     search.leave_out_lacking()
     chosen = chosen_of(search)
@@ -268,52 +232,7 @@ def judge(
         chosen = chosen_of(search)
     if replaced(search, chosen, [candidate for candidate in candidates if candidate.instead_of]):
         chosen = chosen_of(search)
-    if not known and (of_bench := nuisances_beside(search, chosen)):
-        return _with_nuisances(search, of_bench)
-    verdict = _verdict(search, answer_of(search, chosen, search.screened))
-    return verdict if search.data is data else replace(verdict, renewed=search.data)
-
-
-def _with_nuisances(search: Search, of_bench: Fit) -> Verdict:
-    """Return that nothing is certain before nuisances have joined the base."""
-    freedom, rules = search.degrees_of_freedom, search.data.rules
-    return Verdict(search.base, None, False, (), (), freedom, rules, of_bench=of_bench)
-
-
-def _renewed_search(search: Search) -> Search:
-    """Return the search with the noise of the best single effect, if that is then all there is.
-
-    With less noise than there is, further effects would be sought for what is none. A wrong effect
-    that lets much noise through may hide others in it, but hardly as much as noise in each part. An
-    effect beside which sensors are far from what is stated is not all, and a base that needs no
-    effect with that noise says nothing of this one.
-    """
-    data, best = search.data, search.hypotheses[0]
-    explained = best.listed and best.explained >= data.rules.explained_share
-    renewed = data.with_noise_of(best.fit) if explained and not search.enough(best) else None
-    if renewed is None or not _is_all(renewed, fit(renewed, best.candidates, best.fit.values)):
-        return search
-    base, candidates = fit(renewed, start=search.base.values), search.candidates
-    if down_to_noise(base, search.degrees_of_freedom, data.rules):
-        return search
-    nuisances = [effect.candidate for effect in search.nuisances]
-    every = screen(renewed, base, [*candidates, *nuisances])
-    screened = [effect for effect in every if not effect.candidate.nuisance]
-    again = Search(
-        renewed, base, candidates, screened, search.forms_only,
-        [effect for effect in every if effect.candidate.nuisance],
-    )  # fmt: skip
-    again.resume(search.hypotheses, go_on=True)
-    renewed_best = again.hypotheses[0]
-    same = renewed_best.label == best.label and _is_all(renewed, renewed_best.fit)
-    return again if same and not again.held_by_sensors(renewed_best) else search
-
-
-def _is_all(data: Evidence, fitted: Fit) -> bool:
-    """Tell whether a fit leaves noise, as much as there is in each part of the data."""
-    degrees_of_freedom = len(fitted.residuals) - fitted.n_base
-    noise = down_to_noise(fitted, degrees_of_freedom, data.rules)
-    return noise and data.excess(fitted).is_noise(data.rules)
+    return _verdict(search, answer_of(search, chosen, search.screened))
 
 
 def _verdict(search: Search, answer: Answer) -> Verdict:

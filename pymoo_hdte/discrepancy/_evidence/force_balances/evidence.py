@@ -103,10 +103,6 @@ class MeasuredData(WhitenedBalances):
         """Return None, because held-out records of a mechanism are simulated after the verdict."""
         return
 
-    def with_noise_of(self, fitted: Fit) -> None:
-        """Return None, because the noise of measured motion and force is that of the sensors."""
-        return
-
     def says_nothing_of(self, effects: Sequence[LawAt]) -> bool:
         """Tell whether a record rests throughout and effects hold it by dry friction.
 
