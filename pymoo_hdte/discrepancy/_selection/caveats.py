@@ -24,7 +24,6 @@ from pymoo_hdte.discrepancy._selection.reason import (
     AT_BOUND,
     FREED_AT_BOUND,
     HARMONIC_OF_ANOTHER,
-    NEEDS_ANOTHER_FORM,
     NOT_VALIDATED,
     SENSOR_AT_BOUND,
     STANDS_FOR_FORM,
@@ -46,7 +45,7 @@ def reasons_of(search: Search, chosen: Hypothesis, held_out: HeldOutTest | None)
             reasons += holds_zero([candidate])
     if released := _released_at_bounds(chosen):
         reasons.append(Reason.of(FREED_AT_BOUND, numbers=released))
-    for name in _contradicted_in_any_form(search, chosen):
+    for name in _contradicted(chosen.fit, search.data.rules):
         reasons.append(Reason(SENSOR_AT_BOUND, name))
     curves = [candidate.label for candidate in chosen.candidates if not candidate.exact]
     if not search.enough(chosen):
@@ -59,29 +58,6 @@ def reasons_of(search: Search, chosen: Hypothesis, held_out: HeldOutTest | None)
     if per_degree > search.data.rules.contradicting_chi_square:
         reasons.append(above_noise(per_degree))
     return reasons
-
-
-def other_forms(search: Search, chosen: Hypothesis) -> list[Reason]:
-    """Return which members explain the misfit only in another form than the listed one.
-
-    It is all members together if the listed forms contradict a part of the data and others do not.
-    """
-    members = chosen.members if len(chosen.members) > 1 else []
-    labels = [
-        "+".join(candidate.label for candidate in member)
-        for member in members
-        if search.forms.only_in_another_form(chosen, search.without(chosen, member))
-    ]
-    if not labels and not explains_as_listed(search, chosen):
-        forms = search.forms
-        if forms.explains(chosen) or forms.explains_in_another_form(chosen):
-            labels = [chosen.label]
-    return [Reason(NEEDS_ANOTHER_FORM, label) for label in labels]
-
-
-def explains_in_any_form(search: Search, hypothesis: Hypothesis) -> bool:
-    """Tell whether a set explains the misfit, in the listed forms of its laws or in others."""
-    return explains_as_listed(search, hypothesis) or search.forms.explains(hypothesis)
 
 
 def explains_as_listed(search: Search, hypothesis: Hypothesis) -> bool:
@@ -123,25 +99,6 @@ def _released_at_bounds(chosen: Hypothesis) -> dict[str, float]:
     return {
         parameter.name: float(value) for parameter, value in named if parameter.name in released
     }
-
-
-def _contradicted_in_any_form(search: Search, chosen: Hypothesis) -> list[str]:
-    """Return which sensors a set contradicts in every form of its laws.
-
-    Friction that falls as no listed one does is fitted best with a wrong gain. If several laws in a
-    free form leave only noise with all sensors as stated, and fewer laws do not, the gain stood for
-    the form. A single law in a free form can follow too much to show this.
-    """
-    rules, forms = search.data.rules, search.forms
-    names = _contradicted(chosen.fit, rules)
-    if not names or len(chosen.members) < 2:
-        return names
-    free_fit = forms.in_free_form(chosen.fit)
-    if not forms.unexplained_is_noise(free_fit) or beyond_stated(free_fit, rules).any():
-        return names
-    simpler_fits = [search.without(chosen, member).fit for member in chosen.members]
-    every = [*simpler_fits, *map(forms.in_free_form, simpler_fits)]
-    return names if any(map(forms.unexplained_is_noise, every)) else []
 
 
 def _contradicted(fitted: Fit, rules: Rules) -> list[str]:

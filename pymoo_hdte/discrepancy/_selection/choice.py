@@ -15,9 +15,6 @@ import numpy as np
 from pymoo_hdte.discrepancy._selection.candidate import Candidate
 from pymoo_hdte.discrepancy._selection.caveats import (
     explains_as_listed,
-    explains_in_any_form,
-    is_harmonic,
-    strength_is_certain,
     uncertain,
 )
 from pymoo_hdte.discrepancy._selection.hypothesis import (
@@ -28,7 +25,6 @@ from pymoo_hdte.discrepancy._selection.hypothesis import (
     label_of,
     near_by_evidence,
 )
-from pymoo_hdte.discrepancy._selection.screening import Screened
 from pymoo_hdte.discrepancy._selection.search import Search
 
 
@@ -44,7 +40,7 @@ def best_set(search: Search) -> Hypothesis:
         best = _least_that(
             search,
             lambda hypothesis: (
-                explains_in_any_form(search, hypothesis) and search.is_significant(hypothesis)
+                explains_as_listed(search, hypothesis) and search.is_significant(hypothesis)
             ),
         ) or _least_that(search, search.is_significant)
     assert best is not None, "a single effect is always significant"
@@ -88,7 +84,7 @@ def special_case(search: Search, best: Hypothesis) -> Hypothesis:
         (
             hypothesis
             for hypothesis in good
-            if explains_in_any_form(search, hypothesis) and search.is_significant(hypothesis)
+            if explains_as_listed(search, hypothesis) and search.is_significant(hypothesis)
         ),
         best,
     )
@@ -110,7 +106,7 @@ def confirmed(search: Search, chosen: Hypothesis) -> Hypothesis:
         gain = reduced.fit.chi_square - chosen.fit.chi_square
         denied = held_out and gain + held_out.before - held_out.after < rules.single_effect_gain
         unsure = any(candidate in doubted for candidate in member)
-        if denied or (unsure and explains_in_any_form(search, reduced)):
+        if denied or (unsure and explains_as_listed(search, reduced)):
             smaller.append(reduced)
     return (
         confirmed(search, min(smaller, key=lambda hypothesis: hypothesis.bic))
@@ -224,92 +220,3 @@ def replaced(
             else:
                 search.leave_out(trial)
     return explaining
-
-
-def in_another_form(
-    search: Search, chosen: Hypothesis, screened: Sequence[Screened]
-) -> list[Hypothesis]:
-    """Return the sets that explain the misfit in another form, by rising BIC of their listed form.
-
-    They are single effects, or the chosen set if no single effect does.
-
-    Parameters
-    ----------
-    search : Search
-        Search in which no set explains the misfit.
-    chosen : Hypothesis
-        Set that comes closest to explaining it.
-    screened : sequence of Screened
-        All candidates, screened beside the base; empty if only known sets are compared.
-    """
-    if any(search.data.corrections(candidate) is None for candidate in search.candidates[:1]):
-        return []
-    effects = [effect for effect in screened if effect.candidate.releases is None]
-    for effect in search.forms.shortlisted_in_another_form(effects) if effects else ():
-        search.alone(effect)
-    singles = [
-        hypothesis
-        for hypothesis in search.hypotheses
-        if hypothesis.listed and _is_effect(hypothesis)
-    ]
-    finished = [
-        hypothesis if hypothesis is chosen else search.finished(hypothesis)
-        for hypothesis in singles
-    ]
-    explaining = [hypothesis for hypothesis in finished if _explains(search, hypothesis)]
-    if not explaining and chosen.listed and _explains(search, chosen):
-        explaining = [chosen]
-    return sorted(explaining, key=lambda hypothesis: hypothesis.bic)
-
-
-def _explains(search: Search, hypothesis: Hypothesis) -> bool:
-    """Tell whether a set explains the misfit in another form, and is more than that form.
-
-    The strength of an effect of exact form has to be certain beside its corrections: a load on a
-    soft sensor moves like an added inertia in some form, although there is none.
-    """
-    if not search.forms.explains_in_another_form(hypothesis):
-        return False
-    free_fit, rules = search.forms.in_free_form(hypothesis.fit), search.data.rules
-    places = zip(hypothesis.candidates, free_fit.places, strict=True)
-    return all(
-        strength_is_certain(free_fit, candidate, place, rules)
-        for candidate, (_, place) in places
-        if candidate.exact
-    )
-
-
-def _is_effect(hypothesis: Hypothesis) -> bool:
-    """Tell whether a set is a single effect, and no base parameter."""
-    return len(hypothesis.candidates) == 1 and hypothesis.candidates[0].releases is None
-
-
-def in_one_law(search: Search, chosen: Hypothesis) -> list[Hypothesis]:
-    """Return single effects that explain in another form what a set explains by a curve and lines.
-
-    A clearance that varies once in some angle need not do so as a cosine. In a set it then appears
-    as a constant play and lines at the harmonics.
-    """
-    hypotheses = []
-    for law in search.candidates:
-        if law.listed and law.order is not None and _consists_of(chosen, law, law.order):
-            hypothesis = search.finished(search.alone(Screened(law, 0.0, law.starts[0])))
-            if _explains(search, hypothesis):
-                hypotheses.append(hypothesis)
-    return sorted(hypotheses, key=lambda hypothesis: hypothesis.bic)
-
-
-def _consists_of(chosen: Hypothesis, law: Candidate, order: float) -> bool:
-    """Tell whether a set is a law, or its special case, with lines of its harmonics at one port."""
-    curves = [
-        candidate
-        for candidate in chosen.candidates
-        if candidate.name == law.name or law.holds(candidate)
-    ]
-    lines = [candidate for candidate in chosen.candidates if candidate not in curves]
-    return (
-        len(curves) == 1
-        and bool(lines)
-        and all(candidate.port == law.port for candidate in chosen.candidates)
-        and all(line.order is not None and is_harmonic(line.order, order) for line in lines)
-    )

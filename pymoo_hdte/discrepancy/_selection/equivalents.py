@@ -13,7 +13,7 @@ import numpy as np
 
 from pymoo_hdte.discrepancy._selection.candidate import Candidate
 from pymoo_hdte.discrepancy._selection.caveats import (
-    explains_in_any_form,
+    explains_as_listed,
     reasons_of,
     varies,
 )
@@ -21,7 +21,6 @@ from pymoo_hdte.discrepancy._selection.choice import (
     best_set,
     competing_by_evidence,
     confirmed,
-    in_another_form,
     simpler_law,
     special_case,
     stands_out,
@@ -38,42 +37,33 @@ from pymoo_hdte.discrepancy._selection.hypothesis import (
     near_by_evidence,
 )
 from pymoo_hdte.discrepancy._selection.rules import Rules
-from pymoo_hdte.discrepancy._selection.screening import Screened
 from pymoo_hdte.discrepancy._selection.search import Search
 
 
 class Answer(NamedTuple):
     """A chosen set, the sets equivalent to it, and what is certain of them.
 
-    ``certain`` says that it explains the data, ``foreign`` that only another form of its law does,
-    and ``in_part`` that it stands out although more is left.
+    ``certain`` says that it explains the data, and ``in_part`` that it stands out although more is
+    left.
     """
 
     chosen: Hypothesis
     equivalent: list[Hypothesis]
     certain: bool
-    foreign: bool
     in_part: bool
 
 
-def answer_of(search: Search, chosen: Hypothesis, screened: Sequence[Screened]) -> Answer:
+def answer_of(search: Search, chosen: Hypothesis) -> Answer:
     """Return the answer of a search: its chosen set, or the set that replaces it."""
-    certain = explains_in_any_form(search, chosen)
+    certain = explains_as_listed(search, chosen)
     if not certain:
         chosen = simpler_law(search, chosen)
-    foreign: list[Hypothesis] = []
-    if not (certain and chosen.listed):
-        foreign = in_another_form(search, chosen, screened)
-        if not certain and explains_in_any_form(search, best_set(search)):
-            # An effect that was fitted only now explains the misfit in its listed form.
-            chosen, certain, foreign = chosen_of(search), True, []
-    if foreign:
-        equivalent = [*foreign[1:], *([chosen] if certain else [])]
-        chosen, certain = foreign[0], True
-    else:
-        extended = with_one_more(search, chosen) if certain else []
-        reported = [*extended, chosen, *competing_sets(search, chosen)]
-        chosen, equivalent = reported[0], reported[1:]
+    if not certain and explains_as_listed(search, best_set(search)):
+        # An effect that was fitted only now explains the misfit.
+        chosen, certain = chosen_of(search), True
+    extended = with_one_more(search, chosen) if certain else []
+    reported = [*extended, chosen, *competing_sets(search, chosen)]
+    chosen, equivalent = reported[0], reported[1:]
     together = [] if certain else competing_by_evidence(search, chosen)
     in_part = not certain and stands_out(search, chosen, together)
     equivalent += together if in_part else []
@@ -81,7 +71,7 @@ def answer_of(search: Search, chosen: Hypothesis, screened: Sequence[Screened]) 
     if not chosen.listed and listed:
         others = [hypothesis for hypothesis in equivalent if hypothesis is not listed[0]]
         chosen, equivalent = listed[0], [chosen, *others]
-    return Answer(chosen, equivalent, certain, bool(foreign), in_part)
+    return Answer(chosen, equivalent, certain, in_part)
 
 
 def chosen_of(search: Search) -> Hypothesis:
@@ -99,7 +89,7 @@ def competing_sets(search: Search, chosen: Hypothesis) -> list[Hypothesis]:
         for hypothesis in search.hypotheses
         if hypothesis is not chosen
         and _competes(search, hypothesis, chosen)
-        and explains_in_any_form(search, hypothesis)
+        and explains_as_listed(search, hypothesis)
         and search.is_significant(hypothesis)
     ]
     return [
@@ -119,32 +109,10 @@ def _competes(search: Search, hypothesis: Hypothesis, chosen: Hypothesis) -> boo
     A more general law whose extra parameter sits at its bound reduces to the special case and does
     not compete. If the extra parameter is well determined, the evidence decides.
     """
-    competes = (
-        search.indistinguishable(hypothesis, chosen)
-        or undecided(hypothesis, chosen, search.data.rules)
-        or _needs_fewer_values(search, hypothesis, chosen)
+    competes = search.indistinguishable(hypothesis, chosen) or undecided(
+        hypothesis, chosen, search.data.rules
     )
     return competes and not (contains(hypothesis, chosen) and is_bounded(hypothesis.fit))
-
-
-def _needs_fewer_values(search: Search, hypothesis: Hypothesis, chosen: Hypothesis) -> bool:
-    """Tell whether a set explains in another form what the chosen one does with more values.
-
-    Released values beside a law may stand for the form of another law at the same port: a soft
-    wind-up with too large an error of the gears is nearly a play with a soft skin.
-    """
-    shared = label_of(hypothesis.effects) & label_of(chosen.effects)
-    own, replaced = (
-        [effect for effect in effects if effect.label not in shared]
-        for effects in (hypothesis.effects, chosen.effects)
-    )
-    fewer = label_of(hypothesis.released) < label_of(chosen.released)
-    if not fewer or not own or len(own) != len(replaced):
-        return False
-    same = all(any(effect.shares_port_with(law) for law in replaced) for effect in own)
-    increase = hypothesis.fit.chi_square - chosen.fit.chi_square
-    limit = search.data.rules.form_share**2 * search.excess
-    return same and increase < limit and search.forms.unexplained_is_noise(hypothesis.fit)
 
 
 def with_one_more(search: Search, chosen: Hypothesis) -> list[Hypothesis]:
@@ -164,9 +132,8 @@ def with_one_more(search: Search, chosen: Hypothesis) -> list[Hypothesis]:
         and hypothesis.listed
         and chosen.bic - hypothesis.bic >= rules.bic_gain
     ]
-    # Where forms are not known, only listed forms were compared.
-    any_form = search.forms.forms_are_known(chosen.effects)
-    if not (larger and any_form) or not reasons_of(search, chosen, None):
+    # Beside effects only their listed forms were compared.
+    if not larger or chosen.effects or not reasons_of(search, chosen, None):
         return []
     extended = [
         hypothesis
@@ -262,7 +229,6 @@ def complete(search: Search, chosen: Hypothesis) -> None:
     Single effects need no such fits: the best were fitted in other forms and from other starts.
     """
     _with_other_parts(search, chosen)
-    _with_other_laws(search, chosen)
     search.finish_near(len(chosen.members))
 
 
@@ -287,56 +253,3 @@ def _with_other_parts(search: Search, chosen: Hypothesis) -> None:
             if substitute is not part and close and may_be_together(effects):
                 start = chosen.values_of(remaining)[len(search.base.values) :]
                 search.fitted(effects, np.append(substitute.fit.values, start))
-
-
-def _with_other_laws(search: Search, chosen: Hypothesis) -> None:
-    """Fit sets with another law at the port of a member, in all its forms and from all starts.
-
-    Beside other members the search tries one form from one start. A second spring beyond a torsion
-    was thus named a soft wind-up, since only a cubic one was tried beside the drag. A set is fitted
-    only if other forms can remove most of what it leaves, or leave only noise.
-    """
-    for competitor in _competing_at_its_ports(search, chosen):
-        if search.forms.unexplained_is_noise(competitor.fit) or search.leaves_forms(competitor):
-            best = competitor
-            for member, _ in differing(competitor.candidates, chosen.candidates):
-                best = _from_all_starts(search, best, member)
-
-
-def _competing_at_its_ports(search: Search, chosen: Hypothesis) -> list[Hypothesis]:
-    """Return for other names at the same ports the best set that does not compete so far.
-
-    A set that the data do not separate from the chosen one is in its class already.
-    """
-    of_names: dict[frozenset[tuple[str, str]], Hypothesis] = {}
-    for hypothesis in search.of_size(len(chosen.members)):
-        if len(hypothesis.candidates) == len(chosen.candidates):
-            of_names.setdefault(hypothesis.names, hypothesis)
-    of_names.pop(chosen.names, None)
-    return [
-        hypothesis
-        for hypothesis in of_names.values()
-        if all(
-            member.shares_port_with(replaced)
-            for member, replaced in differing(hypothesis.candidates, chosen.candidates)
-        )
-        and not search.indistinguishable(hypothesis, chosen)
-    ]
-
-
-def _from_all_starts(search: Search, hypothesis: Hypothesis, member: Candidate) -> Hypothesis:
-    """Return the best fit of a set with any form of a member, from any of its starts."""
-    hypotheses, base = [hypothesis], hypothesis.fit.values[: hypothesis.fit.n_base]
-    forms = [form for form in search.candidates if form.is_form_of(member)]
-    for law in (member, *forms):
-        effects = tuple(
-            law if candidate is member else candidate for candidate in hypothesis.candidates
-        )
-        for start in law.starts if may_be_together(effects) else ():
-            values = [
-                start if candidate is member else hypothesis.fit.values[place]
-                for candidate, place in hypothesis.fit.places
-            ]
-            begin = np.concatenate([base, *values])
-            hypotheses.append(search.fitted(effects, begin, again=True, hopeless=search.hopeless))
-    return min(hypotheses, key=lambda hypothesis: hypothesis.bic)

@@ -40,13 +40,6 @@ class Excess:
         """Return for which parts, shape (parts,), the excess is significant."""
         return np.asarray(self.of_parts > self._most_noise(rules))
 
-    def is_noise(self, rules: Rules) -> bool:
-        """Tell whether the excess of each part is that of noise, neither more nor less.
-
-        Too little cannot be seen in a part with fewer than some thirty degrees of freedom.
-        """
-        return bool(np.all(np.abs(self.of_parts) <= self._most_noise(rules)))
-
     def _most_noise(self, rules: Rules) -> NDArray[np.float64]:
         noise = np.sqrt(2.0 * self.degrees_of_freedom.sum(axis=0))
         return np.asarray(rules.false_alarm_deviations * noise)

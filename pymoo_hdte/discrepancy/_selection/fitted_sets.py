@@ -8,7 +8,6 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from pymoo_hdte.discrepancy._selection.any_form import AnyForm
 from pymoo_hdte.discrepancy._selection.candidate import Candidate, Layout
 from pymoo_hdte.discrepancy._selection.excess import Excess
 from pymoo_hdte.discrepancy._selection.fitting import Fit, JudgedEvidence, Vector, fit
@@ -39,8 +38,6 @@ class FittedSets:
 
     Attributes
     ----------
-    forms : AnyForm
-        What sets leave in any form of their laws.
     degrees_of_freedom : int
         Degrees of freedom of the base.
     excess : float
@@ -49,9 +46,8 @@ class FittedSets:
 
     def __init__(self, data: JudgedEvidence, base: Fit) -> None:
         self.data, self.base = data, base
-        self.forms = AnyForm(data, base)
-        self.degrees_of_freedom = self.forms.degrees_of_freedom
-        self.excess = self.forms.excess
+        self.degrees_of_freedom = len(base.residuals) - len(base.values)
+        self.excess = base.chi_square - self.degrees_of_freedom
         self._by_label: dict[frozenset[str], Hypothesis] = {}
         self._left_out: set[frozenset[str]] = set()
         self._finished: set[frozenset[str]] = set()
@@ -87,7 +83,8 @@ class FittedSets:
 
     def enough(self, hypothesis: Hypothesis) -> bool:
         """Tell whether a set explains the data down to the noise, with any evident effect."""
-        return self.forms.leaves_noise(hypothesis) and not self.lacks_evident(hypothesis)
+        noise = down_to_noise(hypothesis.fit, self.degrees_of_freedom, self.data.rules)
+        return noise and not self.lacks_evident(hypothesis)
 
     def lacks_evident(self, hypothesis: Hypothesis) -> bool:
         """Tell whether a set lacks an evident effect, that is, has none that it may be."""
@@ -119,33 +116,17 @@ class FittedSets:
             self.data.excess(hypothesis.fit).significant(self.data.rules).any()
         )
 
-    def leaves_forms(self, hypothesis: Hypothesis) -> bool:
-        """Tell whether other forms of its laws do most of what a set leaves, to first order.
-
-        They do not if it leaves only noise and no unknown ended at a bound.
-        """
-        if self.enough(hypothesis) and not is_bounded(hypothesis.fit):
-            return False
-        unexplained = self.forms.unexplained(hypothesis.fit)
-        excess = hypothesis.fit.chi_square - self.degrees_of_freedom
-        limit = 1.0 - self.data.rules.explained_part_share
-        return unexplained is not None and unexplained.excess <= limit * excess
-
     def leaves_form_of(self, hypothesis: Hypothesis, member: Candidate) -> bool:
         """Tell whether another form of a member may do better in a set.
 
-        It may if forms are most of what the set leaves, or if a law with memory leaves more than
-        noise: a loop that forgets is no sum of springs that slip, not even to first order.
+        It may if a law with memory leaves more than noise: a loop that forgets is no sum of springs
+        that slip, not even to first order.
         """
-        return self.leaves_forms(hypothesis) or (member.remembers and not self.enough(hypothesis))
+        return member.remembers and not self.enough(hypothesis)
 
     def indistinguishable(self, hypothesis: Hypothesis, chosen: Hypothesis) -> bool:
         """Tell whether the data do not separate two sets, as the function of this name does."""
-        same_values = label_of(hypothesis.released) == label_of(chosen.released)
-        overlap = same_values and self.forms.forms_are_known((*hypothesis.effects, *chosen.effects))
-        return indistinguishable(
-            hypothesis, chosen, self.degrees_of_freedom, self.data.rules, overlap
-        )
+        return indistinguishable(hypothesis, chosen, self.degrees_of_freedom, self.data.rules)
 
     def is_significant(self, hypothesis: Hypothesis) -> bool:
         """Tell whether each member is significant: without it a set explains clearly less."""
@@ -166,11 +147,9 @@ class FittedSets:
         """
         if self.lacks_evident(simpler) and not self.lacks_evident(hypothesis):
             return True
-        return (
-            is_significant(self.data, self.base, hypothesis, simpler, member)
-            or self.forms.is_significant(hypothesis, simpler)
-            or self._brings_sensors_back(hypothesis, simpler)
-        )
+        return is_significant(
+            self.data, self.base, hypothesis, simpler, member
+        ) or self._brings_sensors_back(hypothesis, simpler)
 
     def _brings_sensors_back(self, hypothesis: Hypothesis, simpler: Hypothesis) -> bool:
         """Tell whether sensors are as stated in a set, and in no form of the simpler set.
@@ -180,8 +159,7 @@ class FittedSets:
         least = self.data.rules.single_effect_gain * misfit_of(hypothesis, self.degrees_of_freedom)
         clear = simpler.fit.chi_square - hypothesis.fit.chi_square >= least
         back = self.beyond_stated(simpler.fit) > 0.0 and self.beyond_stated(hypothesis.fit) == 0.0
-        # A fit in a free form takes as long as several others.
-        return clear and back and self.beyond_stated(self.forms.in_free_form(simpler.fit)) > 0.0
+        return clear and back
 
     def held_by_sensors(self, hypothesis: Hypothesis) -> float:
         """Return `beyond_stated` of a set that could be named without qualification, else 0.

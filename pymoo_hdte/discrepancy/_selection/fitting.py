@@ -224,10 +224,6 @@ class JudgedEvidence(Evidence, Protocol):
         """Share of the base's excess up to which a residual is attributed to no effect."""
         ...
 
-    def corrections(self, candidate: Candidate) -> Sequence[Any] | None:
-        """Return effects by which the form of a law may err; None where no forms are known."""
-        ...
-
     def excess(self, fitted: Fit) -> Excess:
         """Return the excess chi-square of a fit by record and part."""
         ...

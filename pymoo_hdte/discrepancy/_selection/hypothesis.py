@@ -205,7 +205,6 @@ def indistinguishable(
     chosen: Hypothesis,
     degrees_of_freedom: int,
     rules: Rules,
-    overlap: bool = False,
 ) -> bool:
     """Tell whether these data do not separate a hypothesis from the chosen one.
 
@@ -214,8 +213,7 @@ def indistinguishable(
     form or one is a special case of the other. If the chosen set leaves more than noise,
     differences of chi-square are compared with what it leaves. The evidence alone decides if an
     effect stands for several base parameters, or if the hypothesis has a form that only stands in
-    for a listed one. Two laws at one port ``overlap`` if other forms of both are known and the same
-    values are out of tolerance.
+    for a listed one.
     """
     if hypothesis.names == chosen.names:
         return False
@@ -235,10 +233,8 @@ def indistinguishable(
         pairs = differing(hypothesis.candidates, chosen.candidates)
         if any(member.only_as_form for member, _ in pairs):
             return False
-        same = all(member.shares_port_with(counterpart) for member, counterpart in pairs)
-        accuracy = rules.form_share if overlap and same else rules.form_accuracy
         exact = all(member.exact and counterpart.exact for member, counterpart in pairs)
-        close = not exact and increase < accuracy**2 * (chosen.removed + residual)
+        close = not exact and increase < rules.form_accuracy**2 * (chosen.removed + residual)
     if (
         close
         or misfit <= adequate(degrees_of_freedom, rules)

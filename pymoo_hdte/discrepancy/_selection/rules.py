@@ -135,7 +135,6 @@ class Rules:
     fewest_rattling: int = rule(2)
     least_temperature_spread: float = rule(3.0)
     sweep_gain: float = rule(50.0)
-    changed_noise_ratio: float = rule(1.5, at_least=1.0)
 
     # Machines other than a drive.
     noise_power_ratio: float = rule(2.0, at_least=1.0)
@@ -214,12 +213,10 @@ class Rules:
     form_accuracy: float = rule(0.02, at_least=0.0, at_most=1.0)
     form_share: float = rule(0.05, at_least=0.0, at_most=1.0)
     form_ratio: float = rule(2.0, at_least=1.0)
-    form_terms: int = rule(6)
 
     # Is there a second effect?
     second_share: float = rule(0.8, at_least=0.0, at_most=1.0)
     second_form_share: float = rule(0.05, at_least=0.0, at_most=1.0)
-    beyond_forms_share: float = rule(0.95, at_least=0.0, at_most=1.0)
     vote_change: float = rule(16.0)
     vote_share: float = rule(0.5, at_least=0.0, at_most=1.0)
     certain_deviations: float = rule(1.959964)

@@ -25,7 +25,7 @@ from pymoo_hdte.discrepancy._selection.hypothesis import (
     leave_the_same,
     misfit_of,
 )
-from pymoo_hdte.discrepancy._selection.released import gain_of_released, released_together
+from pymoo_hdte.discrepancy._selection.released import released_together
 from pymoo_hdte.discrepancy._selection.screening import Screened, shortlist, varied
 
 
@@ -78,7 +78,6 @@ class Search(FittedSets):
         rules, leading = self.data.rules, self.hypotheses[0]
         done = self.enough(leading) and not self.held_by_sensors(leading)
         if done or not self.could_count(leading):
-            self._extend_beyond_forms(leading)
             return
         for size in range(1, rules.most_effects):
             grown = self.of_size(size)[: rules.most_firsts if size == 1 else 1]
@@ -171,31 +170,6 @@ class Search(FittedSets):
                 for start in effect.starts:
                     self.fitted((*hypothesis.effects, effect), np.append(values, start), again=True)
 
-    def _release_beside(self, hypothesis: Hypothesis) -> None:
-        """Fit a set of effects with the base parameters released that it leaves at their bounds.
-
-        Beside an effect other parameters may be out of tolerance than without it. None is released
-        if the best set of this size explains the misfit in another form of its laws, or if no forms
-        are known: an amplitude out of tolerance may then stand for the form.
-        """
-        rules = self.data.rules
-        least = rules.explained_part_share * (hypothesis.fit.chi_square - self.degrees_of_freedom)
-        least = max(least, rules.single_effect_gain)
-        bounded = self.data.out_of_tolerance(hypothesis.fit.at_bounds, together=True)
-        if hypothesis.released or not bounded or gain_of_released(hypothesis.fit, bounded) < least:
-            return
-        best = self.of_size(len(hypothesis.members))[0]
-        if self.forms.unexplained(best.fit) is None or self.forms.explains(best):
-            return
-        released, fitted = released_together(self.data, hypothesis.fit)
-        names = {candidate.name for candidate in hypothesis.candidates}
-        uncovered = [candidate for candidate in released if candidate.covered_by not in names]
-        needed = tuple(
-            candidate for candidate in uncovered if candidate.outside(self.data.base, fitted.values)
-        )
-        if len(needed) > 1 or not label_of(needed) <= self._covered(needed):
-            self.fitted((*hypothesis.candidates, *needed), fitted.values)
-
     def _prune_near(self, size: int) -> None:
         """Fit the best sets of effects and released parameters without needless parameters."""
         for hypothesis in self.of_size(size):
@@ -211,14 +185,9 @@ class Search(FittedSets):
         if label in self._extended or label in self._left_out:
             return
         self._extended.add(label)
-        self._release_beside(hypothesis)
         if not (candidates := self._addable(hypothesis)):
             return
         self.add_evident(hypothesis, candidates)
-        if len(hypothesis.members) > 1 and self.forms.explains(hypothesis):
-            # A third effect shows only in what no form of two others explains.
-            self._extend_beyond_forms(hypothesis)
-            return
         rules, excess = self.data.rules, hypothesis.fit.chi_square - self.degrees_of_freedom
         if sensor_excess := self.held_by_sensors(hypothesis):
             # An effect that brings a sensor back to what is stated removes at least its excess.
@@ -236,7 +205,6 @@ class Search(FittedSets):
         )
         for effect in chosen:
             self.extended(hypothesis, effect.candidate, effect.start)
-        self._extend_beyond_forms(hypothesis)
 
     def _addable(self, hypothesis: Hypothesis) -> list[Candidate]:
         """Return the effects that may be added to a set."""
@@ -246,17 +214,6 @@ class Search(FittedSets):
             if candidate.releases is None
             and all(candidate.goes_with(member) for member in hypothesis.candidates)
         ]
-
-    def _extend_beyond_forms(self, hypothesis: Hypothesis) -> None:
-        """Fit a set with effects that remove what its laws do not explain in any form."""
-        if len(hypothesis.members) >= self.data.rules.most_effects:
-            return
-        screened = self._screened_beside_base(self._addable(hypothesis))
-        effects = self.forms.shortlisted_beside(hypothesis, screened)
-        for effect in effects:
-            self.extended(hypothesis, effect.candidate, effect.start)
-        if effects:
-            self.finish_near(len(hypothesis.members) + 1)
 
     def _screened_beside_base(self, candidates: Sequence[Candidate]) -> list[Screened]:
         """Return candidates as screened beside the base; nothing if none was screened."""

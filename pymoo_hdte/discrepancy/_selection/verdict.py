@@ -17,11 +17,10 @@ from pymoo_hdte.discrepancy._selection import probability
 from pymoo_hdte.discrepancy._selection.candidate import Candidate
 from pymoo_hdte.discrepancy._selection.caveats import (
     above_noise,
-    explains_in_any_form,
-    other_forms,
+    explains_as_listed,
     reasons_of,
 )
-from pymoo_hdte.discrepancy._selection.choice import in_one_law, replaced
+from pymoo_hdte.discrepancy._selection.choice import replaced
 from pymoo_hdte.discrepancy._selection.equivalents import (
     Answer,
     answer_of,
@@ -73,9 +72,6 @@ class Verdict:
         Whether the records kept out of the fit, if there are any, show what is chosen.
     probability : float or None
         That it is right: see `probability`. None where it names nothing, or nothing was compared.
-    in_another_form : float or None
-        Share of the misfit that another form of the named law removes, where only such a form
-        explains it.
     seen_beyond : tuple of str
         Names of effects that are seen in what no fit holds, as ripple beyond the band of a motion.
     rivals_beyond : tuple of str
@@ -92,7 +88,6 @@ class Verdict:
     reasons: tuple[Reason, ...] = ()
     shown_in_held_out: bool = True
     probability: float | None = None
-    in_another_form: float | None = None
     seen_beyond: tuple[str, ...] = ()
     rivals_beyond: tuple[str, ...] = ()
 
@@ -215,8 +210,8 @@ def judge(
         search.leave_out_lacking()
         chosen = chosen_of(search)
         alone = len(chosen.members) == 1
-        if not (go_on and alone) or explains_in_any_form(search, chosen):
-            return _verdict(search, answer_of(search, chosen, ()))
+        if not (go_on and alone) or explains_as_listed(search, chosen):
+            return _verdict(search, answer_of(search, chosen))
         screened = screened or screen(data, base, searched)
         search = Search(data, base, searched, screened, forms)
         search.resume(known, go_on=True)
@@ -232,23 +227,22 @@ def judge(
         chosen = chosen_of(search)
     if replaced(search, chosen, [candidate for candidate in candidates if candidate.instead_of]):
         chosen = chosen_of(search)
-    return _verdict(search, answer_of(search, chosen, search.screened))
+    return _verdict(search, answer_of(search, chosen))
 
 
 def _verdict(search: Search, answer: Answer) -> Verdict:
     """Return the verdict: an answer with its reasons, status and probability."""
     data, rules, degrees_of_freedom = search.data, search.data.rules, search.degrees_of_freedom
-    chosen, rivals, certain, foreign, in_part = answer
+    chosen, rivals, certain, in_part = answer
     equivalent = list(rivals)
     held_out_test = data.held_out_test(search.base, chosen.fit)
     shown = held_out_test is None or held_out_test.counts(rules)
-    reasons = reasons_of(search, chosen, held_out_test) + other_forms(search, chosen)
+    reasons = reasons_of(search, chosen, held_out_test)
     if in_part:
         reason = above_noise(chosen.fit.chi_square / degrees_of_freedom)
         reasons += [reason] if reason not in reasons else []
-    if (certain and not foreign) or in_part:
+    if certain or in_part:
         # The rules of earning may pass over a set for which the evidence speaks: both are told.
-        equivalent += in_one_law(search, chosen)
         equivalent += probability.likelier(
             chosen, equivalent, search.hypotheses, degrees_of_freedom
         )
@@ -264,13 +258,11 @@ def _verdict(search: Search, answer: Answer) -> Verdict:
         rules,
         tuple(reasons),
         shown,
-        in_another_form=search.forms.share_in_another_form(chosen) if foreign else None,
     )
     if verdict.status == "unlisted":
         verdict = replace(verdict, equivalent=())
     others = verdict.equivalent
-    compared = (chosen, *others) if foreign else search.hypotheses
     # A class that is not all is no more certain than a name in part.
     like = "partial" if in_part and others else verdict.status
-    sure = probability.of_names(like, chosen, others, compared, degrees_of_freedom, rules)
+    sure = probability.of_names(like, chosen, others, search.hypotheses, degrees_of_freedom, rules)
     return replace(verdict, probability=sure)

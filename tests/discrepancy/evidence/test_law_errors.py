@@ -1,13 +1,10 @@
 """Relative errors of laws: processes of the stated size, and tangents of scaled laws."""
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pymoo_hdte.discrepancy._evidence.force_balances.law_errors import BalanceErrors, _turns_of
 from pymoo_hdte.discrepancy._evidence.order_lines.law_errors import ScaledLaw
 from pymoo_hdte.discrepancy._selection.process import TERMS, sine_of, sines_of
 from pymoo_hdte.effects.law import PortState, periodic_phase
@@ -37,44 +34,3 @@ def test_tangents_are_those_of_the_torque(place, number):
         slope = np.asarray(scaled.respond(state_of(at)).slope)
         size = max(abs(float(slope[0])), 1.0)
         assert (ahead - behind) / (2.0 * step) == pytest.approx(slope, abs=1e-4 * size)
-
-
-def test_a_motion_turns_stops_and_starts():
-    """At once, or anywhere in a rest."""
-    speed = np.concatenate([np.ones(10), -np.ones(10), np.zeros(11), np.ones(10)])
-    (turn, *rest) = _turns_of(speed, 0.5, 4.0)
-    assert turn == (9.5, -1.0)
-    assert rest == [(20.5, 1.0), (23.5, 1.0), (26.5, 1.0), (29.5, 1.0)]
-    assert _turns_of(np.ones(10), 0.5, 4.0) == []
-
-
-def balances(residuals, frequency, parts=1):
-    """Return what the score knows of residuals (n,) of one record, each part at all frequencies."""
-    data = SimpleNamespace(
-        frequency=np.tile(frequency, parts),
-        _part=np.repeat(np.arange(parts), len(frequency)),
-        _record=np.zeros(parts * len(frequency), dtype=int),
-    )
-    return BalanceErrors(data, None, SimpleNamespace(residuals=residuals))
-
-
-def test_each_octave_of_a_balance_has_its_noise():
-    frequency = np.linspace(0.0, 16.0, 200)
-    channels = balances(np.ones(400), frequency, parts=2).channels
-    counts = np.bincount(channels)
-    assert np.all(counts >= 20)
-    of_first = channels[:200]
-    assert np.array_equal(channels[200:], of_first + of_first.max() + 1)
-    # From above: over 8 Hz, over 4 Hz, and all that are fewer than 20 with the octave over them.
-    assert [frequency[of_first == k].min() > low for k, low in ((0, 7.9), (1, 3.9))] == [True] * 2
-    assert frequency[of_first == of_first.max()].min() == 0.0
-
-
-def test_residuals_of_a_motion_that_repeats_count_for_few(rng):
-    """White ones count nearly for all; of lines the others are no witnesses."""
-    frequency = np.linspace(8.1, 16.0, 400)
-    white = rng.normal(size=400)
-    lines = np.where(np.arange(400) % 100 == 50, 40.0, 0.1) * white
-    counts = [balances(residuals, frequency).shares.sum() for residuals in (white, lines)]
-    assert counts[0] > 0.7 * 400
-    assert counts[1] < 0.2 * 400

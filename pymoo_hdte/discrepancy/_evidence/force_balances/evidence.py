@@ -66,9 +66,6 @@ class MeasuredData(WhitenedBalances):
         base = fitted.values[: len(self.base)]
         return lambda added: -self.whitened_forces(base, added)
 
-    def corrections(self, candidate: Candidate) -> None:
-        """Return None, because no forms of laws are known beside those of the library."""
-
     def rows_of_parts(self) -> list[NDArray[np.int_]]:
         """Return the indices of the residuals of each part."""
         return [np.flatnonzero(self._part == part) for part in range(len(self.names))]
