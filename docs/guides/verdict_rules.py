@@ -1,9 +1,10 @@
 r"""
-Mathematics: the rules of a verdict
-===================================
+Mathematics: the rules of a mechanism
+=====================================
 
 ``pymoo-hdte discrepancy`` says whether a model lacks something that its measurements show, and
-what. This page gives the rules and the statistics behind them. All thresholds are in
+what. Of drives and of machines of your own a :doc:`score <verdict_score>` decides; of joints and
+other mechanisms rules. This page gives them, and the statistics behind them. All thresholds are in
 `pymoo_hdte.discrepancy._selection.rules.Rules`, from which this page reads them.
 """
 
@@ -27,9 +28,8 @@ from pymoo_hdte.mechanism import BelievedValue, Input, Mechanism, Port, Record
 # Residuals in units of their noise
 # ---------------------------------
 #
-# Records become *features*, such as amplitudes and phases of the order lines of a drive, or the
-# spectrum of the force balance of another machine. Prediction minus feature, divided by the noise
-# (*whitened*, which removes correlations of the noise), gives residuals :math:`r` that are
+# Records become *features*: the spectrum of the force balance. Prediction minus feature, divided by
+# the noise (*whitened*, which removes correlations of the noise), gives residuals :math:`r` that are
 # independent and of unit variance if the model is right. The misfit is
 #
 # .. math::
@@ -154,7 +154,6 @@ print(f"  in each part of the data                 {RULES.explained_part_share:g
 print(f"  by effects of an exact form              {RULES.exact_share:.6f}")
 print(f"chi-square / nu that does for exact forms  {RULES.exact_chi_square:g}")
 print(f"a second effect removes of the residual    {RULES.second_share:g}")
-print(f"  or, beyond all forms of the first        {RULES.beyond_forms_share:g}")
 print(f"indistinguishable within an evidence of    {RULES.evidence_distance:g}")
 print(f"  or, of forms not exact, if they leave    {RULES.form_ratio:g} times as much")
 
@@ -170,9 +169,9 @@ print(f"  or, of forms not exact, if they leave    {RULES.form_ratio:g} times as
 #    * - ``adequate``
 #      - The base passes the limit, and no candidate would gain enough.
 #    * - ``unlisted``
-#      - It does not, and no set explains the misfit either, in the listed form of its laws or in
-#        another, or the prediction error on held-out records does not shrink as it should:
-#        less than half of what a true effect would remove is gone, beyond chance.
+#      - It does not, and no set explains the misfit either, or the prediction error on held-out
+#        records does not shrink as it should: less than half of what a true effect would remove is
+#        gone, beyond chance.
 #    * - ``class``
 #      - A set explains it, and another set of as many effects that explains it too lies within the
 #        distances above. Where even the chosen form leaves more than noise, that of the evidence is
@@ -185,22 +184,11 @@ print(f"  or, of forms not exact, if they leave    {RULES.form_ratio:g} times as
 #      - As before, but one of its values ended at a bound, the interval of a strength contains
 #        nothing, a sensor's zero or gain ended far outside its stated limits, values out of
 #        tolerance stand beside a curve that leaves more than noise, or more than three times the
-#        noise is left. Or it explains the misfit in another form of its law only.
+#        noise is left.
 #    * - ``parameter``
 #      - The set that explains it is no effect but a base parameter beyond its tolerance.
 
 print(", ".join(STATUSES))
-
-# %%
-# *In another form*: no bearing has exactly the friction curve of a list, and no load is quite
-# rigidly coupled. To first order, other forms of a law are sums of curves of the same argument, of
-# harmonics of the same angle, or of rates of the load's acceleration. Where no set explains the
-# misfit, the one effect that leaves nothing but noise beyond them is named in part, however little
-# its listed form removes: each curve counts as an unknown. For how little, and where a law and its
-# special case are both open:
-
-print(f"share of the excess removed at least       {RULES.partial_share:g}")
-print(f"a law may be the form of its special case  {RULES.form_share:g} of its strength")
 
 # %%
 # Two of these rules simplify a set before it is selected. A law gives way to its special case if
