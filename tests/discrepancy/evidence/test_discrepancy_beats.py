@@ -8,6 +8,7 @@ from virtual_rig_cases import BELIEVED, PHASES, RIG, SHORT, effect, true_rig
 
 from experiments.studies.virtual_rig.rig import run_campaign
 from experiments.studies.virtual_rig.runs import Condition
+from pymoo_hdte.discrepancy._evidence.order_lines.evidence import training_data
 from pymoo_hdte.discrepancy._evidence.order_lines.features import measure
 from pymoo_hdte.discrepancy._evidence.order_lines.folded_lines import orders_that_fold
 from pymoo_hdte.discrepancy._evidence.order_lines.parameters import base_parameters
@@ -18,6 +19,8 @@ from pymoo_hdte.discrepancy._evidence.order_lines.prediction import (
 )
 from pymoo_hdte.discrepancy._plan.imagined import imagined_campaign, possible_tests
 from pymoo_hdte.discrepancy._plan.limits import PlanLimits
+from pymoo_hdte.discrepancy._selection.fitting import fit
+from pymoo_hdte.discrepancy._verdicts.drive import _beyond
 from pymoo_hdte.drive import LawAtPort, harmonic_balance
 from pymoo_hdte.drive._effects import MeshStiffnessVariation
 from pymoo_hdte.drive._solve.free_angle import torus_of
@@ -206,3 +209,42 @@ def means_under(weight, present, believed=False):
     still = np.zeros((1, len(at["torus"].orders)), dtype=complex)
     means = [harmonic_balance(row, lead=still, **at).transmission_error[0, 0].real for row in rows]
     return predicted[1] - predicted[0], means[1] - means[0]
+
+
+FASTER = ((600.0, 1000.0), (2000.0, 1000.0))
+"""Speeds in r/min, and rates of the rows in Hz."""
+
+
+@pytest.fixture(scope="module")
+def led_unevenly():
+    """Return the data of a drive whose motor ripples at order 7, at three speeds."""
+    ripple = effect("input", ripple=0.015, ripple_order=7.0, ripple_phase=0.9, ripple_second=6.0)
+    runs = [Condition(rpm, 0.0, rate, 1, "train") for rpm, rate in ((10.0, 20.0), *FASTER)]
+    campaign = run_campaign(true_rig(ripple), BELIEVED, RIG, np.random.default_rng(3), tuple(runs))
+    orders = [1.0, 2.0, 2.02, 7.0, 14.0]
+    return training_data(campaign, measure(campaign, campaign.train, orders))
+
+
+def test_the_input_s_own_harmonics_excite_and_are_not_judged(led_unevenly):
+    """They show at one speed only, where an effect of their order would show at all."""
+    data = led_unevenly
+    _, exciting = _beyond(data, fit(data))
+    assert 21.0 in exciting
+    orders = sorted([*data.features.orders.tolist(), *exciting])
+    records = data.features.records
+    wider = measure(data.campaign, records, orders, only_exciting=exciting)
+    assert wider.only_exciting == exciting
+    place = orders.index(21.0)
+    assert np.abs(wider.conditions.lead[0, place]) > 1e-4
+    of_order = np.concatenate([wider.places(channel)[place] for channel in range(4)])
+    assert not wider.judged[:, of_order].any()
+    assert not wider.values[~wider.judged].any()
+
+
+def test_changes_whitened_by_one_noise_are_whitened_by_another(led_unevenly):
+    data = led_unevenly
+    rippling = LawAtPort("torque_ripple", "input", PeriodicTorque(7.0, 0.9, 0.015))
+    noisier = replace(data, reference_effects=(rippling,))
+    changes = np.random.default_rng(1).normal(size=(2, *data.features.values.shape))
+    white, other = (some.whiten(changes) for some in (data, noisier))
+    np.testing.assert_allclose(noisier.rewhitened(white, data), other, rtol=1e-8, atol=1e-8)
