@@ -58,7 +58,6 @@ def caveats(chi_square_per_degree, *candidates, base=(), values=()):
         data=SimpleNamespace(rules=RULES),
         degrees_of_freedom=FREEDOM,
         enough=lambda chosen: quiet,
-        forms=SimpleNamespace(in_free_form=lambda one: one),
     )
     return reasons_of(search, Hypothesis(fitted, bic=0.0, explained=1.0), None)
 
@@ -115,46 +114,6 @@ def test_a_sensor_far_beyond_what_is_stated_of_it_is_a_caveat(prior, value, doub
     assert bool(caveats(1.0, FRICTION, base=(zero,), values=(value,))) == doubtful
 
 
-@pytest.mark.parametrize(
-    ("zero", "free_leaves_noise", "fewer_do", "doubtful"),
-    [
-        (0.05, True, (), False),
-        (0.9, True, (), True),
-        (0.05, False, (), True),
-        (0.05, True, ("as listed",), True),
-        (0.05, True, ("free",), True),
-    ],
-)
-def test_a_sensor_s_value_is_no_caveat_only_where_the_forms_of_all_laws_explain_it(
-    zero, free_leaves_noise, fewer_do, doubtful
-):
-    """With 0.9, nine deviations, it is no longer at its bound, and as doubtful."""
-    base = (Parameter("output_torque_zero", 0.0, -1.0, 1.0, 0.1, prior=0.1),)
-    fits = {
-        (fewer, free): fit_of(1.0, (FRICTION, LINE), base, (zero if free else 1.0,))
-        for fewer in (False, True)
-        for free in (False, True)
-    }
-    noise = {(False, True)} if free_leaves_noise else set()
-    noise |= {(True, each == "free") for each in fewer_do}
-
-    def place_of(fitted):
-        return next(place for place, one in fits.items() if one is fitted)
-
-    search = SimpleNamespace(
-        data=SimpleNamespace(rules=RULES),
-        degrees_of_freedom=FREEDOM,
-        enough=lambda chosen: True,
-        without=lambda chosen, member: SimpleNamespace(fit=fits[True, False]),
-        forms=SimpleNamespace(
-            in_free_form=lambda fitted: fits[place_of(fitted)[0], True],
-            unexplained_is_noise=lambda fitted: place_of(fitted) in noise,
-        ),
-    )
-    chosen = Hypothesis(fits[False, False], bic=0.0, explained=1.0)
-    assert bool(reasons_of(search, chosen, None)) == doubtful
-
-
 def test_what_is_left_in_multiples_of_the_noise_is_a_caveat():
     limit = RULES.contradicting_chi_square
     assert not caveats(0.99 * limit, LINE)
@@ -191,7 +150,7 @@ def test_the_special_case_that_does_as_well_stands_for_its_law(
     bounded, left, removed, name, monkeypatch
 ):
     """On a linear axis (EMPS) friction fell within less than the slowest speed."""
-    monkeypatch.setattr(choice, "explains_in_any_form", lambda search, one: True)
+    monkeypatch.setattr(choice, "explains_as_listed", lambda search, one: True)
     best, simple = (
         law("stribeck_friction", bounded=bounded),
         law("coulomb_friction", chi_square=left),
@@ -232,7 +191,7 @@ def test_a_special_case_may_need_fewer_values_than_the_law(first, second, nested
 
 
 def test_a_set_that_is_fitted_further_while_others_are_judged_is_judged_itself(monkeypatch):
-    monkeypatch.setattr(choice, "explains_in_any_form", lambda search, one: True)
+    monkeypatch.setattr(choice, "explains_as_listed", lambda search, one: True)
     pair, trial, other, ended = (object() for _ in range(4))
     search = SimpleNamespace(hypotheses=[pair, other, trial])
 
@@ -247,7 +206,7 @@ def test_a_set_that_is_fitted_further_while_others_are_judged_is_judged_itself(m
 
 
 def test_the_smaller_set_of_least_bic_is_left_of_two_members_in_doubt(monkeypatch):
-    monkeypatch.setattr(choice, "explains_in_any_form", lambda search, one: True)
+    monkeypatch.setattr(choice, "explains_as_listed", lambda search, one: True)
     monkeypatch.setattr(choice, "uncertain", lambda fitted, rules: ["first", "second"])
 
     def of(bic, *members):
@@ -337,38 +296,30 @@ def test_sets_far_behind_are_not_finished(size, behind, enough, held, resumed, f
 
 
 @pytest.mark.parametrize(
-    ("rest", "free_form_of_rest", "both", "removed", "earned"),
+    ("rest", "both", "removed", "earned"),
     [
-        (0.6, 0.6, 0.1, 30.0, True),
-        (0.3, 0.3, 0.1, 30.0, False),
-        (0.6, 0.1, 0.1, 30.0, False),
-        (0.6, 0.6, 0.5, 30.0, False),
-        (0.6, 0.6, 0.1, 20.0, False),
+        (0.6, 0.1, 30.0, True),
+        (0.3, 0.1, 30.0, False),
+        (0.6, 0.5, 30.0, False),
+        (0.6, 0.1, 20.0, False),
     ],
 )
-def test_what_brings_a_sensor_s_gain_back_is_earned_also_beside_noise(
-    rest, free_form_of_rest, both, removed, earned
-):
+def test_what_brings_a_sensor_s_gain_back_is_earned_also_beside_noise(rest, both, removed, earned):
     """A friction that grows with the load was left out beside a hysteresis and a gain of 6 sigma.
 
-    Not what no far gain asks for, what another form of the rest does as well, or what removes no
-    more than noise gives.
+    Not what no far gain asks for, or what removes no more than noise gives.
     """
     gain = (Parameter("input_torque_gain", 0.0, -1.0, 1.0, 0.1, prior=0.1),)
     fits = {
         name: fit_of(left, (FRICTION,), gain, (value,))
         for name, left, value in (
             ("rest", 1.0, rest),
-            ("free", 1.0, free_form_of_rest),
             ("both", 1.0 - removed / FREEDOM, both),
         )
     }
     known = FittedSets.__new__(FittedSets)
     known.data, known.degrees_of_freedom = JUDGED, FREEDOM
     known.base = SimpleNamespace(residuals=np.zeros(FREEDOM), values=())
-    known.forms = SimpleNamespace(
-        is_significant=lambda one, rest: False, in_free_form=lambda fitted: fits["free"]
-    )
     known.without = lambda one, member: SimpleNamespace(fit=fits["rest"])
     whole = SimpleNamespace(fit=fits["both"], members=[(LINE,), (FRICTION,)])
     assert known.is_significant(whole) == earned
