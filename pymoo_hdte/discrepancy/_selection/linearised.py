@@ -167,6 +167,7 @@ def _size(
         values / scale,
         np.array([parameter.lower >= 0.0 for parameter in parameters]),
         not further,
+        of_effect=True,
     )
 
 

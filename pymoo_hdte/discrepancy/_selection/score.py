@@ -89,6 +89,8 @@ class Sized:
         stated, and large enough to be visible: see `VISIBLE`. What is smaller is nothing, and
         belongs to the hypothesis without it. For one coefficient, or two of about the same
         curvature.
+    of_effect : bool
+        Whether it is a size of an effect, beyond which those that are ``cut`` have to be visible.
     of_form : bool
         Whether it is by how much the form of a law errs: beyond ``most`` it is another law.
     """
@@ -100,6 +102,7 @@ class Sized:
     at: Vector
     positive: NDArray[np.bool_]
     cut: bool = False
+    of_effect: bool = False
     of_form: bool = False
 
 
@@ -363,7 +366,8 @@ class Integral:
         """Return the least scale of a quantity: as stated, and visible if it is ``cut``.
 
         Visible is a chi-square of `VISIBLE` beyond all free unknowns, and beyond all other
-        quantities that are cut, up to their largest scale.
+        quantities that are cut or sizes of effects, up to their largest scale: friction that falls
+        with speed is none as long as a level can do what its fall does.
         """
         sized = self.hypothesis.sized
         if not sized[number].cut:
@@ -372,7 +376,7 @@ class Integral:
         precision[self.boxed] += self.site_precision[: len(self.boxed)]
         others = [np.arange(self.n_free)]
         for other, (place, part) in enumerate(zip(self.places, sized, strict=True)):
-            if other != number and part.cut:
+            if other != number and (part.cut or part.of_effect):
                 precision[place] = 1.0 / (part.most * self.units[place]) ** 2
                 others.append(np.arange(place.start, place.stop))
         gram, place = self.grams.sum(axis=0), self.places[number]

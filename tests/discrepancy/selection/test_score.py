@@ -249,6 +249,24 @@ def test_something_outside_is_found_where_it_is(rng):
     assert found.ln > score(something).ln + 100.0
 
 
+def test_what_another_size_of_an_effect_can_do_is_not_visible(rng):
+    """Friction that falls a little from the first to the last speed, beside its level."""
+    level = np.full((N, 1), 10.0)
+    falling = level * np.linspace(1.0, 0.9, N)[:, None]
+    fall = sized(falling, 0.0, 50.0, cut=True)
+    beside = replace(sized(level, 0.01, 50.0), of_effect=True)
+    nothing = free(np.empty((N, 0)))
+    alone, both = (
+        Integral(hypothesis(rng.normal(size=N), nothing, fall, *parts)).least[0]
+        for parts in ((), (beside,))
+    )
+    visible = np.sqrt(VISIBLE) / np.linalg.norm(falling)
+    assert alone == pytest.approx(visible)
+    assert both == pytest.approx(
+        np.sqrt(VISIBLE) / np.linalg.norm(falling - falling.mean()), rel=0.05
+    )
+
+
 @pytest.mark.parametrize(("error", "another"), [(0.1, False), (2.0, True)])
 def test_a_law_that_errs_by_more_than_its_form_may_is_another_one(error, another):
     law = np.full(40, 50.0)
