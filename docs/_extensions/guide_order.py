@@ -12,7 +12,7 @@ ORDER = (
     "extend.py",
     "exact_moments.py",
     "steady_state.py",
-    "verdict_rules.py",
+    "verdict_score.py",
 )
 
 

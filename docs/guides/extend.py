@@ -341,8 +341,6 @@ for rule in (ConstantWeight(), LinearDecrease(), EntropyWeight()):
 # To try it without the entry in the catalogue, all it takes is a folder and a campaign in this
 # process:
 
-sys.path[:0] = [str(HERE.parents[1]), str(HERE.parent / "examples")]
-
 from stiffer import run
 
 from experiments.runner.registry import Context

@@ -161,7 +161,7 @@ def _falling(sizes: Sizes) -> list[Guess]:
     """Guess friction that falls with the speed, slowly or before the port moves fast."""
     speed, force = sizes.speed, sizes.force
     unknowns = (
-        unknown("level", 0.0, sizes.largest, force),
+        unknown("level", 0.0, sizes.largest, force, may_vanish=True),
         unknown("excess", 0.0, sizes.largest, 0.3 * force),
         unknown("fading", 0.005 * speed, speed, 0.1 * speed),
     )

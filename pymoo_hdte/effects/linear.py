@@ -57,6 +57,7 @@ register(
         {"force": "torque"},
         "A constant {force} at the {port}: gravity, or a bias.",
         _offset,
+        exact=True,
         constant_one_way=True,
         # Ahead of a gear it is the zero of the torsion.
         behind_gear=True,
@@ -183,6 +184,7 @@ register(
         {"coefficient": "stiffness"},
         "There is a spring at the {port} that the nominal model lacks.",
         _spring,
+        exact=True,
         of_fit={"force": "torque"},
         behind_gear=True,
     )

@@ -48,6 +48,9 @@ class Parameter:
         Whether larger values predict nearly the same: ``upper`` is then no limit of the law.
     phase_of : str
         Name of the amplitude of the line whose phase it is; empty for other unknowns.
+    may_vanish : bool
+        Whether the effect is still itself with zero, and no other effect: a size beside that by
+        which it is named.
     """
 
     name: str
@@ -59,6 +62,7 @@ class Parameter:
     linear: bool = False
     open_above: bool = False
     phase_of: str = ""
+    may_vanish: bool = False
 
     @property
     def line(self) -> str:
@@ -83,10 +87,15 @@ def unknown(
     typical: float,
     linear: bool = False,
     open_above: bool = False,
+    may_vanish: bool = False,
 ) -> Parameter:
     """Return a parameter that starts at its typical size; the arguments as of `Parameter`."""
-    size = abs(typical)
-    return Parameter(name, typical, lower, upper, size, linear=linear, open_above=open_above)
+    return Parameter(
+        *(name, typical, lower, upper, abs(typical)),
+        linear=linear,
+        open_above=open_above,
+        may_vanish=may_vanish,
+    )
 
 
 def wave(

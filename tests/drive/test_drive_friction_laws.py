@@ -7,7 +7,7 @@ import pytest
 from drive_mechanism import drive_mechanism
 from hypothesis import given
 from hypothesis import strategies as st
-from planted_features import known_data, library, measured
+from planted_features import judged, known_data, library, measured
 from quick_campaigns import CONDITIONS, quick_campaign
 from virtual_rig_cases import BELIEVED, RIG, effect
 
@@ -15,8 +15,6 @@ from experiments.studies.virtual_rig.own_effects import with_effects
 from experiments.studies.virtual_rig.rig import draw_rig, run_campaign
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy import analyse
-from pymoo_hdte.discrepancy._selection.fitting import fit
-from pymoo_hdte.discrepancy._selection.verdict import judge
 from pymoo_hdte.drive import LawAtPort, SpeedLoop, harmonic_balance, preset
 from pymoo_hdte.effects.effect import effect_named
 from pymoo_hdte.effects.friction import SMOOTHING_SPEED, NonlinearDrag
@@ -101,7 +99,7 @@ def test_a_planted_power_comes_back_with_its_exponent(exponent, torque, word):
     drags = [one for one in library(data) if one.name == "nonlinear_drag"]
     (planted,) = (one for one in drags if word in one.sentence and one.port == "input")
     data, _ = measured(planted.build((torque, exponent)), np.random.default_rng(5), data)
-    judge_power(judge(data, fit(data), drags), exponent, torque, word)
+    judge_power(judged(data, drags), exponent, torque, word)
 
 
 FORMS = [
@@ -117,9 +115,9 @@ def test_a_form_that_stands_for_another_alone_is_named_with_its_values(name, for
     data = known_data([(speed, load) for speed in speeds for load in (0.0, 10.0, 20.0, 40.0)])
     laws = [one for one in library(data) if (one.name, one.port) == (name, "input")]
     (planted,) = (one for one in laws if one.form == form)
-    assert planted.only_as_form
+    assert planted.instead_of
     data, _ = measured(planted.build(values), np.random.default_rng(5), data)
-    verdict = judge(data, fit(data), laws)
+    verdict = judged(data, laws)
     assert verdict.status == "named"
     assert [one.label for one in verdict.chosen.candidates] == [planted.label]
     fitted = verdict.chosen.fit

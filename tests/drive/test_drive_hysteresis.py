@@ -11,6 +11,7 @@ from pymoo_hdte.drive._solve.angle_equations import AngleEquations
 from pymoo_hdte.drive._solve.free_angle import torus_of
 from pymoo_hdte.drive._solve.linear_systems import stacked, unstacked
 from pymoo_hdte.drive._solve.newton import Place
+from pymoo_hdte.drive._solve.torus import Torus
 from pymoo_hdte.effects.bouc_wen import BoucWen
 from pymoo_hdte.effects.effect import effect_named
 from pymoo_hdte.effects.hysteresis import MaxwellSlip
@@ -245,3 +246,15 @@ def test_only_lugre_changes_with_the_speed():
     slow, fast = (bristles(LOADED, duration) for duration in (1e3, 1e-2))
     assert fast == pytest.approx(slow)
     assert "Dahl's or LuGre's" in effect_named("hysteresis").sentence
+
+
+def test_a_motion_on_few_harmonics_is_where_one_on_more_begins():
+    coefficients = drive_with("resonant", SPRINGS)
+    few = harmonic_balance(coefficients)
+    (highest, *beats), orders = few.torus.highest, few.torus.fundamentals
+    more = Torus(orders, (highest + 4, *(most + 1 for most in beats)))
+    whole = harmonic_balance(coefficients, torus=more)
+    near = harmonic_balance(coefficients, torus=more, start=few, steps=6)
+    assert not harmonic_balance(coefficients, torus=more, steps=6).converged[0]
+    assert near.converged[0]
+    assert near.torsion == pytest.approx(whole.torsion, abs=1e-9 * np.abs(whole.torsion).max())

@@ -89,6 +89,20 @@ def test_where_an_iteration_does_not_end_the_whole_matrix_serves(rng):
     assert system.matrix()[0] @ found == pytest.approx(right, abs=1e-9)
 
 
+def test_a_system_that_is_asked_often_is_factored(rng):
+    """As when derivatives by all values of a fit are found with it."""
+    system = linearised(Torus((1.0, 0.02, 0.35), (3, 2, 1)), rng, remembers=True).row(0)
+    one = Iterated(system, factored(system.core().matrix()[0]))
+    asked = rng.standard_normal((len(system.torus.orders), 2 * len(system.torus.orders)))
+    asked[:, len(system.torus.orders)] = 0.0
+    for right in asked:
+        found = one.solve(right)
+    assert system.matrix()[0] @ found == pytest.approx(right, abs=1e-9)
+    products = one._products
+    one.solve(asked[0])
+    assert one._products == products
+
+
 def test_what_is_not_finite_has_no_solution(rng):
     system = linearised(Torus((1.0, 0.02, 0.35), (2, 1, 1)), rng, remembers=False).row(0)
     one = Iterated(system, factored(system.core().matrix()[0]))

@@ -3,7 +3,7 @@
 from dataclasses import replace
 from types import SimpleNamespace
 
-from pymoo_hdte.discrepancy._selection.reason import ABOVE_NOISE, Reason
+from pymoo_hdte.discrepancy._selection.reason import MORE_MISSING, Reason
 from pymoo_hdte.discrepancy._selection.verdict import Verdict
 
 
@@ -12,7 +12,7 @@ def made_verdict(
 ):
     """Return a verdict whose content leads to a status."""
     if status == "partial" and not reasons:
-        reasons = (Reason(ABOVE_NOISE),)
+        reasons = (Reason.of(MORE_MISSING, numbers={"outside": 0.5}),)
     rivals = ("encoder_delay",) if status == "class" and not equivalent else ()
     verdict = Verdict(
         base,
@@ -31,7 +31,7 @@ def made_verdict(
 
 def with_status(verdict, status, **content):
     """Return an analysed verdict with other content that leads to a status."""
-    reasons = (Reason(ABOVE_NOISE),) if status == "partial" else ()
+    reasons = (Reason.of(MORE_MISSING, numbers={"outside": 0.5}),) if status == "partial" else ()
     content = {"certain": status != "unlisted", "reasons": reasons, **content}
     changed = replace(verdict, **content)
     assert changed.status == status

@@ -18,6 +18,7 @@ from pymoo_hdte.discrepancy._evidence.order_lines.torsion_curve import TorsionPo
 from pymoo_hdte.discrepancy._selection.candidate import Layout
 from pymoo_hdte.discrepancy._selection.fitting import fit
 from pymoo_hdte.discrepancy._selection.hypothesis import Hypothesis
+from pymoo_hdte.discrepancy._verdicts import rattling
 from pymoo_hdte.discrepancy._verdicts.drive_finding import DriveFinding
 from pymoo_hdte.drive import mean_torsion
 from pymoo_hdte.units import ARCSEC, REVOLUTION_PER_MINUTE
@@ -86,7 +87,9 @@ def measured(effects=(), rng=None, data=None, **changes):
     values = data.predict(truth[None], effects)[0]
     if rng is not None:
         noise = rng.standard_normal(values.shape)
-        values = values + np.einsum("rij,rj->ri", data.whiteners, noise)
+        # An error that does not repeat is a motion, and what a channel shows of it the drive's.
+        true_noise = replace(data, reference=truth, reference_effects=tuple(effects)).whiteners
+        values = values + np.einsum("rij,rj->ri", true_noise, noise)
     return replace(data, features=replace(data.features, values=values)), truth
 
 
@@ -125,3 +128,8 @@ def analysed(data, status="unlisted", candidate=None, start=()):
         chosen = Hypothesis(fit(data, (candidate,), np.concatenate([base.values, start])), 0.0, 1.0)
     verdict = made_verdict(status, base, chosen, freedom=len(base.residuals) - len(base.values))
     return DriveFinding(data.campaign, data, verdict, ())
+
+
+def judged(data, candidates):
+    """Return the verdict on planted data."""
+    return rattling._judged_on(data, fit(data), candidates)[1]

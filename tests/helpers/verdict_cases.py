@@ -17,9 +17,8 @@ from pymoo_hdte.discrepancy import read_campaign
 from pymoo_hdte.discrepancy._answers.where import location
 from pymoo_hdte.discrepancy._evidence.order_lines import evidence
 from pymoo_hdte.discrepancy._records.cleaning.findings import RowFindings
-from pymoo_hdte.discrepancy._selection import fitting, verdict
+from pymoo_hdte.discrepancy._selection import fitting
 from pymoo_hdte.discrepancy._selection.candidate import Candidate
-from pymoo_hdte.discrepancy._selection.search import Search
 from pymoo_hdte.discrepancy._verdicts import drive as analysis
 
 
@@ -48,37 +47,6 @@ def one_step(patch):
     patch.setattr(fitting, "minimum", unfinished)
 
 
-def ranking_fits_decide(patch):
-    """Fits that end early, where they are good enough to rank sets, are what sets are judged by."""
-    patch.setattr(Search, "finished", lambda self, one, *starts: one)
-
-
-def no_validation(patch):
-    """The held-out records have no say."""
-    reasons_of = verdict.reasons_of
-
-    patch.setattr(
-        verdict,
-        "reasons_of",
-        lambda search, chosen, held_out_test: reasons_of(search, chosen, None),
-    )
-    patch.setattr(
-        verdict.Verdict, "after_held_out_test", lambda self, *held_out_test, **errors: self
-    )
-
-
-def no_caveats(patch):
-    """Neither the held-out records nor bounds and intervals have a say."""
-    no_validation(patch)
-    patch.setattr(verdict, "reasons_of", lambda search, chosen, held_out_test: [])
-
-
-def one_parameter_at_a_time(patch):
-    """Of base parameters out of tolerance only one is freed."""
-    patch.setattr(Search, "_release_parameters", lambda self: None)
-    patch.setattr(Search, "_release_beside", lambda self, one: None)
-
-
 def rows_are_believed(patch):
     """Rows and stated noise are taken on faith."""
     patch.setattr(
@@ -89,11 +57,6 @@ def rows_are_believed(patch):
 def one_effect_at_a_port(patch):
     """A second effect at the same port is barred."""
     patch.setattr(Candidate, "goes_with", lambda self, other: self.port != other.port)
-
-
-def one_effect(patch):
-    """Sets of several effects are not tried."""
-    patch.setattr(Search, "grow", lambda self: None)
 
 
 def amplitudes_are_never_wrong(patch):

@@ -48,7 +48,7 @@ LOWEST_EXPERIMENTS_FIRST = (
     *("studies.virtual_rig", "studies.fronts", "studies.contest"),
     *("studies.suites.formulas", "studies.suites", "studies.cards"),
     *("studies.robust", "studies.blind.rig", "studies.blind", "studies.measured"),
-    *("studies.reliability", "studies.one_score", "studies", "paper_page"),
+    *("studies.reliability", "studies", "paper_page"),
 )
 OUTSIDE = ("experiments", "tests")
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy._evidence.own_machine import ModelEvidence
 from pymoo_hdte.discrepancy._selection.candidate import Candidate, out_of_tolerance
-from pymoo_hdte.discrepancy._selection.excess import Excess, HeldOutTest
+from pymoo_hdte.discrepancy._selection.excess import Excess
 from pymoo_hdte.discrepancy._selection.fitting import Fit, Response, Unknowns, Vector, built
 from pymoo_hdte.discrepancy._selection.rules import RULES, Rules
 from pymoo_hdte.effects.unknowns import Parameter
@@ -59,11 +59,6 @@ class PredictedRecords:
         """Return no names: no effect shows by itself."""
         return frozenset()
 
-    @property
-    def model_error_share(self) -> float:
-        """Share of the base's excess up to which a residual counts as the model's own error."""
-        return self.rules.model_accuracy**2
-
     def objective(self, candidates: Sequence[Candidate]) -> PredictionObjective:
         """Return the whitened residuals with candidates, and their derivatives."""
         return PredictionObjective(self, candidates)
@@ -79,14 +74,6 @@ class PredictedRecords:
             return np.concatenate([after - before, priors])
 
         return change
-
-    def corrections(self, candidate: Candidate) -> None:
-        """Return None: no forms of laws are known beside those of the library."""
-        return
-
-    def with_noise_of(self, fitted: Fit) -> None:
-        """Return None: the noise does not depend on the model."""
-        return
 
     def rows_of_parts(self) -> list[NDArray[np.int_]]:
         """Return the indices of the residuals of each channel."""
@@ -104,14 +91,6 @@ class PredictedRecords:
         """Return a candidate for each unknown of the base that a fit left at a bound."""
         names = [parameter.name for parameter in self.base]
         return [out_of_tolerance(name, name) for name in at_bounds if name in names]
-
-    def held_out_test(self, base: Fit, fitted: Fit) -> HeldOutTest | None:
-        """Return what the records kept out of the fit say of two fits; None without any."""
-        if self.held_out is None:
-            return None
-        before, after = (self.held_out.left_by(each) for each in (base, fitted))
-        change = after - before
-        return HeldOutTest(float(before @ before), float(after @ after), float(change @ change))
 
     def left_by(self, fitted: Fit) -> Vector:
         """Return the whitened residuals of these records, (n,), by a fit of any records."""

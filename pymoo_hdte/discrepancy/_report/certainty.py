@@ -5,18 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from pymoo_hdte._reports.html import number, percent
-from pymoo_hdte.discrepancy._evidence.order_lines.evidence import PARTS
 from pymoo_hdte.discrepancy._evidence.order_lines.parameters import labels_by_order, words_of
-from pymoo_hdte.discrepancy._report.words import caveats
-from pymoo_hdte.discrepancy._selection.hypothesis import (
-    Hypothesis,
-    adequate,
-    contradicted_parts,
-    explains,
-)
+from pymoo_hdte.discrepancy._selection.hypothesis import Hypothesis, adequate
 from pymoo_hdte.discrepancy._selection.verdict import Verdict
 from pymoo_hdte.discrepancy._verdicts.drive_finding import DriveFinding
-from pymoo_hdte.effects.sentence_blanks import in_words, listed
+from pymoo_hdte.effects.sentence_blanks import in_words
 
 
 def how_sure(finding: DriveFinding) -> str:
@@ -26,12 +19,12 @@ def how_sure(finding: DriveFinding) -> str:
     residual = verdict.base.chi_square / verdict.degrees_of_freedom
     if verdict.status == "adequate":
         return (
-            f"{_probably(verdict)} The misfit of the nominal drive, fitted within its tolerances, "
+            f"{_probably(finding)} The misfit of the nominal drive, fitted within its tolerances, "
             f"has {residual:.2f} times the variance of the noise; up to {limit:.2f} counts as "
             "noise. An effect too small for these records may still be there."
         )
     if verdict.chosen is None:
-        return "Something is certainly missing, but no effect could be tried."
+        return f"{_probably(finding)} No effect comes near it."
     share = percent(verdict.chosen.explained)
     if not verdict.chosen.listed:
         return (
@@ -39,15 +32,10 @@ def how_sure(finding: DriveFinding) -> str:
             "of the encoder takes no part in the motion of the drive."
         )
     if verdict.status == "unlisted":
-        certain = "Something is certainly missing, but what it is remains open."
-        if not verdict.comes_near:
-            most = labels_by_order(verdict.chosen.label, orders)
-            return f"{certain} At most {share} of the misfit is explained, by {most}."
+        nearest = labels_by_order(verdict.chosen.label, orders)
         return (
-            f"{certain} The nearest effect, "
-            f"{labels_by_order(verdict.chosen.label, orders)}, explains {share} of the misfit, "
-            f"{_too_little(finding, verdict.chosen)}."
-            + "".join(f" Against it: {caveat}." for caveat in caveats(verdict, orders))
+            f"{_probably(finding)} But what it is remains open. The nearest effect, {nearest}, "
+            f"explains {share} of the misfit."
         )
     return " ".join(_evidence(finding, verdict.chosen, share))
 
@@ -121,21 +109,6 @@ def _with_more(
     ]
 
 
-def _too_little(finding: DriveFinding, nearest: Hypothesis) -> str:
-    """Return why the nearest effect is not named."""
-    residual = contradicted_parts(finding.data, finding.verdict.base, nearest.fit)
-    if residual.any():
-        parts = [
-            part.replace("_", " ") for part, missed in zip(PARTS, residual, strict=True) if missed
-        ]
-        return f"but not what shows in the {listed(parts)}"
-    rules = finding.verdict.rules
-    if explains(finding.data, nearest, finding.verdict.base, finding.verdict.degrees_of_freedom):
-        return "too little to name it"
-    share = rules.exact_share if nearest.exact else rules.explained_share
-    return f"while naming it takes {100.0 * share:g} %, or a residual within the noise"
-
-
 def _evidence(finding: DriveFinding, chosen: Hypothesis, share: str) -> list[str]:
     verdict = finding.verdict
     after = chosen.fit.chi_square / verdict.degrees_of_freedom
@@ -153,11 +126,6 @@ def _evidence(finding: DriveFinding, chosen: Hypothesis, share: str) -> list[str
     if verdict.equivalent:
         shares = ", ".join(percent(hypothesis.explained) for hypothesis in verdict.equivalent)
         words.append(f"The indistinguishable alternatives explain {shares}.")
-    elif verdict.in_another_form is not None:
-        words.append(
-            f"In another form of its law it explains {percent(verdict.in_another_form)}; no other "
-            "hypothesis reaches the noise in any form."
-        )
     elif others:
         best = min(others, key=lambda hypothesis: hypothesis.bic)
         words.append(_next_best(best, chosen, orders))
@@ -174,20 +142,21 @@ def _evidence(finding: DriveFinding, chosen: Hypothesis, share: str) -> list[str
     if bounded:
         names = ", ".join(bounded)
         words.append(f"At the bound of its range, and therefore uncertain: {names}.")
-    return [_probably(verdict), *words]
+    return [_probably(finding), *words]
 
 
-def _probably(verdict: Verdict) -> str:
-    """Return the probability that a verdict is right, in words."""
+def _probably(finding: DriveFinding) -> str:
+    """Return the probability that a verdict is right, in words, and what decided it."""
+    verdict = finding.verdict
     what = {
         "adequate": "no effect in the library is missing",
         "class": "one of these is the cause",
         "partial": "what is named is missing, though perhaps not all of it",
+        "unlisted": "something is missing",
     }.get(verdict.status, "this is the cause")
-    if verdict.status == "class" and verdict.leaves_more_than_noise:
-        what = "at least one of these is missing"
     whole = int(100.0 * (verdict.probability or 0.0))
-    return f"Probability that {what}: {whole} % (calibrated on test campaigns)."
+    included = ", those held out included" if finding.campaign.held_out else ""
+    return f"Probability that {what}: {whole} %, by all records{included}."
 
 
 def _others(verdict: Verdict, chosen: Hypothesis) -> list[Hypothesis]:

@@ -376,7 +376,7 @@ def alternatives_of(verdict: Verdict) -> list[dict[str, Any]]:
             "chi_square": hypothesis.fit.chi_square,
             "explained": hypothesis.explained,
             "at_bound": list(hypothesis.fit.at_bounds),
-            "equivalent": verdict.is_equivalent(hypothesis),
+            "equivalent": hypothesis in verdict.equivalent,
         }
 
     return [

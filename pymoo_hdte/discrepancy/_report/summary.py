@@ -74,7 +74,7 @@ def _size(row: EffectRow) -> str:
 
 def _probability(probability: float | None) -> Iterable[str]:
     if probability is not None:
-        yield f"Probability: {int(100.0 * probability)} % (calibrated on test campaigns)"
+        yield f"Probability: {int(100.0 * probability)} %"
 
 
 def _prediction_errors(held_out: Any) -> Iterable[str]:

@@ -266,7 +266,11 @@ def _shown(unit: str) -> str:
 def _role(verdict: Verdict, hypothesis: Hypothesis) -> str:
     if hypothesis is verdict.chosen:
         return "nearest, not enough" if verdict.status == "unlisted" else "chosen"
-    return "indistinguishable" if verdict.is_equivalent(hypothesis) else "rejected"
+    if hypothesis in verdict.equivalent:
+        return "indistinguishable"
+    # A verdict is about names: at another order, or in another form, they were not rejected.
+    named = {said.names for said in (verdict.chosen, *verdict.equivalent) if said is not None}
+    return "less likely form" if hypothesis.names in named else "rejected"
 
 
 _MOST_FAULTS = 50

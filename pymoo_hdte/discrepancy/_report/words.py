@@ -24,45 +24,15 @@ Label = Callable[[str], str]
 """From the label of a set of effects to how it is written."""
 
 _SENTENCES: dict[str, Callable[[Reason, Label], str]] = {
-    codes.AT_BOUND: lambda reason, label: (
-        f"{', '.join(reason.names)} of {label(reason.effect)} ended at a bound"
-    ),
-    codes.ZERO_IN_INTERVAL: lambda reason, label: (
-        f"the interval of {label(reason.effect)} contains zero"
-    ),
-    codes.FREED_AT_BOUND: lambda reason, label: (
-        "a base parameter ended at ten times or a tenth of its nominal value"
-    ),
-    codes.SENSOR_AT_BOUND: lambda reason, label: (
-        f"{reason.effect.replace('_', ' ')} ended far outside its stated limits"
-    ),
-    codes.STANDS_FOR_FORM: lambda reason, label: (
-        f"values out of tolerance may stand for the residual of {label(reason.effect)}"
-    ),
-    codes.HARMONIC_OF_ANOTHER: lambda reason, label: (
-        f"{label(reason.effect)} may be a harmonic of {label(*reason.names)}"
-    ),
     codes.NOT_VALIDATED: lambda reason, label: (
         "the prediction error on the held-out records does not shrink as it should"
     ),
     codes.HELD_OUT_ERROR_GROWS: lambda reason, label: (
         f"the prediction error on held-out records grows: {listed(reason.names)}"
     ),
-    codes.ABOVE_NOISE: lambda reason, label: (
-        f"the unexplained residual is {dict(reason.numbers)['times_noise']:.3g} times the noise"
-    ),
-    codes.NEEDS_ANOTHER_FORM: lambda reason, label: (
-        f"{label(reason.effect)} needs another form to explain the residual"
-    ),
-    codes.EXPLAINS_TOO_LITTLE: lambda reason, label: (
-        f"it explains {100.0 * dict(reason.numbers)['share']:.0f} % of the misfit, "
-        "too little to name it alone"
-    ),
-    codes.RICHER_AT_BOUND: lambda reason, label: (
-        f"{label(reason.effect)} fits better, but its {', '.join(reason.names)} ended at a bound"
-    ),
-    codes.AT_TOLERANCE: lambda reason, label: (
-        f"{reason.effect} ended at the bound of its tolerance"
+    codes.MORE_MISSING: lambda reason, label: (
+        "it leaves something, which is outside the library with a probability of "
+        f"{100.0 * dict(reason.numbers)['outside']:.0f} %"
     ),
 }
 

@@ -122,19 +122,10 @@ class Candidate:
         )
         return not (forms or self.places & candidate.places)
 
-    def shares_port_with(self, candidate: Candidate) -> bool:
-        """Tell whether both act at one port, where one may stand for the form of the other."""
-        return (self.acts_at or self.port) == (candidate.acts_at or candidate.port)
-
     def replaces(self, member: Candidate) -> bool:
         """Tell whether it may replace an effect, which is at the same port or has a memory."""
         named = member.name != self.name and member.name in self.instead_of
         return named and (member.port == self.port or member.remembers)
-
-    @property
-    def only_as_form(self) -> bool:
-        """Whether it is tried only instead of another form of the same effect."""
-        return self.name in self.instead_of
 
     def holds(self, special: Candidate) -> bool:
         """Tell whether another effect is a special case of this one, or of this form of it."""
@@ -153,15 +144,6 @@ class Candidate:
             return self.name == member.covered_by
         return (self.name, self.port) == (member.name, member.port)
 
-    def stands_for(self, member: Candidate, any_curve: bool) -> bool:
-        """Tell whether it may replace an effect: as another form, or as a special case at its port.
-
-        With ``any_curve`` any curve may replace another at its port, unless it is `only_as_form`.
-        """
-        curve = any_curve and member.is_curve and self.is_curve and not self.only_as_form
-        special = self.port == member.port and (curve or member.holds(self))
-        return special or self.is_form_of(member)
-
     @property
     def linear(self) -> bool:
         """Whether predictions are close to linear in all its unknowns: parts of lines, and levels.
@@ -175,11 +157,6 @@ class Candidate:
         """Indices of the cosine and sine part of each line among its parameters, shape (2,)."""
         begins = [row for row, parameter in enumerate(self.parameters) if parameter.begins_line]
         return [np.array([row, row + 1]) for row in begins]
-
-    @property
-    def is_curve(self) -> bool:
-        """Whether it is a law without memory, order or exact form: one curve of a motion."""
-        return not (self.exact or self.remembers) and self.order is None
 
     @property
     def unknowns(self) -> int:

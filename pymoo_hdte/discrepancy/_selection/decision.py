@@ -12,6 +12,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.special import logsumexp
 
 Name = tuple[str, str]
@@ -109,10 +110,13 @@ def log_prior(names: Sequence[Name], forms: Sequence[int], outside: bool) -> flo
 def decide(explanations: Sequence[Explanation], priors: Sequence[float]) -> Decision:
     """Return what is said of explanations with their logarithms of prior odds.
 
-    - ``"adequate"``: nothing is missing, and that is sure.
+    - ``"adequate"``: that nothing is missing is likelier than not. Of who claims nothing no more is
+      asked: with `SURE` one clean campaign in twenty would be said to lack something.
     - ``"named"``, ``"parameter"``: one set is sure, and that nothing is outside of the library.
     - ``"class"``: one of a few sets is sure, and something outside is less likely than not.
-    - ``"partial"``: some names are sure, and no more than these.
+    - ``"partial"``: some names are sure, and no more than these. Of values alone that says nothing
+      if something outside is likely: it has no form yet that a value could not imitate.
+    - ``"class"`` again: one of a few names is sure, whatever else there is.
     - ``"unlisted"``: else.
     """
     weights = np.array([item.ln for item in explanations]) + np.asarray(priors)
@@ -132,7 +136,7 @@ def decide(explanations: Sequence[Explanation], priors: Sequence[float]) -> Deci
         marginal = {name: float(share) for name, share in of_names.most_common()}
         return Decision(status, tuple(members), probability, outside, possible, marginal)
 
-    if possible and of_nothing >= SURE:
+    if possible and of_nothing > 0.5:
         return said("adequate", [], of_nothing)
     members = _fewest(ranked, of_sets)
     sure = possible and bool(members) and frozenset() not in members
@@ -145,8 +149,12 @@ def decide(explanations: Sequence[Explanation], priors: Sequence[float]) -> Deci
     if sure and len(members) > 1 and outside < 0.5:
         # It claims that one of these is missing, not that nothing else is.
         return said("class", members, sum(of_sets[names] for names in members))
-    if certain:
+    if any(name != "parameter" for name, _ in certain) or (certain and outside < 0.5):
         return said("partial", [certain], min(of_names[name] for name in certain))
+    if possible and outside < 0.5 and (any_of := _any_of(explanations, shares)):
+        without = sum(shares[[not any_of & item.names for item in explanations]])
+        order = sorted(any_of, key=lambda name: -of_names[name])
+        return said("class", [frozenset({name}) for name in order], 1.0 - float(without))
     return said("unlisted", ranked[:1], 1.0 - of_nothing)
 
 
@@ -160,3 +168,18 @@ def _fewest(
         if total >= SURE:
             return list(ranked[: number + 1])
     return []
+
+
+def _any_of(explanations: Sequence[Explanation], shares: NDArray[np.float64]) -> frozenset[Name]:
+    """Return a few names of which one is surely there; none if that takes too many."""
+    any_of, rest = frozenset[Name](), np.ones(len(shares), dtype=bool)
+    while float(shares[rest].sum()) > 1.0 - SURE:
+        of_names = Counter[Name]()
+        for item, share, remains in zip(explanations, shares.tolist(), rest.tolist(), strict=True):
+            if remains:
+                of_names.update(dict.fromkeys(item.names, share))
+        if not of_names or len(any_of) == MOST_IN_CLASS:
+            return frozenset()
+        any_of |= {of_names.most_common(1)[0][0]}
+        rest = np.array([not any_of & item.names for item in explanations])
+    return any_of

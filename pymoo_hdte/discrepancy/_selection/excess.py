@@ -40,29 +40,9 @@ class Excess:
         """Return for which parts, shape (parts,), the excess is significant."""
         return np.asarray(self.of_parts > self._most_noise(rules))
 
-    def is_noise(self, rules: Rules) -> bool:
-        """Tell whether the excess of each part is that of noise, neither more nor less.
-
-        Too little cannot be seen in a part with fewer than some thirty degrees of freedom.
-        """
-        return bool(np.all(np.abs(self.of_parts) <= self._most_noise(rules)))
-
     def _most_noise(self, rules: Rules) -> NDArray[np.float64]:
         noise = np.sqrt(2.0 * self.degrees_of_freedom.sum(axis=0))
         return np.asarray(rules.false_alarm_deviations * noise)
-
-    @property
-    def worst(self) -> NDArray[np.int_]:
-        """Row of each part's largest excess, shape (parts,); -1 where a part has only one row."""
-        several = np.count_nonzero(self.degrees_of_freedom, axis=0) > 1
-        return np.where(several, np.argmax(self.chi_square, axis=0), -1)
-
-    def without(self, rows: NDArray[np.int_]) -> Excess:
-        """Return the excess without one row of each part; row -1 leaves a part as it is."""
-        chi_square, degrees_of_freedom = self.chi_square.copy(), self.degrees_of_freedom.copy()
-        parts = np.flatnonzero(rows >= 0)
-        chi_square[rows[parts], parts] = degrees_of_freedom[rows[parts], parts] = 0.0
-        return Excess(chi_square, degrees_of_freedom)
 
 
 @dataclass(frozen=True)

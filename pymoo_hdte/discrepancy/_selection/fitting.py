@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pymoo_hdte.discrepancy._selection.candidate import Candidate, Layout
-from pymoo_hdte.discrepancy._selection.excess import Excess, HeldOutTest
 from pymoo_hdte.discrepancy._selection.levenberg_marquardt import SETTLED_SHARE, Minimum, minimum
 from pymoo_hdte.discrepancy._selection.rules import Rules
 from pymoo_hdte.effects.unknowns import Parameter
@@ -192,11 +191,6 @@ class Evidence(Protocol):
         ...
 
     @property
-    def model_error_share(self) -> float:
-        """Share of the base's excess up to which a residual is attributed to no effect."""
-        ...
-
-    @property
     def evident(self) -> frozenset[str]:
         """Names of effects of which one is there, whatever a fit says; empty if none is evident."""
         ...
@@ -209,16 +203,8 @@ class Evidence(Protocol):
         """Return how the residuals of a fit respond to further effects."""
         ...
 
-    def corrections(self, candidate: Candidate) -> Sequence[Any] | None:
-        """Return effects by which the form of a law may err; None where no forms are known."""
-        ...
-
     def rows_of_parts(self) -> list[NDArray[np.int_]]:
         """Return the indices of the residuals of each part of the data."""
-        ...
-
-    def excess(self, fitted: Fit) -> Excess:
-        """Return the excess chi-square of a fit by record and part."""
         ...
 
     def out_of_tolerance(self, at_bounds: Sequence[str], together: bool = False) -> list[Candidate]:
@@ -226,14 +212,6 @@ class Evidence(Protocol):
 
         Those that an effect covers under another name only if several are freed ``together``.
         """
-        ...
-
-    def held_out_test(self, base: Fit, fitted: Fit) -> HeldOutTest | None:
-        """Return what the records kept out of the fit say of two fits; None without any."""
-        ...
-
-    def with_noise_of(self, fitted: Fit) -> Evidence | None:
-        """Return the data with the noise of another model; None where it adds little to theirs."""
         ...
 
 

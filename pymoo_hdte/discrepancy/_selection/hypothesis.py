@@ -76,13 +76,6 @@ class Hypothesis:
         members = [(candidate,) for candidate in self.effects]
         return members + ([self.released] if self.released else [])
 
-    def values_of(self, effects: Sequence[Candidate]) -> NDArray[np.float64]:
-        """Return the fitted values of the base and of some of its effects, in the order of both."""
-        parts = [
-            self.fit.values[place] for candidate, place in self.fit.places if candidate in effects
-        ]
-        return np.concatenate([self.fit.values[: self.fit.n_base], *parts])
-
     @cached_property
     def names(self) -> frozenset[tuple[str, str]]:
         """Name and port of each candidate, where a released value has those of its effect."""
@@ -114,21 +107,6 @@ def down_to_noise(fitted: Fit, degrees_of_freedom: int, rules: Rules) -> bool:
     return fitted.chi_square <= adequate(degrees_of_freedom, rules) * degrees_of_freedom
 
 
-def contradicted_parts(data: Evidence, base: Fit, fitted: Fit) -> NDArray[np.bool_]:
-    """Tell which parts of the data contradict both the base and a fit, shape (parts,).
-
-    If there are several records, the worst of each part is left out: it may be at a resonance,
-    where no form is exact.
-    """
-    before, after, rules = data.excess(base), data.excess(fitted), data.rules
-    worst = after.worst
-    before, after = before.without(worst), after.without(worst)
-    contradicting = rules.contradicting_chi_square - 1.0
-    plain = after.of_parts > contradicting * after.degrees_of_freedom.sum(axis=0)
-    residual = after.of_parts > (1.0 - rules.explained_part_share) * before.of_parts
-    return np.asarray(before.significant(rules) & plain & residual)
-
-
 def bounded_unknowns(fitted: Fit) -> list[tuple[Candidate, dict[str, float]]]:
     """Return for each candidate of a fit its unknowns that ended at a bound, with their values.
 
@@ -148,11 +126,6 @@ def bounded_unknowns(fitted: Fit) -> list[tuple[Candidate, dict[str, float]]]:
     return bounded
 
 
-def is_bounded(fitted: Fit) -> bool:
-    """Tell whether any unknown of the candidates of a fit ended at a bound."""
-    return any(bounded for _, bounded in bounded_unknowns(fitted))
-
-
 def expected_values(fitted: Fit, rules: Rules) -> NDArray[np.float64]:
     """Return the expected values by a fit and its bounds, shape (n_parameters,).
 
@@ -170,107 +143,6 @@ def expected_values(fitted: Fit, rules: Rules) -> NDArray[np.float64]:
     pull = np.where(undetermined, ((lower + upper) / 2.0 - fitted.values) / uniform, 0.0)
     moved = fitted.values + fitted.covariance @ pull
     return np.asarray(np.clip(moved, lower, upper))
-
-
-def gains_enough(hypothesis: Hypothesis, base: Fit, rules: Rules) -> bool:
-    """Tell whether a set of effects reduces the BIC of the base enough to be named."""
-    unknowns = sum(candidate.unknowns for candidate in hypothesis.candidates)
-    gain = base.chi_square - hypothesis.fit.chi_square
-    return bool(gain - unknowns * np.log(len(base.residuals)) >= rules.bic_gain)
-
-
-def explains(data: Evidence, hypothesis: Hypothesis, base: Fit, degrees_of_freedom: int) -> bool:
-    """Tell whether a set of effects explains the misfit of the base, in all parts of the data."""
-    rules, limit = data.rules, adequate(degrees_of_freedom, data.rules)
-    share = rules.exact_share if hypothesis.exact else rules.explained_share
-    limit = max(limit, rules.exact_chi_square) if hypothesis.exact else limit
-    if not gains_enough(hypothesis, base, rules):
-        return False
-    if hypothesis.fit.chi_square <= limit * degrees_of_freedom:
-        return True
-    return (
-        hypothesis.explained >= share and not contradicted_parts(data, base, hypothesis.fit).any()
-    )
-
-
-def misfit_of(hypothesis: Hypothesis, degrees_of_freedom: int) -> float:
-    """Return the chi-square per degree of freedom of a set, at least 1: the unit of gains."""
-    return max(hypothesis.fit.chi_square / degrees_of_freedom, 1.0)
-
-
-def indistinguishable(
-    hypothesis: Hypothesis,
-    chosen: Hypothesis,
-    degrees_of_freedom: int,
-    rules: Rules,
-    overlap: bool = False,
-) -> bool:
-    """Tell whether these data do not separate a hypothesis from the chosen one.
-
-    The true form of an effect may differ from the listed one. Two sets therefore compete if one
-    leaves no more beyond the other than such forms do, unless they differ only by effects of exact
-    form or one is a special case of the other. If the chosen set leaves more than noise,
-    differences of chi-square are compared with what it leaves. The evidence alone decides if an
-    effect stands for several base parameters, or if the hypothesis has a form that only stands in
-    for a listed one. Two laws at one port ``overlap`` if other forms of both are known and the same
-    values are out of tolerance.
-    """
-    if hypothesis.names == chosen.names:
-        return False
-    misfit = misfit_of(chosen, degrees_of_freedom)
-    close = near_by_evidence(hypothesis, chosen, degrees_of_freedom, rules)
-    if len(hypothesis.candidates) != len(chosen.candidates):
-        return close and _stands_for_parameters(hypothesis, chosen)
-    residual = chosen.fit.chi_square - degrees_of_freedom
-    if not (
-        close
-        or hypothesis.exact
-        or chosen.exact
-        or contains(hypothesis, chosen)
-        or contains(chosen, hypothesis)
-    ):
-        increase = hypothesis.fit.chi_square - chosen.fit.chi_square
-        pairs = differing(hypothesis.candidates, chosen.candidates)
-        if any(member.only_as_form for member, _ in pairs):
-            return False
-        same = all(member.shares_port_with(counterpart) for member, counterpart in pairs)
-        accuracy = rules.form_share if overlap and same else rules.form_accuracy
-        exact = all(member.exact and counterpart.exact for member, counterpart in pairs)
-        close = not exact and increase < accuracy**2 * (chosen.removed + residual)
-    if (
-        close
-        or misfit <= adequate(degrees_of_freedom, rules)
-        or (hypothesis.exact and chosen.exact)
-    ):
-        return close
-    return hypothesis.fit.chi_square - degrees_of_freedom < rules.form_ratio * residual
-
-
-def near_by_evidence(
-    hypothesis: Hypothesis, chosen: Hypothesis, degrees_of_freedom: int, rules: Rules
-) -> bool:
-    """Tell whether the evidence does not separate a set from the chosen one."""
-    misfit = misfit_of(chosen, degrees_of_freedom)
-    return hypothesis.fit.evidence - chosen.fit.evidence < rules.evidence_distance * misfit
-
-
-def _stands_for_parameters(hypothesis: Hypothesis, chosen: Hypothesis) -> bool:
-    """Tell whether two sets have equally many members, but different effects.
-
-    Other numbers of parameters beside the same effects are no other answer.
-    """
-    effects, replaced = label_of(hypothesis.effects), label_of(chosen.effects)
-    return (
-        bool(effects and replaced)
-        and effects != replaced
-        and len(hypothesis.members) == len(chosen.members)
-    )
-
-
-def leave_the_same(hypothesis: Hypothesis, chosen: Hypothesis, rules: Rules) -> bool:
-    """Tell whether two sets leave so nearly the same that the same effect must be missing."""
-    difference = abs(hypothesis.fit.chi_square - chosen.fit.chi_square)
-    return difference <= rules.trial_gain * chosen.fit.chi_square
 
 
 def contains(hypothesis: Hypothesis, special: Hypothesis) -> bool:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from pymoo_hdte.discrepancy._selection.candidate import Candidate
 from pymoo_hdte.discrepancy._selection.fitting import Fit
-from pymoo_hdte.discrepancy._selection.score import Free, Linearised, Sized, Vector
+from pymoo_hdte.discrepancy._selection.score import Free, Linearised, Member, Sized, Vector
 from pymoo_hdte.effects.unknowns import Parameter
 
 SHOULDER = 0.1
@@ -26,7 +26,7 @@ LEAST_ERROR, MOST_ERROR = 1e-3, 0.3
 the upper end it is another law."""
 _LEAST_SHARE = 1e-3
 """Least of a further line or level of an effect, as a share of its largest: it may be as good as
-absent. Each size of a law has to be visible: a law without it has another name."""
+absent. Any other size of a law has to be visible: a law without it has another name."""
 _BY_LOGARITHM = 5.0
 """Ratio of a shape's bounds from which on it is known by its logarithm."""
 
@@ -63,12 +63,14 @@ def linearise(
     for k in base:
         if (parameter := fitted.parameters[k]).name in released:
             sized.append(_released(parameter, float(fitted.values[k]), columns[:, [k]]))
+    members = list[Member]()
     for candidate, place in fitted.places:
+        begin = len(free), len(sized)
         for rows in _groups(candidate.parameters):
             parameters = [candidate.parameters[row] for row in rows]
             at = [place.start + row for row in rows]
             if _is_size(parameters[0]):
-                further = rows[0] > 0 and candidate.linear
+                further = parameters[0].may_vanish or (rows[0] > 0 and candidate.linear)
                 sized.append(
                     _size(candidate, parameters, columns[:, at], fitted.values[at], further)
                 )
@@ -85,10 +87,17 @@ def linearise(
             sized.append(
                 Sized(f"form of {candidate.label}", changes, LEAST_ERROR, most, none, none > 0.0)
             )
+        members.append(Member(slice(begin[0], len(free)), slice(begin[1], len(sized))))
     of_free = np.column_stack(free) if free else np.empty((n, 0))
     stated = np.array(priors).reshape(-1, 5).T
     return Linearised(
-        fitted.residuals[:n], channels, Free(of_free, *stated), tuple(sized), noise, shares
+        fitted.residuals[:n],
+        channels,
+        Free(of_free, *stated),
+        tuple(sized),
+        noise,
+        shares,
+        members=tuple(members),
     )
 
 

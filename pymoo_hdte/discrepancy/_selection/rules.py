@@ -51,11 +51,6 @@ def rule(value: float, *, at_least: float | None = None, at_most: float = math.i
     return field(default=value, metadata={"at_least": at_least, "at_most": at_most})
 
 
-def _share(right: int, of: int) -> float:
-    """Return a share by Laplace's rule of succession, which adds one case of either kind."""
-    return (right + 1) / (of + 2)
-
-
 @dataclass(frozen=True, kw_only=True)
 class Rules:
     """Every threshold that decides what is named, refused, flagged or shown as certain.
@@ -77,18 +72,13 @@ class Rules:
     """
 
     # How far sets of effects are searched.
-    promising_share: float = rule(0.2, at_least=0.0, at_most=1.0)
     most_fitted: int = rule(5)
     most_of_one_name: int = rule(2)
     fit_evaluations: int = rule(25)
     trial_gain: float = rule(0.01, at_least=0.0, at_most=1.0)
     outdone_share: float = rule(0.1, at_least=0.0, at_most=1.0)
-    refit_margin: float = rule(5.0, at_least=1.0)
-    second_hope_share: float = rule(0.5, at_least=0.0)
     most_effects: int = rule(3)
-    most_firsts: int = rule(2)
     most_freed_rounds: int = rule(3)
-    most_seconds: int = rule(2)
 
     # When a row is faulty, or a stated noise wrong.
     row_fault_chance: float = rule(1e-3, at_most=1.0)
@@ -135,7 +125,6 @@ class Rules:
     fewest_rattling: int = rule(2)
     least_temperature_spread: float = rule(3.0)
     sweep_gain: float = rule(50.0)
-    changed_noise_ratio: float = rule(1.5, at_least=1.0)
 
     # Machines other than a drive.
     noise_power_ratio: float = rule(2.0, at_least=1.0)
@@ -175,16 +164,8 @@ class Rules:
     nearest_rival_ratio: float = rule(4.0, at_least=1.0)
     offered_share: float = rule(0.05, at_least=0.0, at_most=1.0)
 
-    # How probable is what is said?
-    named_right: float = rule(_share(110, of=112), at_most=1.0)
-    class_right: float = rule(_share(31, of=33), at_most=1.0)
-    partial_right: float = rule(_share(20, of=24), at_most=1.0)
-    adequate_right: float = rule(_share(38, of=38), at_most=1.0)
-
     # What machines other than a drive need.
-    mechanism_remainder: float = rule(0.05, at_least=0.0, at_most=1.0)
     main_share: float = rule(0.5, at_least=0.0, at_most=1.0)
-    parsimony_ratio: float = rule(1.1, at_least=1.0)
     rest_rounds: int = rule(2)
     rest_seconds: int = rule(3)
     fewest_error_periods: float = rule(1.0)
@@ -205,21 +186,13 @@ class Rules:
     partial_share: float = rule(0.75, at_most=1.0)
     explained_part_share: float = rule(0.5, at_least=0.0, at_most=1.0)
     contradicting_chi_square: float = rule(9.0, at_least=1.0)
-    exact_chi_square: float = rule(1.3, at_least=1.0)
     exact_model_accuracy: float = rule(1e-3, at_least=0.0, at_most=1.0)
     model_accuracy: float = rule(0.02, at_least=0.0, at_most=1.0)
 
     # Can the data tell two explanations apart?
     evidence_distance: float = rule(10.0)
-    form_accuracy: float = rule(0.02, at_least=0.0, at_most=1.0)
-    form_share: float = rule(0.05, at_least=0.0, at_most=1.0)
-    form_ratio: float = rule(2.0, at_least=1.0)
-    form_terms: int = rule(6)
 
     # Is there a second effect?
-    second_share: float = rule(0.8, at_least=0.0, at_most=1.0)
-    second_form_share: float = rule(0.05, at_least=0.0, at_most=1.0)
-    beyond_forms_share: float = rule(0.95, at_least=0.0, at_most=1.0)
     vote_change: float = rule(16.0)
     vote_share: float = rule(0.5, at_least=0.0, at_most=1.0)
     certain_deviations: float = rule(1.959964)
@@ -227,11 +200,6 @@ class Rules:
     def __post_init__(self) -> None:
         for threshold in fields(self):
             _check(threshold, getattr(self, threshold.name))
-
-    @property
-    def exact_share(self) -> float:
-        """Least share of the excess that effects of exact form remove: all but their own error."""
-        return 1.0 - self.exact_model_accuracy**2
 
     def explained(self) -> tuple[Rule, ...]:
         """Return every rule with its present value, in words."""

@@ -21,10 +21,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
+from scipy.special import log_ndtr
 from scipy.stats import chi2, ncx2, norm
 
 Vector = NDArray[np.float64]
@@ -105,6 +107,13 @@ alone then makes none as likely as 1 in 20 in 95 % of campaigns; with two standa
 would in half of them. What is smaller is nothing, as far as the data can tell."""
 
 
+class Member(NamedTuple):
+    """Places of what belongs to an effect among the free unknowns and the quantities of a size."""
+
+    free: slice
+    sized: slice
+
+
 @dataclass(frozen=True, eq=False)
 class Linearised:
     """A hypothesis linearised at its fit.
@@ -122,6 +131,11 @@ class Linearised:
         factors are 1.
     shares : ndarray, shape (n,), optional
         Independent values that each residual counts for, at most 1: less where they are correlated.
+    least_noise : ndarray, shape (n_channels,), optional
+        Least factor of the noise of each channel, that of its sensors alone. Else what cancels the
+        data, with all that is known of them, leaves none.
+    members : tuple of Member
+        What belongs to each effect of the hypothesis.
     """
 
     residuals: Vector
@@ -130,6 +144,20 @@ class Linearised:
     sized: tuple[Sized, ...] = ()
     noise: float = float(np.log(2.0))
     shares: Vector | None = None
+    least_noise: Vector | None = None
+    members: tuple[Member, ...] = ()
+
+    def without(self, number: int) -> Linearised:
+        """Return it without one of its effects, to first order."""
+        member, free, residuals = self.members[number], self.free, self.residuals
+        for part in self.sized[member.sized]:
+            residuals = residuals - part.columns @ part.at
+        values = {
+            name: np.delete(getattr(free, name), member.free, axis=-1)
+            for name in ("columns", "lower", "upper", "shoulder", "mean", "deviation")
+        }
+        sized = (*self.sized[: member.sized.start], *self.sized[member.sized.stop :])
+        return replace(self, residuals=residuals, free=Free(**values), sized=sized, members=())
 
     def beside(self, *sized: Sized) -> Linearised:
         """Return it with further quantities of unknown size."""
@@ -264,7 +292,9 @@ class Integral:
         whole *= self.weights[:, None]
         self.grams = np.array([(part := whole[rows]).T @ part for rows in self.rows])
         self.counts = np.array([np.sum(shares[rows]) for rows in self.rows])
-        self.factors = np.ones(n_channels)
+        least = hypothesis.least_noise
+        self.least_log = np.full(n_channels, -np.inf) if least is None else np.log(least)
+        self.factors = np.maximum(np.exp(self.least_log), 1.0)
         self._set_priors()
         self.least = [self._least(number) for number in range(len(sized))]
         self.log_scales = [
@@ -493,6 +523,7 @@ class Integral:
         every = np.column_stack([part.columns for part in places]) / by_row[:, None]
         shared = scaled.T @ every
         followed = covariance @ shared
+        freedom = self._freedom(covariance)
         ends = np.cumsum([0, *(part.columns.shape[1] for part in places)])
         for number, part in enumerate(places):
             place = slice(ends[number], ends[number + 1])
@@ -514,19 +545,22 @@ class Integral:
             if renewed:
                 sizes = vectors @ (projected / (values + np.exp(-2.0 * at)))
                 after = left + columns @ sizes - scaled @ (followed[:, place] @ sizes)
-                gains[number] += self._gain_of_noise(after, covariance)
+                gains[number] += self._gain_of_noise(after, freedom)
         return gains
 
-    def _gain_of_noise(self, left: Vector, covariance: Matrix) -> float:
-        """Return by how much factors that fit residuals (n,), in units of them, are likelier."""
+    def _gain_of_noise(self, left: Vector, freedom: Vector) -> float:
+        """Return by how much factors that fit residuals (n,), in units of them, are likelier.
+
+        ``freedom`` is that of each channel, as of `_freedom`.
+        """
         spread, channels = self.hypothesis.noise, self.hypothesis.channels
         if spread <= 0.0:
             return 0.0
-        freedom = self._freedom(covariance)
         before = np.log(self.factors)
         power = np.zeros_like(before)
         np.add.at(power, channels, left**2)
         after = before + _log_factor(power, freedom, before, spread)
+        after = np.maximum(after, self.least_log)
         of_prior = (before**2 - after**2) / (2.0 * spread**2)
         ratio = after - before
         of_data = -freedom * ratio + 0.5 * power * (1.0 - np.exp(-2.0 * ratio))
@@ -547,10 +581,16 @@ class Integral:
         left = self.grams @ whole @ whole
         freedom = self._freedom(covariance)
         log = np.log(self.factors)
-        log = log + _log_factor(left / self.factors**2, freedom, log, spread)
+        log = np.maximum(
+            log + _log_factor(left / self.factors**2, freedom, log, spread), self.least_log
+        )
         self.factors = np.exp(log)
-        curvature = 2.0 * freedom + 1.0 / spread**2
-        return float(np.sum(-0.5 * (log / spread) ** 2 - np.log(spread) - 0.5 * np.log(curvature)))
+        power = left / self.factors**2
+        root = np.sqrt(2.0 * power + 1.0 / spread**2)
+        # At the least factor the slope is not zero, and half of the Gaussian or less is within.
+        slope = (power - freedom - log / spread**2) / root
+        within = log_ndtr((log - self.least_log) * root + slope) + 0.5 * slope**2
+        return float(np.sum(-0.5 * (log / spread) ** 2 - np.log(spread * root) + within))
 
 
 def _log_factor(power: Vector, freedom: Vector, log: Vector, spread: float) -> Vector:

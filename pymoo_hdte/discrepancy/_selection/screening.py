@@ -17,7 +17,6 @@ from scipy.optimize import lsq_linear
 
 from pymoo_hdte.discrepancy._selection.candidate import Candidate
 from pymoo_hdte.discrepancy._selection.fitting import Evidence, Fit
-from pymoo_hdte.discrepancy._selection.rules import Rules
 from pymoo_hdte.effects.unknowns import HARMONIC_NAMES
 
 _NONE = np.empty((0, 0))
@@ -78,97 +77,10 @@ def screen(data: Evidence, fitted: Fit, candidates: Sequence[Candidate]) -> list
     return sorted(screened, key=lambda effect: -effect.reduction)
 
 
-def shortlist(
-    data: Evidence,
-    fitted: Fit,
-    candidates: Sequence[Candidate],
-    screened_before: Sequence[Screened],
-    excess: float,
-    ill: Sequence[tuple[int, float]],
-) -> list[Screened]:
-    """Return the effects that may remove most of what a fit leaves, in total or in a part of it.
-
-    If none does in total to first order, the best one is returned if it removes enough.
-
-    Parameters
-    ----------
-    data : Evidence
-    fitted : Fit
-    candidates : sequence of Candidate
-        Effects that may be added.
-    screened_before : sequence of Screened
-        The same effects as screened beside another model of these data, or nothing.
-    excess : float
-        Excess chi-square of the fit.
-    ill : sequence of (int, float)
-        Parts of the data that the fit explains badly, with their excess.
-    """
-    rules = data.rules
-    if screened_before:
-        candidates = _not_far_behind(data, fitted, screened_before, excess, ill)
-    screened = screen(data, fitted, candidates) if candidates else []
-    chosen = _shortlist(screened, [effect.reduction for effect in screened], excess, rules)
-    if not chosen:
-        chosen = [
-            effect for effect in screened[:1] if effect.reduction >= rules.promising_share * excess
-        ]
-    for part, of_part in ill:
-        reductions = [effect.by_part[part] for effect in screened]
-        further = _shortlist(screened, reductions, of_part, rules)
-        chosen += [effect for effect in further if effect not in chosen]
-    return chosen
-
-
-def _not_far_behind(
-    data: Evidence,
-    fitted: Fit,
-    screened_before: Sequence[Screened],
-    excess: float,
-    ill: Sequence[tuple[int, float]],
-) -> list[Candidate]:
-    """Return the effects that are worth a screening, which takes a prediction for each start.
-
-    Their signatures beside another fit take no prediction. Effects that move a resonance or take
-    contact away change them, so that only candidates far behind are left out.
-    """
-    share = data.rules.promising_share * data.rules.second_hope_share
-    orthonormal, residual = beyond_parameters(fitted)
-    parts, inward = data.rows_of_parts(), _inward(fitted, orthonormal)
-    rescreened = (
-        _screened(effect.candidate, effect.signatures, orthonormal, residual, parts, inward)
-        for effect in screened_before
-    )
-    return [
-        effect.candidate
-        for effect in rescreened
-        if effect.reduction >= share * excess
-        or any(effect.by_part[part] >= share * of_part for part, of_part in ill)
-    ]
-
-
-def _shortlist(
-    screened: Sequence[Screened], reductions: Sequence[float], excess: float, rules: Rules
-) -> list[Screened]:
-    """Return the best candidates to first order, if they remove enough of an excess."""
-    order = np.argsort([-reduction for reduction in reductions], kind="stable")
-    enough = [screened[k] for k in order if reductions[k] >= rules.second_hope_share * excess]
-    return varied(enough, 1)[: rules.most_seconds]
-
-
 def varied(screened: Sequence[Screened], most: int) -> list[Screened]:
     """Return at most the ``most`` best candidates of each name."""
     names = [effect.candidate.name for effect in screened]
     return [effect for k, effect in enumerate(screened) if names[:k].count(names[k]) < most]
-
-
-def reduced(
-    effect: Screened, orthonormal: NDArray[np.float64], residual: NDArray[np.float64]
-) -> Screened:
-    """Return a screened candidate with what it could remove of another residual (n,).
-
-    Orthonormal directions (n, k) that others can do are projected out of its signatures.
-    """
-    return _screened(effect.candidate, effect.signatures, orthonormal, residual, (), _NONE)
 
 
 def beyond_parameters(fitted: Fit) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -47,7 +47,9 @@ def best_fit(
                 fits.append(again)
         return _least(fits)
 
-    best = follow((_from_nominal(data.base, fits[0]), *starts))
+    # Of several effects all but one come from a set that was fitted so.
+    alone = len(hypothesis.candidates) == 1
+    best = follow([*([_from_nominal(data.base, fits[0])] if alone else []), *starts])
     best = follow(_other_shapes(best, _no_better(best, hypothesis, hypotheses, data.rules)))
     return follow(_other_ends(best, _no_better(best, hypothesis, hypotheses, data.rules)))
 

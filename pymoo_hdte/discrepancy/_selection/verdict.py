@@ -1,51 +1,19 @@
-"""The verdict: whether an effect is missing, which one it is, and how certain the answer is.
-
-The base is fitted within its tolerances first. If it is not adequate, candidates are screened, the
-best few are fitted jointly with the base, and the one with the least BIC is named, provided that it
-removes most of the excess, and at least half of it in each part of the data. Hypotheses that the
-data cannot separate from it are named with it. A second effect must remove most of the first one's
-residual, in total or in the part that the first explains worst. What stands out from all else but
-leaves more than noise is named in part.
-"""
+"""The verdict: whether an effect is missing, which one it is, and how certain the answer is."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from pymoo_hdte.discrepancy._selection import probability
-from pymoo_hdte.discrepancy._selection.candidate import Candidate
-from pymoo_hdte.discrepancy._selection.caveats import (
-    above_noise,
-    explains_in_any_form,
-    other_forms,
-    reasons_of,
-)
-from pymoo_hdte.discrepancy._selection.choice import in_one_law, replaced
-from pymoo_hdte.discrepancy._selection.equivalents import (
-    Answer,
-    answer_of,
-    chosen_of,
-    complete,
-    distinct,
-)
 from pymoo_hdte.discrepancy._selection.excess import HeldOutTest
-from pymoo_hdte.discrepancy._selection.fitted_sets import beyond_stated
-from pymoo_hdte.discrepancy._selection.fitting import Evidence, Fit, fit
+from pymoo_hdte.discrepancy._selection.fitting import Fit
 from pymoo_hdte.discrepancy._selection.hypothesis import Hypothesis, down_to_noise
-from pymoo_hdte.discrepancy._selection.nuisances import (
-    leading_group,
-    leading_nuisances,
-    nuisances_beside,
-)
 from pymoo_hdte.discrepancy._selection.reason import (
     HELD_OUT_ERROR_GROWS,
     NOT_VALIDATED,
     Reason,
 )
 from pymoo_hdte.discrepancy._selection.rules import RULES, Rules
-from pymoo_hdte.discrepancy._selection.screening import screen
-from pymoo_hdte.discrepancy._selection.search import Search
 
 STATUSES = ("adequate", "named", "class", "parameter", "unlisted", "partial")
 EXPLAINED = ("named", "class", "parameter", "partial")
@@ -77,19 +45,11 @@ class Verdict:
     shown_in_held_out : bool
         Whether the records kept out of the fit, if there are any, show what is chosen.
     probability : float or None
-        That it is right: see `probability`. None where it names nothing, or nothing was compared.
-    in_another_form : float or None
-        Share of the misfit that another form of the named law removes, where only such a form
-        explains it.
-    renewed : Evidence or None
-        The data as they were judged, where their noise is not the one that they came with.
+        That it is right, by its posterior.
     seen_beyond : tuple of str
         Names of effects that are seen in what no fit holds, as ripple beyond the band of a motion.
     rivals_beyond : tuple of str
         What would explain as much and is in no fit, as the delay of an encoder.
-    of_bench : Fit or None
-        A fit with nuisances of the bench that have to join the base first: see
-        `leading_nuisances`. The verdict without it says nothing then.
     """
 
     base: Fit
@@ -102,11 +62,8 @@ class Verdict:
     reasons: tuple[Reason, ...] = ()
     shown_in_held_out: bool = True
     probability: float | None = None
-    in_another_form: float | None = None
-    renewed: Evidence | None = None
     seen_beyond: tuple[str, ...] = ()
     rivals_beyond: tuple[str, ...] = ()
-    of_bench: Fit | None = None
 
     @property
     def status(self) -> str:
@@ -139,15 +96,6 @@ class Verdict:
         chosen = self.chosen
         degrees_of_freedom, rules = self.degrees_of_freedom, self.rules
         return chosen is not None and not down_to_noise(chosen.fit, degrees_of_freedom, rules)
-
-    def is_equivalent(self, hypothesis: Hypothesis) -> bool:
-        """Tell whether a set is of the class, or an order or form away from one and as likely."""
-        named = () if self.chosen is None else (self.chosen, *self.equivalent)
-        distance = self.rules.evidence_distance
-        return hypothesis in self.equivalent or any(
-            hypothesis.names == member.names and hypothesis.bic - member.bic < distance
-            for member in named
-        )
 
     def has_reason(self, code: str) -> bool:
         """Tell whether any of its reasons has a code."""
@@ -195,163 +143,4 @@ class Verdict:
 
     def with_caveats(self, reasons: Sequence[Reason]) -> Verdict:
         """Return it with further reasons, with which no status is unqualified."""
-        sure, shares = self.probability, probability.experience_of(self.rules)
-        qualified = replace(self, reasons=(*self.reasons, *reasons))
-        if sure and qualified.status != self.status:
-            sure *= shares[qualified.status] / shares[self.status]
-        return replace(qualified, probability=sure)
-
-
-def judge(
-    data: Evidence,
-    base: Fit,
-    candidates: Sequence[Candidate],
-    known: Sequence[Hypothesis] = (),
-    go_on: bool = False,
-) -> Verdict:
-    """Return the verdict on a fitted base, by the rules of its data.
-
-    If sets are ``known`` from nearly the same data, only these are compared; where the best
-    is a single effect that does not explain them in any form, the search may ``go_on``.
-    """
-    rules = data.rules
-    degrees_of_freedom = len(base.residuals) - len(base.values)
-    possible = [] if known else [candidate for candidate in candidates if candidate.nuisance]
-    candidates = [candidate for candidate in candidates if not candidate.nuisance]
-    candidates = [*candidates, *data.out_of_tolerance(base.at_bounds)]
-    quiet = down_to_noise(base, degrees_of_freedom, rules) and not data.evident
-    # A sensor far from what is stated of it may have taken what is missing.
-    quiet = quiet and not beyond_stated(base, rules).any()
-    # Screening is slow, and known sets need none unless the base itself may be adequate.
-    searched = [candidate for candidate in candidates if not candidate.instead_of]
-    every = screen(data, base, [*searched, *possible]) if quiet or not known else []
-    screened = [effect for effect in every if not effect.candidate.nuisance]
-    nuisances = [effect for effect in every if effect.candidate.nuisance]
-    gain = max((screening.reduction for screening in screened), default=0.0)
-    if quiet and gain < rules.single_effect_gain:
-        clean = probability.of_nothing(screened, len(base.residuals), rules)
-        of_bench = leading_nuisances(Search(data, base, searched, screened, nuisances=nuisances))
-        return Verdict(
-            base, None, True, (), (), degrees_of_freedom, rules,
-            probability=clean, of_bench=of_bench,
-        )  # fmt: skip
-    if not screened and not known:
-        return Verdict(base, None, False, (), (), degrees_of_freedom, rules)
-    forms = [candidate for candidate in candidates if candidate.only_as_form]
-    search = Search(data, base, searched, screened, forms, nuisances)
-    if known:
-        search.resume(known)
-        search.leave_out_lacking()
-        chosen = chosen_of(search)
-        alone = len(chosen.members) == 1
-        if not (go_on and alone) or explains_in_any_form(search, chosen):
-            return _verdict(search, answer_of(search, chosen, ()))
-        screened = screened or screen(data, base, searched)
-        search = Search(data, base, searched, screened, forms)
-        search.resume(known, go_on=True)
-    else:
-        if of_bench := leading_group(search):
-            return _with_nuisances(search, of_bench)
-        search.singles()
-        if of_bench := leading_nuisances(search):
-            return _with_nuisances(search, of_bench)
-        search = _renewed_search(search)
-        if of_bench := nuisances_beside(search, search.hypotheses[0]):
-            return _with_nuisances(search, of_bench)
-    search.grow()
-    search.leave_out_lacking()
-    chosen = chosen_of(search)
-    completed = set[frozenset[tuple[str, str]]]()
-    while len(chosen.members) > 1 and chosen.names not in completed:
-        completed.add(chosen.names)
-        complete(search, chosen)
-        chosen = chosen_of(search)
-    if replaced(search, chosen, [candidate for candidate in candidates if candidate.instead_of]):
-        chosen = chosen_of(search)
-    if not known and (of_bench := nuisances_beside(search, chosen)):
-        return _with_nuisances(search, of_bench)
-    verdict = _verdict(search, answer_of(search, chosen, search.screened))
-    return verdict if search.data is data else replace(verdict, renewed=search.data)
-
-
-def _with_nuisances(search: Search, of_bench: Fit) -> Verdict:
-    """Return that nothing is certain before nuisances have joined the base."""
-    freedom, rules = search.degrees_of_freedom, search.data.rules
-    return Verdict(search.base, None, False, (), (), freedom, rules, of_bench=of_bench)
-
-
-def _renewed_search(search: Search) -> Search:
-    """Return the search with the noise of the best single effect, if that is then all there is.
-
-    With less noise than there is, further effects would be sought for what is none. A wrong effect
-    that lets much noise through may hide others in it, but hardly as much as noise in each part. An
-    effect beside which sensors are far from what is stated is not all, and a base that needs no
-    effect with that noise says nothing of this one.
-    """
-    data, best = search.data, search.hypotheses[0]
-    explained = best.listed and best.explained >= data.rules.explained_share
-    renewed = data.with_noise_of(best.fit) if explained and not search.enough(best) else None
-    if renewed is None or not _is_all(renewed, fit(renewed, best.candidates, best.fit.values)):
-        return search
-    base, candidates = fit(renewed, start=search.base.values), search.candidates
-    if down_to_noise(base, search.degrees_of_freedom, data.rules):
-        return search
-    nuisances = [effect.candidate for effect in search.nuisances]
-    every = screen(renewed, base, [*candidates, *nuisances])
-    screened = [effect for effect in every if not effect.candidate.nuisance]
-    again = Search(
-        renewed, base, candidates, screened, search.forms_only,
-        [effect for effect in every if effect.candidate.nuisance],
-    )  # fmt: skip
-    again.resume(search.hypotheses, go_on=True)
-    renewed_best = again.hypotheses[0]
-    same = renewed_best.label == best.label and _is_all(renewed, renewed_best.fit)
-    return again if same and not again.held_by_sensors(renewed_best) else search
-
-
-def _is_all(data: Evidence, fitted: Fit) -> bool:
-    """Tell whether a fit leaves noise, as much as there is in each part of the data."""
-    degrees_of_freedom = len(fitted.residuals) - fitted.n_base
-    noise = down_to_noise(fitted, degrees_of_freedom, data.rules)
-    return noise and data.excess(fitted).is_noise(data.rules)
-
-
-def _verdict(search: Search, answer: Answer) -> Verdict:
-    """Return the verdict: an answer with its reasons, status and probability."""
-    data, rules, degrees_of_freedom = search.data, search.data.rules, search.degrees_of_freedom
-    chosen, rivals, certain, foreign, in_part = answer
-    equivalent = list(rivals)
-    held_out_test = data.held_out_test(search.base, chosen.fit)
-    shown = held_out_test is None or held_out_test.counts(rules)
-    reasons = reasons_of(search, chosen, held_out_test) + other_forms(search, chosen)
-    if in_part:
-        reason = above_noise(chosen.fit.chi_square / degrees_of_freedom)
-        reasons += [reason] if reason not in reasons else []
-    if (certain and not foreign) or in_part:
-        # The rules of earning may pass over a set for which the evidence speaks: both are told.
-        equivalent += in_one_law(search, chosen)
-        equivalent += probability.likelier(
-            chosen, equivalent, search.hypotheses, degrees_of_freedom
-        )
-    equivalent = distinct(chosen, equivalent)
-    known = (certain or in_part) and not search.lacks_evident(chosen)
-    verdict = Verdict(
-        search.base,
-        chosen,
-        known,
-        tuple(hypothesis for hypothesis in search.hypotheses if hypothesis is not chosen),
-        tuple(equivalent),
-        degrees_of_freedom,
-        rules,
-        tuple(reasons),
-        shown,
-        in_another_form=search.forms.share_in_another_form(chosen) if foreign else None,
-    )
-    if verdict.status == "unlisted":
-        verdict = replace(verdict, equivalent=())
-    others = verdict.equivalent
-    compared = (chosen, *others) if foreign else search.hypotheses
-    # A class that is not all is no more certain than a name in part.
-    like = "partial" if in_part and others else verdict.status
-    sure = probability.of_names(like, chosen, others, compared, degrees_of_freedom, rules)
-    return replace(verdict, probability=sure)
+        return replace(self, reasons=(*self.reasons, *reasons))

@@ -32,10 +32,8 @@ from pymoo_hdte.discrepancy._records.records import RunningRecord
 from pymoo_hdte.discrepancy._selection.candidate import Candidate
 from pymoo_hdte.discrepancy._selection.fitting import Fit, fit
 from pymoo_hdte.discrepancy._selection.rules import RULES, Rules
-from pymoo_hdte.discrepancy._selection.verdict import Verdict, judge
 from pymoo_hdte.discrepancy._verdicts import rattling
 from pymoo_hdte.discrepancy._verdicts.drive_finding import DriveFinding
-from pymoo_hdte.discrepancy._verdicts.validation_drive import validate_drive
 from pymoo_hdte.drive import harmonic_balance
 from pymoo_hdte.drive._solve.free_angle import torus_of
 from pymoo_hdte.effects.effect import effect_named
@@ -111,15 +109,7 @@ def examine_drive(campaign: Campaign, rules: Rules = RULES) -> DriveFinding:
         # Where no fit follows the harmonics, as in a record that then has no steady state, the
         # lower orders may still be explained.
         judged, harmonics = rattling.judged(data, base, _candidates), []
-    data, listed, verdict = judged
-    data, verdict = _judged_again(verdict, data, listed)
-    finding = DriveFinding(campaign, data, verdict, (*unexpected, *harmonics), rows)
-    if verdict.accepted is verdict.base or (validation := validate_drive(finding)) is None:
-        return finding
-    worse = {name.replace("_", " "): growth for name, growth in validation.growths.items()}
-    return replace(
-        finding, verdict=verdict.after_held_out_test(worse=worse, condemned=validation.condemns)
-    )
+    return DriveFinding(campaign, *judged, (*unexpected, *harmonics), rows)
 
 
 def _harmonics(data: Data, base: Fit) -> list[float]:
@@ -180,24 +170,6 @@ def _check_steady(data: Data) -> None:
         names = [effect.name for effect in believed.effects]
         allowed = f"effects with which the drive has a steady motion in every record; not in {lost}"
         raise InvalidInput("believed.effects", names, allowed)
-
-
-def _judged_again(verdict: Verdict, data: Data, listed: list[Candidate]) -> tuple[Data, Verdict]:
-    """Judge again if the named effect changes the noise.
-
-    From a single effect that then leaves more than noise the search goes on: what resonances hid
-    beside it may show.
-    """
-    chosen = verdict.chosen
-    if chosen is None or chosen.explained < data.rules.explained_share:
-        return data, verdict
-    renewed = data.with_noise_of(chosen.fit)
-    if renewed is None:
-        return data, verdict
-    known = (chosen, *verdict.alternatives)
-    base = fit(renewed, start=verdict.base.values)
-    again = judge(renewed, base, listed, known, go_on=True)
-    return (data, verdict) if again.chosen is None else (renewed, again)
 
 
 def _candidates(data: Data, base: Fit) -> list[Candidate]:

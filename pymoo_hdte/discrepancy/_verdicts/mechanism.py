@@ -204,7 +204,7 @@ def examined(
     seen = position_orders(sensors, base)
     of_fit = partial(candidates or _candidates, sensors, base, seen)
     data, every, best = with_unexplained_residual(sensors, base, of_fit)
-    return data, judged(sensors, data, every, best)
+    return data, judged(sensors, data, every, best and best.fit)
 
 
 def _candidates(

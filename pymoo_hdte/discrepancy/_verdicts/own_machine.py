@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
 from pymoo_hdte.checks import InvalidInput, one_of
+from pymoo_hdte.discrepancy._evidence.own_errors import RecordErrors
 from pymoo_hdte.discrepancy._evidence.own_machine import ModelEvidence
 from pymoo_hdte.discrepancy._evidence.own_records import PredictedRecords
+from pymoo_hdte.discrepancy._selection.decided import verdict_of
 from pymoo_hdte.discrepancy._selection.fitting import fit
+from pymoo_hdte.discrepancy._selection.growth import Growth
 from pymoo_hdte.discrepancy._selection.rules import RULES, Rules
-from pymoo_hdte.discrepancy._selection.verdict import Verdict, judge
+from pymoo_hdte.discrepancy._selection.verdict import Verdict
 from pymoo_hdte.discrepancy._verdicts.prediction_error import DEVIATIONS, PredictionError
 
 _ROLES = ("train", "held_out")
@@ -129,17 +132,17 @@ def examine_machine(machine: Machine, rules: Rules = RULES) -> MachineFinding:
     kept_out = PredictedRecords(machine.evidence(held_out), rules=rules) if held_out else None
     data = PredictedRecords(machine.evidence(train), kept_out, rules)
     base = fit(data)
-    verdict = judge(data, base, data.model.candidates(base))
+    # Those kept out of fits count by their predictive density, with the same coefficients.
+    every = PredictedRecords(machine.evidence(machine.records), rules=rules) if held_out else data
+    of_every = fit(every, start=base.values)
+    growth = Growth(every, of_every, data.model.candidates(base), RecordErrors(every, of_every))
+    growth.grow()
+    verdict = verdict_of(data, *growth.decide(), base)
     title = str(getattr(machine, "title", type(machine).__name__))
     names, held_out_names = (
         tuple(record.name for record in records) for records in (train, held_out)
     )
-    finding = MachineFinding(title, names, held_out_names, data, verdict)
-    errors = held_out_errors(finding)
-    if errors is None or verdict.accepted is verdict.base:
-        return finding
-    verdict = verdict.after_held_out_test(worse=errors.growths, condemned=errors.overall.worse)
-    return replace(finding, verdict=verdict)
+    return MachineFinding(title, names, held_out_names, data, verdict)
 
 
 def held_out_errors(finding: MachineFinding) -> HeldOutErrors | None:

@@ -15,16 +15,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pymoo_hdte.discrepancy._evidence.order_lines.evidence import Data
+from pymoo_hdte.discrepancy._evidence.order_lines.law_errors import LawErrors
 from pymoo_hdte.discrepancy._selection.candidate import Candidate, Layout
+from pymoo_hdte.discrepancy._selection.decided import verdict_of
 from pymoo_hdte.discrepancy._selection.fitting import Fit, fit
+from pymoo_hdte.discrepancy._selection.growth import MOST_MEMBERS, Growth
 from pymoo_hdte.discrepancy._selection.rules import RULES, Rules
-from pymoo_hdte.discrepancy._selection.verdict import EXPLAINED, Verdict, judge
+from pymoo_hdte.discrepancy._selection.verdict import Verdict
 from pymoo_hdte.effects.effect import effect_named, known_effects
 
 SUMMED = 8
 """Most lines whose sums and differences a steady motion is taken to have."""
 LEAKED = 0.01
 """Share of a record's strongest line, in power, up to which a line may be what that one leaks."""
+MOST_RENEWED = MOST_MEMBERS + 1
+"""Times that the noise may be renewed: with each effect that is found, and once with another form.
+Sets that take turns in being the likeliest end it."""
 SAME_ORDER = 0.6
 """Cycles of an output turn up to which a line is of a steady order, which may lie between lines.
 
@@ -34,13 +40,12 @@ An order half-way between two lines shows in both.
 
 def judged(
     data: Data, base: Fit, candidates_of: Callable[[Data, Fit], list[Candidate]]
-) -> tuple[Data, list[Candidate], Verdict]:
-    """Return the verdict on some data, with the data and the candidates that it is of.
+) -> tuple[Data, Verdict]:
+    """Return the verdict on some data, with the data that it is of.
 
     If sweeps speak for a clearance, records in which it would rattle are left out. If they speak
-    for another effect, and the verdict on all records leaves more than noise, the others are judged
-    alone, too: that verdict is taken if it names a clearance beside another effect and leaves no
-    more than noise.
+    for another effect, and the verdict on all records is not sure, the others are judged alone:
+    that verdict is taken if it names a clearance beside another effect.
 
     Parameters
     ----------
@@ -54,59 +59,64 @@ def judged(
     leading = leading_sweep_effect(data, base, candidates)
     loaded = data if leading is None else data.loaded
     if loaded is data or leading is None:
-        return _judged_from(data, base, candidates, candidates_of)
+        return _judged_on(data, base, candidates)
+    of_loaded = fit(loaded)
     if effect_named(leading).rattles:
-        return _judged_on(loaded, candidates_of)
-    overall = _judged_from(data, base, candidates, candidates_of)
-    if overall[-1].status == "unlisted" or overall[-1].leaves_more_than_noise:
-        again = _judged_on(loaded, candidates_of)
+        return _judged_on(loaded, of_loaded, candidates_of(loaded, of_loaded))
+    overall = _judged_on(data, base, candidates)
+    if overall[-1].status in ("unlisted", "partial"):
+        again = _judged_on(loaded, of_loaded, candidates_of(loaded, of_loaded))
         if _explains_by_a_clearance(again[-1]):
             return again
     return overall
 
 
-def _judged_on(
-    data: Data, candidates_of: Callable[[Data, Fit], list[Candidate]]
-) -> tuple[Data, list[Candidate], Verdict]:
-    """Return data, candidates and the verdict on all these data."""
-    base = fit(data)
-    return _judged_from(data, base, candidates_of(data, base), candidates_of)
+def _judged_on(data: Data, base: Fit, candidates: list[Candidate]) -> tuple[Data, Verdict]:
+    """Return the verdict on all these data, with the data on the bench that they show.
 
-
-def _judged_from(
-    data: Data,
-    base: Fit,
-    candidates: list[Candidate],
-    candidates_of: Callable[[Data, Fit], list[Candidate]],
-) -> tuple[Data, list[Candidate], Verdict]:
-    """Return data, with bench and noise as they were judged with, candidates and the verdict.
-
-    Nuisances that lead join the bench, until none does.
+    The likelihood of all records is that of those that are fitted, times the predictive density of
+    those that are kept out of fits, with the same coefficients.
     """
-    verdict = judge(data, base, candidates)
-    while (leading := verdict.of_bench) is not None:
-        begin = leading.values[: leading.n_base]
-        for nuisance, place in leading.places:
-            if nuisance.nuisance:
-                values = leading.values[place]
-                data, begin = data.on_bench(nuisance, values.tolist()), np.append(begin, values)
-        base = fit(data, start=begin)
-        candidates = candidates_of(data, base)
-        verdict = judge(data, base, candidates)
-    renewed = verdict.renewed
-    return renewed if isinstance(renewed, Data) else data, candidates, verdict
+    every = data.with_held_out
+    of_every = base if every is data else fit(every, start=base.values)
+    known, growth = _grown(every, of_every, candidates)
+    decision, sets = growth.decide()
+    likeliest, bench = sets[0].fit, data
+    if known is not every:
+        bench = replace(data, reference=known.reference, reference_effects=known.reference_effects)
+    for nuisance, place in likeliest.places:
+        if nuisance.nuisance:
+            bench = bench.on_bench(nuisance, likeliest.values[place].tolist())
+    return bench, verdict_of(bench, decision, sets, base if bench is data else None)
+
+
+def _grown(data: Data, base: Fit, candidates: Sequence[Candidate]) -> tuple[Data, Growth]:
+    """Return the sets of effects grown with the noise of the likeliest one, and the data with it.
+
+    An effect that moves a resonance changes what an error that does not repeat brings to each
+    channel, and one that creeps leaves what fades. Where the likeliest set does so, the sets are
+    compared anew: without it, what creeps seemed to be further effects beside a hysteresis.
+    """
+    likely: Sequence[Fit] = ()
+    for renewals in range(MOST_RENEWED + 1):
+        growth, renewed = Growth(data, base, candidates, LawErrors(data, base)), None
+        for fitted in growth.steps(likely):
+            renewed = data.with_noise_of(fitted) if renewals < MOST_RENEWED else None
+            if renewed is not None:
+                break
+        likely = growth.likeliest
+        if renewed is None:
+            break
+        data, base = renewed, fit(renewed, start=base.values)
+    return data, growth
 
 
 def _explains_by_a_clearance(verdict: Verdict) -> bool:
-    """Tell whether a clearance beside another effect, perhaps of a class, leaves only noise."""
-    if verdict.status not in EXPLAINED or verdict.leaves_more_than_noise:
-        return False
-    named = [
-        hypothesis for hypothesis in (verdict.chosen, *verdict.equivalent) if hypothesis is not None
-    ]
-    several = (hypothesis.effects for hypothesis in named if len(hypothesis.effects) > 1)
-    listed = {member.name for effects in several for member in effects if member.listed}
-    return any(effect_named(name).rattles for name in listed)
+    """Tell whether a clearance beside another effect is sure, perhaps as one of a class."""
+    sure = verdict.status in ("named", "class")
+    named = (verdict.chosen, *verdict.equivalent) if sure else ()
+    several = [item.effects for item in named if item is not None and len(item.effects) > 1]
+    return any(effect_named(member.name).rattles for effects in several for member in effects)
 
 
 def is_heard(

@@ -7,9 +7,10 @@ scale that nobody stated, and with them whatever is a torque by motion.
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pymoo_hdte.discrepancy._evidence.order_lines.parameters import READING
-from pymoo_hdte.discrepancy._selection.fitted_sets import from_stated
+from pymoo_hdte.discrepancy._selection.candidate import Layout
 from pymoo_hdte.discrepancy._selection.fitting import Fit
 from pymoo_hdte.discrepancy._selection.rules import Rules
 from pymoo_hdte.effects.unknowns import Parameter
@@ -20,7 +21,7 @@ _OF_TORQUES = ("N", "kg")
 
 def beyond_limits(fitted: Fit, rules: Rules) -> list[tuple[Parameter, float]]:
     """Return gains and zeros that plainly contradict their stated limits, with values; SI."""
-    contradicted = np.flatnonzero(from_stated(fitted) ** 2 >= rules.contradicting_chi_square)
+    contradicted = np.flatnonzero(_from_stated(fitted) ** 2 >= rules.contradicting_chi_square)
     known = [(fitted.parameters[place], float(fitted.values[place])) for place in contradicted]
     return [(parameter, value) for parameter, value in known if parameter.name in READING]
 
@@ -44,3 +45,12 @@ def shares_scale(unit: str) -> bool:
 
 def _is_gain(sensor: Parameter) -> bool:
     return sensor.name.endswith("_gain")
+
+
+def _from_stated(fitted: Fit) -> NDArray[np.float64]:
+    """Return how far parameters are from what is stated of them, in units of its deviation.
+
+    Shape (n_parameters,); zero where nothing is stated.
+    """
+    stated = Layout(fitted.parameters)
+    return np.asarray((fitted.values - stated.array("start")) / stated.array("prior"))

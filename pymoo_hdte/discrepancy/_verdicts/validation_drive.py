@@ -119,11 +119,6 @@ class Validation:
             if error.worse
         }
 
-    @property
-    def condemns(self) -> bool:
-        """Whether the correction made the leading channel, or all of them together, worse."""
-        return self.channels[self.leading].worse or self.overall.worse
-
     def as_dict(self) -> dict[str, Any]:
         """Return the entry in the verdict as plain values, the transmission error first."""
         metrics = None

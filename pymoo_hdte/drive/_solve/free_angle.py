@@ -98,7 +98,7 @@ def harmonic_balance(
         Largest change of the torsion, and of the energy, relative to their sizes, at which the
         iteration ends.
     start : SteadyMotion, optional
-        Nearby cases, a row each, to begin from; ignored if their torus is another.
+        Nearby cases, a row each, to begin from.
     steps : int
         Most steps of Newton's method; a row that would need more, or that does not halve what is
         left in fifteen of them, has not converged.
@@ -137,8 +137,7 @@ def harmonic_balance(
     torus = torus_of(coefficients) if torus is None else torus
     if lead is not None and lead.shape != (n, len(torus.orders)):
         raise InvalidInput("lead", lead.shape, f"of shape {(n, len(torus.orders))}")
-    if start is not None and not np.array_equal(start.torus.orders, torus.orders):
-        start = None
+    start = None if start is None else start.on(torus)
     solvers = []
     for begin in range(0, max(n, 1), _ROWS_AT_ONCE):
         rows = slice(begin, begin + _ROWS_AT_ONCE)

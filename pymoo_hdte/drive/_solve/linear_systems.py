@@ -23,6 +23,11 @@ Vector = NDArray[np.float64]
 _RESIDUAL = 1e-5
 """Share of the right side that an iteration may leave: so steps shrink faster than they have to to
 go on with the system of another place (to a tenth)."""
+_WORTH = 6
+"""Unknowns for each product with a signal from which on the factored matrix has cost less: beside a
+hysteresis one of 256 unknowns took as long as 36 products, one of 426 as long as 70."""
+_LARGEST = 1500
+"""Most unknowns of a matrix that takes the place of an iteration: 18 MB for each record."""
 _MOST = (40, 5)
 """Directions kept by an iteration until it restarts, and the largest number of restarts."""
 
@@ -109,12 +114,14 @@ class Iterated:
             [row.torus.of_core, row.torus.of_core + len(self._alone)]
         )
         self._whole: Factored | None = None
+        self._products = 0
 
     def solve(self, right: Vector) -> Vector:
         """Return the unknowns (2 H,) for a right side (2 H,) without imaginary part of the mean.
 
-        By the whole matrix where the iteration does not end: a poor step could be taken for one
-        that has arrived.
+        By the whole matrix where the iteration does not end, as a poor step could be taken for one
+        that has arrived, and where it has cost as much before: derivatives by all values of a fit
+        are found with the same system.
         """
         if not np.isfinite(np.linalg.norm(right)):
             return np.full_like(right, np.nan)
@@ -125,13 +132,15 @@ class Iterated:
             unknowns, failed = gmres(
                 whole, right, rtol=_RESIDUAL, restart=restart, maxiter=most, M=preconditioner
             )
-            if not failed:
+            worth = _WORTH * self._products > size <= _LARGEST
+            if not failed and not worth:
                 return np.asarray(unknowns)
             self._whole = factored(self._row.matrix()[0])
         return self._whole.solve(right)
 
     def _times(self, values: Vector) -> Vector:
         """Return the product of the derivative and values (2 H,)."""
+        self._products += 1
         row, torus = self._row, self._row.torus
         phasors = unstacked(values[np.newaxis])
         signal = torus.signal(phasors)

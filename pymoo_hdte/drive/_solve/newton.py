@@ -26,11 +26,11 @@ from pymoo_hdte.drive._solve.steady_motion import Phasors
 
 _NEARLY_CONSTANT = 0.02
 """Relative variation of the mesh stiffness up to which a step uses its mean."""
-_OF_A_MATRIX = 250
+_OF_A_MATRIX = 300
 """Most harmonics of several beats for which steps are taken with whole matrices.
 
-Without them a verdict with 230 of two beats took as long as with them; a solution with 689 of three
-a sixth of the time, with 1607 a twentieth.
+Without them a verdict with 230 of two beats took as long as with them, a screening with 298 of
+three twice as long; a solution with 689 of three a sixth of the time, with 1607 a twentieth.
 """
 _PARTS = 0.5 ** np.arange(1, 5)
 """Parts of a step that are tried; with 1/16 as the least the fewest of 756 cases were lost."""

@@ -166,6 +166,16 @@ class SteadyMotion:
         values = [getattr(self, name)[rows] for name in BY_CASE]
         return SteadyMotion(self.torus, *values, tangents=tangents)
 
+    def on(self, torus: Torus) -> SteadyMotion:
+        """Return the motion with the harmonics of another torus, the only ones that are kept."""
+        if np.array_equal(self.torus.orders, torus.orders):
+            return self
+        values = {name: getattr(self, name) for name in BY_CASE}
+        for name, phasors in values.items():
+            if name not in ("slopes", "converged"):
+                values[name] = torus.harmonics(self.torus.orders, phasors)
+        return SteadyMotion(torus, **values)
+
     def spectrum(self) -> OrderSpectrum:
         """Return theta_d of the n cases as an order spectrum, rad."""
         return OrderSpectrum(self.torus.orders, self.transmission_error)

@@ -167,6 +167,17 @@ class Torus:
                 return int(places[0]), sign < 0.0
         return None
 
+    def harmonics(
+        self, orders: NDArray[np.float64], phasors: NDArray[np.complex128]
+    ) -> NDArray[np.complex128]:
+        """Return lines (n, m) at orders (m,) as harmonics; those that are not kept are left out."""
+        harmonics = np.zeros((len(phasors), len(self.orders)), dtype=complex)
+        for order, column in zip(orders.tolist(), phasors.T, strict=True):
+            if (place := self.find(order)) is not None:
+                index, conjugate = place
+                harmonics[:, index] = column.conj() if conjugate else column
+        return harmonics
+
     def path(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return grid values (n, G) in the order in which a slow beat passes them, twice over.
 

@@ -273,20 +273,6 @@ def test_a_believed_drag_leaves_none_in_any_form(name, law):
     assert not [one for one in found if one.name == "nonlinear_drag"]
 
 
-def test_a_form_alone_stands_for_its_own_effect_and_for_no_other_curve():
-    sizes = port_sizes(BELIEVED, ORDERS.tolist(), [1.0], SCALES)
-    known = {one.label: one for one in drive_candidates(sizes)}
-    thinning, drag = known["nonlinear_drag/shear_thinning:input"], known["nonlinear_drag:input"]
-    assert thinning.only_as_form
-    assert not drag.only_as_form
-    assert thinning.stands_for(drag, any_curve=False)
-    # Drag is another curve where dry friction was; what is sought as a form of drag is not.
-    dry = known["coulomb_friction:input"]
-    assert drag.stands_for(dry, any_curve=True)
-    assert not drag.stands_for(dry, any_curve=False)
-    assert not thinning.stands_for(dry, any_curve=True)
-
-
 def test_a_believed_order_of_the_error_is_no_further_line_of_it():
     names = [
         (one.name, one.order)

@@ -7,7 +7,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pymoo_hdte.discrepancy._evidence.force_balances.law_errors import BalanceErrors, _turns_of
+from pymoo_hdte.discrepancy._evidence.force_balances.law_errors import (
+    BalanceErrors,
+    _of_turn,
+    _turns_of,
+)
 from pymoo_hdte.discrepancy._evidence.order_lines.law_errors import ScaledLaw
 from pymoo_hdte.discrepancy._selection.process import TERMS, sine_of, sines_of
 from pymoo_hdte.effects.law import PortState, periodic_phase
@@ -40,12 +44,30 @@ def test_tangents_are_those_of_the_torque(place, number):
 
 
 def test_a_motion_turns_stops_and_starts():
-    """At once, or anywhere in a rest."""
+    """At once, or anywhere in a rest, of which the ends of a record may be parts."""
     speed = np.concatenate([np.ones(10), -np.ones(10), np.zeros(11), np.ones(10)])
     (turn, *rest) = _turns_of(speed, 0.5, 4.0)
-    assert turn == (9.5, -1.0)
-    assert rest == [(20.5, 1.0), (23.5, 1.0), (26.5, 1.0), (29.5, 1.0)]
+    assert turn == (9.5, 1.0, -1.0)
+    assert rest == [(place, -1.0, 1.0) for place in (20.5, 23.5, 26.5, 29.5)]
     assert _turns_of(np.ones(10), 0.5, 4.0) == []
+    slows = np.abs(np.linspace(-1.0, 1.0, 41))
+    # However shortly: noise of the speed hides whether it stops there.
+    assert _turns_of(slows, 0.02, 4.0) == [(20.0, 1.0, 1.0)]
+    from_rest = np.linspace(0.01, 1.0, 40)
+    assert _turns_of(from_rest, 0.0, 4.0) == [(0.0, 0.0, 1.0)]
+    assert _turns_of(-from_rest[::-1], 0.0, 4.0) == [(39.0, -1.0, 0.0)]
+
+
+@pytest.mark.parametrize(("before", "after"), [(-1.0, 1.0), (1.0, 1.0), (1.0, -1.0)])
+def test_dry_friction_may_turn_at_any_moment_around_a_turn_that_is_seen(rng, before, after):
+    """Beside a stop it is less on both sides, beside a turn each time nearer to the other side."""
+    places = np.array([-1.5, -0.7, -0.4, -0.1, 0.1, 0.3, 0.6, 0.9, 1.2])
+    turns = rng.uniform(-1.0, 1.0, (40_000, 1))
+    between = np.where(places < 0.0, -before, -after)
+    between = between * ((places * turns > 0.0) & (np.abs(places) < np.abs(turns)))
+    wanted = 4.0 * between.T @ between / len(turns)
+    pulses = np.array(list(_of_turn(places, before, after)))
+    assert pulses.T @ pulses == pytest.approx(wanted, abs=0.15)
 
 
 def balances(residuals, frequency, parts=1):

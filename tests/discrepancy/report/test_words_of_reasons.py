@@ -10,9 +10,7 @@ from pymoo_hdte.discrepancy._selection.reason import Reason
 
 CODES = [value for name, value in vars(codes).items() if name.isupper()]
 NUMBERS = {
-    codes.ABOVE_NOISE: {"times_noise": 3.0},
-    codes.EXPLAINS_TOO_LITTLE: {"share": 0.6},
-    codes.HARMONIC_OF_ANOTHER: {"backlash:mesh@1": 2.0},
+    codes.MORE_MISSING: {"outside": 0.6},
     codes.SENSOR_OFF: {"fitted": 0.1, "stated": 0.01},
     codes.LINES_ABOVE: {"20": 20.0, "highest": 18.0},
     codes.HARMONIC_ABOVE: {"order": 10.0, "highest": 18.0},
@@ -36,6 +34,6 @@ def test_no_two_codes_are_one():
 
 
 def test_reasons_are_the_same_if_all_of_them_is():
-    reason = Reason.of(codes.ABOVE_NOISE, numbers={"times_noise": 2.0})
-    assert reason == Reason.of(codes.ABOVE_NOISE, numbers={"times_noise": 2.0})
-    assert len({reason, Reason.of(codes.ABOVE_NOISE, numbers={"times_noise": 3.0})}) == 2
+    reason = Reason.of(codes.MORE_MISSING, numbers={"outside": 2.0})
+    assert reason == Reason.of(codes.MORE_MISSING, numbers={"outside": 2.0})
+    assert len({reason, Reason.of(codes.MORE_MISSING, numbers={"outside": 3.0})}) == 2

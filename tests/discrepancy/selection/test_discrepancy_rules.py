@@ -3,7 +3,6 @@
 import ast
 import inspect
 from dataclasses import fields, replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -18,10 +17,7 @@ from pymoo_hdte.discrepancy._evidence.force_balances.evidence import measured_da
 from pymoo_hdte.discrepancy._evidence.force_balances.preconditions import check_scale
 from pymoo_hdte.discrepancy._records.plausibility import check_believed
 from pymoo_hdte.discrepancy._selection.candidate import Layout
-from pymoo_hdte.discrepancy._selection.fitting import fit
-from pymoo_hdte.discrepancy._selection.hypothesis import indistinguishable
 from pymoo_hdte.discrepancy._selection.rules import RULES, Rules
-from pymoo_hdte.discrepancy._selection.verdict import judge
 from pymoo_hdte.discrepancy._verdicts.mechanism import examine_mechanism
 from pymoo_hdte.mechanism import BelievedValue, Input, Mechanism, Port, Record
 from pymoo_hdte.units import ARCSEC
@@ -40,11 +36,6 @@ def of_labels(*labels):
 def planted(label, values, seed=4):
     (candidate,) = of_labels(label)
     return measured(candidate.build(values), np.random.default_rng(seed), EMPTY)[0]
-
-
-def verdict_on(data, *labels, **changed):
-    data = replace(data, rules=replace(RULES, **changed))
-    return judge(data, fit(data), of_labels(*labels))
 
 
 def test_every_rule_says_what_it_means_and_where_it_comes_from():
@@ -79,8 +70,8 @@ def test_impossible_values_are_refused(bad):
 def test_numbers_of_things_are_whole():
     with pytest.raises(InvalidInput, match=r"rules\.most_fitted"):
         Rules(most_fitted=2.5)
-    with pytest.raises(InvalidInput, match=r"rules\.explained_share"):
-        Rules(explained_share=1.1)
+    with pytest.raises(InvalidInput, match=r"rules\.order_line_chance"):
+        Rules(order_line_chance=1.1)
 
 
 def test_the_level_of_a_false_alarm_is_the_one_stated():
@@ -130,42 +121,6 @@ def test_the_accuracy_of_the_drive_model_is_that_of_its_harmonics():
     # The rule is no smaller than the model's error, and not so large that it would hide others'.
     assert RULES.exact_model_accuracy / 5.0 < exact < RULES.exact_model_accuracy
     assert RULES.model_accuracy / 5.0 < others < RULES.model_accuracy
-
-
-def test_a_lower_level_raises_an_alarm_where_nothing_is_missing():
-    rng = np.random.default_rng(4)
-    data = measured((), rng, EMPTY)[0]
-    # More variance than stated, but within the rule.
-    noise = np.einsum("rij,rj->ri", data.whiteners, rng.standard_normal(data.features.values.shape))
-    features = replace(data.features, values=data.features.values + 0.4 * noise)
-    data = replace(data, features=features)
-    found = verdict_on(data, RIPPLE, LINE)
-    assert found.status == "adequate"
-    degrees_of_freedom = found.degrees_of_freedom
-    deviations = (found.base.chi_square - degrees_of_freedom) / np.sqrt(2.0 * degrees_of_freedom)
-    assert 0.0 < deviations < RULES.false_alarm_deviations
-    alarmed = verdict_on(data, RIPPLE, LINE, false_alarm_deviations=0.9 * deviations)
-    assert alarmed.status == "unlisted"
-
-
-def test_a_name_needs_the_gain_that_the_rule_asks_for():
-    data = planted(RIPPLE, (1e-4, 0.0))
-    named = verdict_on(data, RIPPLE, LINE)
-    assert named.status == "named"
-    base = named.base.chi_square + len(named.base.values) * np.log(len(named.base.residuals))
-    gain = base - named.chosen.bic
-    assert gain > RULES.bic_gain
-    assert verdict_on(data, RIPPLE, LINE, bic_gain=1.1 * gain).status == "unlisted"
-
-
-def test_a_shorter_distance_tells_two_explanations_apart():
-    def explanation(name, evidence):
-        fitted = SimpleNamespace(chi_square=1000.0, evidence=evidence)
-        return SimpleNamespace(fit=fitted, candidates=(name,), names={name}, exact=True)
-
-    one, other = explanation("one", 1050.0), explanation("other", 1057.0)
-    assert indistinguishable(other, one, 1000, RULES)
-    assert not indistinguishable(other, one, 1000, replace(RULES, evidence_distance=5.0))
 
 
 def test_the_map_flags_by_the_rate_of_its_rules():

@@ -1,7 +1,6 @@
 """First-order signatures: what a candidate could remove, in closed form and by a fit."""
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -17,10 +16,8 @@ from pymoo_hdte.discrepancy._evidence.order_lines.features import (
 )
 from pymoo_hdte.discrepancy._evidence.order_lines.prediction import Conditions
 from pymoo_hdte.discrepancy._records.records import RunningRecord
-from pymoo_hdte.discrepancy._selection import screening
 from pymoo_hdte.discrepancy._selection.fitting import fit
-from pymoo_hdte.discrepancy._selection.rules import RULES
-from pymoo_hdte.discrepancy._selection.screening import Screened, screen, shortlist
+from pymoo_hdte.discrepancy._selection.screening import screen
 from pymoo_hdte.discrepancy._verdicts.rattling import leading_sweep_effect
 from pymoo_hdte.units import ARCSEC
 
@@ -100,22 +97,6 @@ def test_a_gain_comes_back_from_its_bound_with_the_friction_that_drove_it_there(
     both = fit(data, (ripple, friction), np.append(beside.values, found.start))
     assert found.reduction == pytest.approx(beside.chi_square - both.chi_square, rel=0.02)
     assert found.start == pytest.approx([0.1], rel=0.1)
-
-
-@pytest.mark.parametrize(
-    ("shares", "tried"),
-    [((0.3, 0.25), "a"), ((0.15, 0.1), ""), ((0.6, 0.3), "a"), ((0.7, 0.6), "ab")],
-)
-def test_where_no_second_effect_is_hopeful_the_best_one_is_tried(shares, tried, monkeypatch):
-    """Friction of the load beside a large ripple removed 85 %, and to first order 34 %."""
-    found = [
-        Screened(SimpleNamespace(name=name), 100.0 * share, ())
-        for name, share in zip("ab", shares, strict=True)
-    ]
-    monkeypatch.setattr(screening, "screen", lambda data, fitted, others: found)
-    data = SimpleNamespace(rules=RULES)
-    chosen = shortlist(data, None, ["a", "b"], [], 100.0, [])
-    assert "".join(one.candidate.name for one in chosen) == tried
 
 
 @pytest.mark.nightly

@@ -16,7 +16,7 @@ from pymoo_hdte.discrepancy._selection.fitting import Unknowns, built, fit
 from pymoo_hdte.discrepancy._selection.growth import Growth
 from pymoo_hdte.discrepancy._selection.linearised import linearise
 from pymoo_hdte.discrepancy._selection.rules import RULES
-from pymoo_hdte.discrepancy._selection.score import Linearised, Sized
+from pymoo_hdte.discrepancy._selection.score import Linearised, Sized, score
 from pymoo_hdte.effects.unknowns import Parameter, unknown
 
 N = 60
@@ -126,6 +126,26 @@ def test_no_set_is_likelier_than_the_best_one_grown(seed):
             every._weigh(fit(growth.data, members))
     assert best.weight >= every.ranked[0].weight - 0.01
     assert len(growth.ranked) < len(every.ranked)
+
+
+def test_a_set_without_a_member_is_known_to_first_order(rng):
+    """Of linear data that is exact."""
+    columns = rng.normal(size=(N, 3))
+    data = LinearData(columns @ [2.0, -3.0, 1.0] + rng.normal(size=N), columns, np.ones(N))
+    members = [candidate(k) for k in range(3)]
+    whole = data.linearised(fit(data, members))
+    others = data.linearised(fit(data, [members[0], members[2]]))
+    assert score(whole.without(1)).ln == pytest.approx(score(others).ln, abs=0.01)
+
+
+def test_the_likeliest_set_of_another_noise_goes_along(rng):
+    columns = rng.normal(size=(N, 5))
+    measured = columns[:, [1, 3]] @ [2.0, -2.0] + rng.normal(size=N)
+    before = grown(measured, columns, np.ones(N))
+    data = LinearData(measured + 0.1 * rng.normal(size=N), columns, np.ones(N))
+    growth = Growth(data, fit(data), before.candidates, data)
+    first = next(growth.steps(before.likeliest))
+    assert {int(member.port) for member in first.candidates} == {1, 3}
 
 
 @pytest.fixture

@@ -17,6 +17,7 @@ from pymoo_hdte.discrepancy._selection.decision import (
 
 A, B, C = (frozenset({(name, "input")}) for name in ("a", "b", "c"))
 NOTHING = frozenset()
+VALUE = frozenset({("parameter", "stiffness")})
 
 
 def said(*shares, worst_chance=1.0):
@@ -39,13 +40,17 @@ def said(*shares, worst_chance=1.0):
     ("shares", "status", "members"),
     [
         ([(NOTHING, False, 0.97), (A, False, 0.03)], "adequate", ()),
+        ([(NOTHING, False, 0.6), (A, False, 0.4)], "adequate", ()),
         ([(NOTHING, False, 0.02), (A, False, 0.98)], "named", (A,)),
         ([(A, False, 0.9), (A, True, 0.1)], "partial", (A,)),
         ([(A, False, 0.3), (B, False, 0.66), (C, False, 0.04)], "class", (B, A)),
         ([(A | B, True, 0.5), (A | C, True, 0.5)], "partial", (A,)),
         ([(NOTHING, False, 0.5), (A, False, 0.5)], "unlisted", (NOTHING,)),
         ([(NOTHING, True, 1.0)], "unlisted", (NOTHING,)),
-        ([(frozenset({("parameter", "stiffness")}), False, 1.0)], "parameter", None),
+        ([(VALUE, False, 1.0)], "parameter", None),
+        # A value alone may stand for what is outside.
+        ([(VALUE, True, 1.0)], "unlisted", (VALUE,)),
+        ([(VALUE | A, True, 1.0)], "partial", (VALUE | A,)),
     ],
 )
 def test_levels_of_probability_decide(shares, status, members):
@@ -60,6 +65,14 @@ def test_a_class_is_short():
     decision = said(*many)
     assert decision.status == "unlisted"
     assert len(decision.members) <= MOST_IN_CLASS
+
+
+def test_one_of_two_names_is_sure_whatever_there_is_beside_them():
+    beside = [frozenset({(str(k), "input")}) for k in range(6)]
+    decision = said(*((A | more, False, 0.1) for more in beside), (B, False, 0.4))
+    assert (decision.status, decision.members) == ("class", (A, B))
+    assert decision.probability == pytest.approx(1.0)
+    assert said(*((A | more, True, 0.1) for more in beside), (B, True, 0.4)).status == "unlisted"
 
 
 @given(st.lists(st.floats(0.01, 1.0), min_size=3, max_size=3))

@@ -4,13 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from planted_features import FEW, library, measured, with_sweep
+from planted_features import FEW, judged, library, measured, with_sweep
 
-from pymoo_hdte.discrepancy._selection.fitted_sets import FittedSets
-from pymoo_hdte.discrepancy._selection.fitting import fit
-from pymoo_hdte.discrepancy._selection.screening import screen
-from pymoo_hdte.discrepancy._selection.search import Search
-from pymoo_hdte.discrepancy._selection.verdict import judge
 from pymoo_hdte.drive import KinematicReaction, LawAtPort
 from pymoo_hdte.effects.bouc_wen import BoucWen
 from pymoo_hdte.effects.hysteresis import MaxwellSlip
@@ -40,29 +35,12 @@ def laws_of(data):
 
 @pytest.mark.nightly
 def test_a_loop_that_forgets_is_named_with_what_stands_beside_it(data):
-    found = judge(data, fit(data), laws_of(data))
+    found = judged(data, laws_of(data))
     labels = [one.label for one in found.chosen.candidates]
     assert (found.status, sorted(labels)) == ("named", [LOOP, REACTION])
     place = next(place for one, place in found.chosen.fit.places if one.label == LOOP)
     deviation = np.sqrt(np.diag(found.chosen.fit.covariance)[place][0])
     assert found.chosen.fit.values[place][0] == pytest.approx(FORCE, abs=3.0 * deviation)
-
-
-@pytest.mark.parametrize("mended", [True, pytest.param(False, marks=pytest.mark.nightly)])
-def test_a_second_effect_is_sought_beside_the_loop_and_not_beside_springs(
-    data, mended, monkeypatch
-):
-    """To first order the loop is no sum of springs: their forms do not ask for it."""
-    if not mended:
-        monkeypatch.setattr(
-            FittedSets, "leaves_form_of", lambda self, one, member: self.leaves_forms(one)
-        )
-    base, laws = fit(data), laws_of(data)
-    searched = [one for one in laws if not one.instead_of]
-    forms = [one for one in laws if one.only_as_form]
-    search = Search(data, base, searched, screen(data, base, searched), forms)
-    search.singles()
-    assert (search.hypotheses[0].label == LOOP) == mended
 
 
 def test_what_creeps_in_a_record_is_noise_beside_such_a_loop():

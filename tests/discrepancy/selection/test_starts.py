@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from pymoo_hdte.discrepancy._selection.candidate import Candidate
-from pymoo_hdte.discrepancy._selection.fitted_sets import FittedSets
-from pymoo_hdte.discrepancy._selection.fitting import Fit, Unknowns, fit
+from pymoo_hdte.discrepancy._selection.fitting import Unknowns, fit
 from pymoo_hdte.discrepancy._selection.hypothesis import hypothesis_of
 from pymoo_hdte.discrepancy._selection.rules import RULES
 from pymoo_hdte.discrepancy._selection.starts import best_fit
@@ -170,14 +169,6 @@ def falling(excesses):
     )
 
 
-def sets_of(excesses):
-    """Sets of effects of a friction that no friction is believed of."""
-    data = falling(excesses)
-    measured = data.objective(()).measured
-    nothing = Fit((), (), np.empty(0), -measured, np.empty((len(measured), 0)))
-    return FittedSets(data, nothing)
-
-
 TWO_ENDS = pytest.mark.parametrize(
     ("excesses", "begin", "end"),
     [
@@ -199,36 +190,3 @@ def test_a_law_no_better_than_its_special_case_is_tried_from_the_other_bound_of_
     best = best_fit(data, one, (), [hypothesis_of(fit(data, (COULOMB,)), 0.0)])
     assert best.values[2] == pytest.approx(end)
     assert best.chi_square < one.fit.chi_square - 1.0
-
-
-@TWO_ENDS
-def test_a_law_is_held_against_its_special_case_once_that_is_fitted_to_the_end(
-    excesses, begin, end
-):
-    """A special case that is only ranked leaves more than the law, which need not be better."""
-    sets = sets_of(excesses)
-    coulomb = sets.fitted((COULOMB,), np.array([FAR]), steps=0)
-    law = sets.fitted((STRIBECK,), np.array([FAR, 0.1, begin]), steps=0)
-    assert coulomb.fit.chi_square > 1e3
-    assert sets.finished(law).fit.values[2] == pytest.approx(end)
-
-
-@TWO_ENDS
-def test_a_law_is_fitted_again_once_a_special_case_leaves_as_little(excesses, begin, end):
-    sets = sets_of(excesses)
-    law = sets.fitted((STRIBECK,), np.array([FAR, 0.1, begin]), steps=0)
-    assert sets.finished(law).fit.values[2] == pytest.approx(begin)
-    sets.finished(sets.fitted((COULOMB,), np.array([FAR])))
-    assert sets.finished(law).fit.values[2] == pytest.approx(end)
-    # What left as little before opens nothing: the second time it is as it was.
-    ended = sets.finished(law)
-    sets.finished(sets.fitted((COULOMB,), np.array([FAR])), np.array([FAR]))
-    assert sets.finished(law) is ended
-
-
-def test_a_special_case_far_off_is_not_fitted_to_the_end_for_a_law():
-    sets = sets_of({10.0: 1.5})
-    coulomb = sets.fitted((COULOMB,), np.array([FAR]), steps=0)
-    law = sets.fitted((STRIBECK,), np.array([LEVEL, 1.5, 9.0]), steps=0)
-    sets.finished(law)
-    assert sets.fitted((COULOMB,), np.array([FAR])) is coulomb

@@ -6,12 +6,12 @@ from itertools import product
 import pytest
 from made_verdicts import made_set
 
-from pymoo_hdte.discrepancy._selection.reason import ABOVE_NOISE, NOT_VALIDATED, Reason
+from pymoo_hdte.discrepancy._selection.reason import MORE_MISSING, NOT_VALIDATED, Reason
 from pymoo_hdte.discrepancy._selection.verdict import EXPLAINED, STATUSES, Verdict
 
 FIT = object()
 SETS = (None, made_set(FIT), made_set(FIT, "parameter"), made_set(FIT, listed=False))
-REASONS = ((), (Reason(ABOVE_NOISE),), (Reason(NOT_VALIDATED),))
+REASONS = ((), (Reason(MORE_MISSING),), (Reason(NOT_VALIDATED),))
 CONTENTS = list(product(SETS, (True, False), REASONS, ((), (made_set(FIT),))))
 
 

@@ -58,7 +58,7 @@ def candidates_of(data, base):
 
 def verdict_on(effects, seed=6):
     data, _ = measured(effects, np.random.default_rng(seed), DATA)
-    data, _, verdict = rattling.judged(data, fit(data), candidates_of)
+    data, verdict = rattling.judged(data, fit(data), candidates_of)
     shown = data.bench.shown(verdict.accepted, verdict.rules)
     return verdict, [nuisance.name for nuisance, _ in shown], data
 

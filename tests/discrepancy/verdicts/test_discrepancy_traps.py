@@ -7,8 +7,6 @@ import pytest
 from quick_campaigns import quick_analysis, quick_campaign
 
 from pymoo_hdte.discrepancy._evidence.order_lines.evidence import Data
-from pymoo_hdte.discrepancy._selection import fitted_sets
-from pymoo_hdte.discrepancy._selection.fitting import fit
 from pymoo_hdte.discrepancy._selection.rules import RULES
 from pymoo_hdte.discrepancy._verdicts.drive import examine_drive
 from pymoo_hdte.units import ARCSEC
@@ -24,17 +22,6 @@ def clean(seed):
     return quick_campaign(seed)
 
 
-@pytest.fixture
-def unsearched(monkeypatch):
-    """Leave the candidates as screened: to fit them only names what the alarm is already about."""
-
-    def as_screened(data, candidates, start, *settings, **named):
-        return fit(data, candidates, start, 1)
-
-    monkeypatch.setattr(fitted_sets, "fit", as_screened)
-    return replace(RULES, most_fitted=1, most_effects=1)
-
-
 def test_a_clean_drive_is_adequate(seed):
     """Fails when either safeguard is taken out of the code."""
     assert quick_analysis(seed).verdict.status == "adequate"
@@ -47,15 +34,15 @@ def test_a_clean_campaign_without_a_sweep_is_adequate(clean):
 
 
 @pytest.mark.nightly
-def test_a_frozen_base_makes_effects_of_its_own_errors(clean, unsearched):
+def test_a_frozen_base_makes_effects_of_its_own_errors(clean):
     frozen = replace(clean.believed, tolerance=RULES.least_tolerance)
-    assert examine_drive(replace(clean, believed=frozen), unsearched).verdict.status != "adequate"
+    assert examine_drive(replace(clean, believed=frozen)).verdict.status != "adequate"
 
 
 @pytest.mark.nightly
-def test_repeatability_left_out_is_a_false_alarm(clean, unsearched):
+def test_repeatability_left_out_is_a_false_alarm(clean):
     exact = replace(clean.rig, repeatability=0.0)
-    assert examine_drive(replace(clean, rig=exact), unsearched).verdict.status != "adequate"
+    assert examine_drive(replace(clean, rig=exact)).verdict.status != "adequate"
 
 
 @pytest.mark.nightly
@@ -72,7 +59,7 @@ def test_a_small_change_of_the_zero_is_no_drift():
 
 
 @pytest.mark.nightly
-def test_repeatability_of_one_channel_only_is_a_false_alarm(clean, unsearched, monkeypatch):
+def test_repeatability_of_one_channel_only_is_a_false_alarm(clean, monkeypatch):
     carried = Data._repeatability
 
     def of_the_transmission_error(self, layout, start):
@@ -81,4 +68,4 @@ def test_repeatability_of_one_channel_only_is_a_false_alarm(clean, unsearched, m
         return carried(self, layout, start) * np.outer(own, own)
 
     monkeypatch.setattr(Data, "_repeatability", of_the_transmission_error)
-    assert examine_drive(clean, unsearched).verdict.status != "adequate"
+    assert examine_drive(clean).verdict.status != "adequate"

@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 from functools import cache
-from types import SimpleNamespace
 
 import measured_oscillator as rig
 import numpy as np
@@ -25,9 +24,6 @@ from pymoo_hdte.discrepancy._evidence.force_balances.preconditions import check_
 from pymoo_hdte.discrepancy._report.mechanism_document import limits, record_remarks, unexplained
 from pymoo_hdte.discrepancy._report.mechanism_values import _parameters, effects, quantities
 from pymoo_hdte.discrepancy._selection.fitting import fit
-from pymoo_hdte.discrepancy._selection.reason import ZERO_IN_INTERVAL
-from pymoo_hdte.discrepancy._selection.rules import RULES
-from pymoo_hdte.discrepancy._verdicts import mechanism_choice
 from pymoo_hdte.discrepancy._verdicts.mechanism import examine_mechanism
 from pymoo_hdte.discrepancy._verdicts.validation_mechanism import validate_mechanism
 from pymoo_hdte.effects.friction import CoulombFriction
@@ -333,35 +329,6 @@ def test_play_takes_the_stiffness_that_is_fitted_and_not_the_believed_one():
     simulated, balanced = validate_mechanism(finding)
     assert simulated.shrinkage > 0.9
     assert balanced.shrinkage > 0.9
-
-
-@pytest.mark.nightly
-def test_an_interval_that_is_printed_with_zero_in_it_leaves_no_plain_name(monkeypatch):
-    """Of coloured residuals it is wider than the curvature of the fit says."""
-
-    def wide(data, fitted):
-        places = [place for _, place in fitted.places]
-        deviation = np.zeros(len(fitted.values))
-        for place in places:
-            deviation[place] = np.abs(fitted.values[place])
-        reach = np.full(len(deviation), data.rules.certain_deviations)
-        return SimpleNamespace(covariance=np.diag(deviation**2), reach=reach)
-
-    assert finding_on(dry).verdict.status == "named"
-    monkeypatch.setattr(mechanism_choice, "Spread", wide)
-    verdict = examine_mechanism(OSCILLATOR, [rig.record_of(dry)]).verdict
-    assert verdict.status == "partial"
-    assert verdict.has_reason(ZERO_IN_INTERVAL)
-
-
-def test_an_effect_that_removes_less_than_the_rule_asks_for_is_not_named():
-    finding = finding_on(dry)
-    assert finding.verdict.status == "named"
-    removed = finding.share_removed
-    assert removed < 1.0
-    stricter = replace(RULES, main_share=(1.0 + removed) / 2.0)
-    again = examine_mechanism(OSCILLATOR, [rig.record_of(dry, seed=1)], rules=stricter)
-    assert again.verdict.status == "unlisted"
 
 
 def test_a_sign_that_is_swapped_is_no_parameter_out_of_tolerance():

@@ -13,7 +13,6 @@ from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy._records.rig_files import read_rig
 from pymoo_hdte.discrepancy._records.rig_model import model_text, read_mechanism_model
 from pymoo_hdte.discrepancy._report.mechanism_values import effects, quantities
-from pymoo_hdte.discrepancy._selection.reason import AT_BOUND, AT_TOLERANCE, Reason
 from pymoo_hdte.discrepancy._verdicts.mechanism import examine_mechanism
 from pymoo_hdte.effects.gravity import Gravity
 from pymoo_hdte.effects.law import PortState, periodic_phase
@@ -183,7 +182,6 @@ def test_at_the_bound_of_a_form_no_name_is_plain():
     finding = found(lambda q, v: 4.0 * np.sign(v) * np.abs(v) ** 0.12)
     assert finding.verdict.status == "partial"
     assert "coulomb_friction" in names(finding)
-    assert finding.verdict.has_reason(AT_BOUND)
     bounded = [one for each in effects(finding) for one in each["at_bound"]]
     shown = [
         key
@@ -208,11 +206,12 @@ def test_at_the_bound_of_a_form_no_name_is_plain():
         ),
     ],
 )
-def test_a_belief_that_ends_at_its_tolerance_is_a_caveat(believed, stuck):
+def test_a_belief_out_of_its_tolerance_is_named_beside_an_effect(believed, stuck):
     finding = found(dry, mechanism=believed)
-    assert finding.verdict.status == "partial"
-    assert Reason(AT_TOLERANCE, stuck) in finding.verdict.reasons
-    assert quantities(finding)[stuck]["at_bound"]
+    assert finding.verdict.status == "named"
+    released = {candidate.releases for candidate in finding.accepted.candidates} - {None}
+    assert released == {stuck}
+    assert not quantities(finding)[stuck]["at_bound"]
     assert "coulomb_friction" in names(finding)
 
 

@@ -3,8 +3,6 @@
 import numpy as np
 import pytest
 
-from pymoo_hdte.discrepancy._selection.reason import EXPLAINS_TOO_LITTLE
-from pymoo_hdte.discrepancy._selection.rules import RULES
 from pymoo_hdte.discrepancy._verdicts.mechanism import examine_mechanism
 from pymoo_hdte.effects.hysteresis import MaxwellSlip
 from pymoo_hdte.effects.linear import DirectionalFriction
@@ -70,14 +68,12 @@ def test_springs_that_slip_and_a_spring_that_hardens_are_found_together(seed):
 
 
 @pytest.mark.nightly
-def test_what_sets_the_noise_by_itself_is_no_plain_name_unless_it_explains_nine_tenths():
+def test_effects_beside_a_disturbance_that_no_law_holds_are_no_plain_names():
     """Beside a disturbance the same two effects are certain, but not that they are all."""
     believed, record = slipping_and_hardening(1, disturbance=7.0)
     finding = examine_mechanism(believed, [record], 75.0)
-    assert RULES.main_share < finding.share_removed < RULES.explained_share
     assert set(names(finding)) == {"hysteresis", "hardening_stiffness"}
     assert finding.verdict.status == "partial"
-    assert finding.verdict.has_reason(EXPLAINS_TOO_LITTLE)
 
 
 @pytest.mark.nightly

@@ -12,7 +12,6 @@ import verdict_cases as mends
 from verdict_cases import case_campaign
 
 from pymoo_hdte.discrepancy import analyse
-from pymoo_hdte.discrepancy._selection.reason import NOT_VALIDATED
 from pymoo_hdte.effects import effect as effects
 from pymoo_hdte.units import ARCSEC
 
@@ -118,7 +117,7 @@ def said(analysis):
 
 def near(verdict):
     """Return the sets that the report calls alike."""
-    return [one for one in verdict.alternatives if verdict.is_equivalent(one)]
+    return [one for one in verdict.alternatives if one in verdict.equivalent]
 
 
 def member_with(verdict, label):
@@ -186,10 +185,6 @@ def check(name, analysis):
         ALSO[name](analysis)
 
 
-def also_of_an_order_in_no_list(analysis):
-    assert analysis.verdict.has_reason(NOT_VALIDATED)
-
-
 def also_of_noise(analysis):
     # The sensors' noise is three times the stated one.
     sensors = [one for one in analysis.finding.rows.noise if one.replaced]
@@ -232,7 +227,6 @@ def also_of_the_amplitude(analysis):
 
 
 ALSO: dict[str, Callable] = {
-    f"load-dependent-order{IN_NO_LIST}": also_of_an_order_in_no_list,
     "coulomb-noise-x3": also_of_noise,
     "nothing-all-values-off": also_of_all_values_off,
     "stiffness-off": also_of_stiffness,
@@ -246,24 +240,18 @@ ALSO: dict[str, Callable] = {
 @pytest.mark.parametrize(
     ("name", "mend"),
     [
-        ("coulomb", mends.ranking_fits_decide),
-        ("rig-11", mends.ranking_fits_decide),
         ("coulomb-one-load", mends.one_step),
         ("coulomb-gap", mends.rows_are_believed),
         ("coulomb-noise-x3", mends.rows_are_believed),
         ("nothing-encoder-spikes", mends.rows_are_believed),
         ("nothing-encoder-jump", mends.rows_are_believed),
-        (f"load-dependent-order{IN_NO_LIST}", mends.no_validation),
-        (f"load-dependent-order{IN_NO_LIST}", mends.no_caveats),
         ("cubic-drag", mends.quadratic_drag_only),
         ("drag-coulomb", mends.one_effect_at_a_port),
         ("hardening-soft-windup", mends.one_effect_at_a_port),
         ("load-dependent-friction", mends.no_friction_that_grows_with_load),
-        ("nothing-all-values-off", mends.one_parameter_at_a_time),
         ("stiffness-off", mends.freed_values_are_believed),
         ("amplitude-off", mends.amplitudes_are_never_wrong),
         ("rig-11", mends.one_step),
-        ("kinematic-eccentricity", mends.one_effect),
     ],
     ids=lambda one: one if isinstance(one, str) else one.__name__,
 )

@@ -52,11 +52,6 @@ class MeasuredData(WhitenedBalances):
         """Empty, because no effect shows by itself in records of a mechanism."""
         return frozenset()
 
-    @property
-    def model_error_share(self) -> float:
-        """Share of the base's excess up to which a residual is attributed to no effect."""
-        return self.rules.mechanism_remainder
-
     def objective(self, candidates: Sequence[Candidate]) -> BalanceObjective:
         """Return whitened residuals with candidates."""
         return BalanceObjective(self, candidates)
@@ -65,9 +60,6 @@ class MeasuredData(WhitenedBalances):
         """Return how the whitened residuals of a fit respond to further effects."""
         base = fitted.values[: len(self.base)]
         return lambda added: -self.whitened_forces(base, added)
-
-    def corrections(self, candidate: Candidate) -> None:
-        """Return None, because no forms of laws are known beside those of the library."""
 
     def rows_of_parts(self) -> list[NDArray[np.int_]]:
         """Return the indices of the residuals of each part."""
@@ -101,10 +93,6 @@ class MeasuredData(WhitenedBalances):
 
     def held_out_test(self, base: Fit, fitted: Fit) -> None:
         """Return None, because held-out records of a mechanism are simulated after the verdict."""
-        return
-
-    def with_noise_of(self, fitted: Fit) -> None:
-        """Return None, because the noise of measured motion and force is that of the sensors."""
         return
 
     def says_nothing_of(self, effects: Sequence[LawAt]) -> bool:

@@ -1,14 +1,14 @@
 """Relative errors of laws in force balances, and what no law of the library holds.
 
-Both are Gaussian processes over the motion at a port: over its position, over its speed, over its
-load and over the time. What a real machine leaves is coloured: each band of frequencies has a
+Both are Gaussian processes over the motion at a port: over its position and its speed, the latter
+over the time as well. What a real machine leaves is coloured: each band of frequencies has a
 noise of its own.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
 
@@ -23,6 +23,7 @@ from pymoo_hdte.discrepancy._selection.linearised import linearise
 from pymoo_hdte.discrepancy._selection.process import TERMS, sine_of
 from pymoo_hdte.discrepancy._selection.score import Linearised, Sized
 from pymoo_hdte.effects.law import Law
+from pymoo_hdte.mechanism.balances import ForceBalance
 from pymoo_hdte.mechanism.port_motion import PortMotion, law_force
 from pymoo_hdte.mechanism.rests import STILL, speed_noise
 
@@ -32,6 +33,8 @@ NOISE = float(np.log(10.0))
 """Standard deviation of the logarithm of the noise, which nobody states of a balance."""
 TURNS = (1e-3, 1.0)
 """Range of the force around a turn that is not known, as a share of what holds a port at rest."""
+_OF_TURN = 3
+"""Functions on each side of a turn, which hold 93 % of the variance of what it may do."""
 _SMOOTHED = 9
 """Coefficients over which a spectrum is smoothed, to see how coloured it is."""
 _FEWEST = 20
@@ -104,6 +107,18 @@ class BalanceErrors:
                     shares[rows] = smooth.mean() ** 2 / np.mean(smooth**2)
         return shares
 
+    @cached_property
+    def least_noise(self) -> Matrix:
+        """Noise of the sensors as a share of what counts as noise, shape (n_channels,)."""
+        shares = np.concatenate(
+            [
+                (balance.noise / deviation)[balance.kept]
+                for balance, deviation in zip(self.data.spectra, self.data.deviation, strict=True)
+            ]
+        )
+        power = np.bincount(self.channels, shares**2) / np.bincount(self.channels)
+        return np.asarray(np.sqrt(power))
+
     def linearised(self, fitted: Fit) -> Linearised:
         """Return a fit as a hypothesis."""
 
@@ -119,68 +134,72 @@ class BalanceErrors:
             ]
             return np.column_stack(columns)
 
-        return linearise(fitted, self.channels, errors, NOISE, self.shares).beside(
-            *self._turning(fitted)
-        )
+        hypothesis = linearise(fitted, self.channels, errors, NOISE, self.shares)
+        return replace(hypothesis, least_noise=self.least_noise).beside(*self._turning(fitted))
 
     def _turning(self, fitted: Fit) -> Iterator[Sized]:
         """Yield what dry friction may do where a port turns, starts or stops.
 
-        When it does is known to a part of the time over which the motion is smoothed only. What
-        smoothing does to a kink of the motion is the same at every turn, but for its size: so a
-        part is common to all turns, and another one is each turn's own.
+        The motion is smoothed over a period of the cutoff, in which it may turn at any moment, or
+        rest for a while. What smoothing does to a kink of the motion is the same at every turn, and
+        at every stop or start; by what it is not, turns add to the noise.
         """
         for effect in fitted.effects:
-            if not (effect.law.breakaway and (columns := self._turns(effect.port)).size):
+            columns = self._turns(effect.port)
+            if not effect.law.breakaway or not columns.size:
                 continue
-            label = f"{effect.name}:{effect.port}"
-            for name, part in (
-                (f"all turns of {label}", columns.reshape(len(columns), -1, 2).sum(axis=1)),
-                (f"turns of {label}", columns),
-            ):
-                none = np.zeros(part.shape[1])
-                yield Sized(name, effect.law.breakaway * part, *TURNS, none, none > 0.0)
+            none = np.zeros(columns.shape[1])
+            yield Sized(
+                f"turns of {effect.name}:{effect.port}",
+                effect.law.breakaway * columns,
+                *TURNS,
+                none,
+                none > 0.0,
+            )
 
     def _turns(self, port: str) -> Matrix:
-        """Return whitened balances of a unit force around each turn of a port, (n, 2 n_turns).
-
-        First that of a turn that is early or late, then that of one that takes its time; both with
-        the sign of the speed after the turn.
-        """
+        """Return whitened balances of a unit force around the turns of a port: see `_of_turn`."""
         if port not in self._of_turns:
-            self._of_turns[port] = np.column_stack(
-                [np.empty((len(self.channels), 0)), *self._pulses(port)]
+            signals = [self._pulses(balance, port) for balance in self.data.spectra]
+            columns = np.column_stack(
+                [self._whitened(port, pulses) for pulses in zip(*signals, strict=True)]
             )
+            self._of_turns[port] = columns[:, columns.any(axis=0)]
         return self._of_turns[port]
 
-    def _pulses(self, port: str) -> Iterator[Matrix]:
-        ends = np.cumsum([0, *(int(balance.kept.sum()) for balance in self.data.spectra)])
-        for number, balance in enumerate(self.data.spectra):
-            speed, step = balance.ports[port].speed, float(balance.time[1] - balance.time[0])
-            smoothed = 1.0 / (balance.cutoff * step)
-            still = speed_noise(balance.mechanism.port(port), balance.record, balance.cutoff)
-            for turn, after in _turns_of(speed, STILL * still, smoothed / 2.0):
-                if not balance.moving.weight[int(turn)]:
-                    continue
-                place = (np.arange(len(speed)) - turn) / (smoothed / 4.0)
-                for pulse in (np.exp(-0.5 * place**2), place * np.exp(-0.5 * place**2)):
-                    column = np.zeros(len(self.channels))
-                    force = balance.of_port(port, after * pulse) / self.data.deviation[number]
-                    column[ends[number] : ends[number + 1]] = force[balance.kept]
-                    yield column
+    @staticmethod
+    def _pulses(balance: ForceBalance, port: str) -> Matrix:
+        """Return the force around rests and around turns of a port, (4 _OF_TURN, n)."""
+        speed, step = balance.ports[port].speed, float(balance.time[1] - balance.time[0])
+        half = 0.5 / (balance.cutoff * step)
+        still = speed_noise(balance.mechanism.port(port), balance.record, balance.cutoff)
+        pulses = np.zeros((2, 2 * _OF_TURN, len(speed)))
+        places = np.arange(len(speed), dtype=np.float64)
+        for turn, *signs in _turns_of(speed, STILL * still, half):
+            if balance.moving.weight[round(turn)]:
+                near = slice(max(int(turn - half), 0), int(turn + half) + 2)
+                of_turn = _of_turn((places[near] - turn) / half, *signs)
+                pulses[int(signs[0] * signs[1] < 0.0), :, near] += np.array(list(of_turn))
+        return pulses.reshape(-1, len(speed))
+
+    def _whitened(self, port: str, signals: Sequence[Matrix]) -> Matrix:
+        """Return whitened balances, (n,), of a force at a port in each record."""
+        parts = zip(self.data.spectra, self.data.deviation, signals, strict=True)
+        return np.concatenate(
+            [
+                (balance.of_port(port, signal) / deviation)[balance.kept]
+                for balance, deviation, signal in parts
+            ]
+        )
 
     def _column(self, port: str, over: str, number: int, law: Law | None = None) -> Matrix:
         """Return whitened balances of a function over something, times a law's force, (n,)."""
-        parts = []
-        reach = self._reach(port, over)
+        signals, reach = [], self._reach(port, over)
         stiffness = self.data.mechanism.port(port).stiffness.value
-        for balance, deviation in zip(self.data.spectra, self.data.deviation, strict=True):
-            motion = balance.ports[port]
+        for motion in (balance.ports[port] for balance in self.data.spectra):
             signal = sine_of(number, _argument(motion, over) / reach)[0]
-            if law is not None:
-                signal = signal * law_force(law, motion, stiffness)
-            parts.append((balance.of_port(port, signal) / deviation)[balance.kept])
-        return np.concatenate(parts)
+            signals.append(signal if law is None else signal * law_force(law, motion, stiffness))
+        return self._whitened(port, signals)
 
     def _reach(self, port: str, over: str) -> float:
         peaks = [
@@ -195,11 +214,10 @@ class BalanceErrors:
         return tuple(self._outside())
 
     def _outside(self) -> Iterator[Sized]:
+        # Not over the load: what it does alone is a gain of the input, and as the load is what the
+        # inputs do as measured, a steep function of it would cancel their noise.
         for port in self.data.mechanism.ports:
-            overs = ["position", "speed", "time"]
-            if all(balance.ports[port.name].load is not None for balance in self.data.spectra):
-                overs.append("load")
-            for over in overs:
+            for over in ("position", "speed", "time"):
                 columns = np.column_stack(
                     [self._column(port.name, over, number) for number in range(1, TERMS + 1)]
                 )
@@ -217,18 +235,41 @@ class BalanceErrors:
                 )
 
 
-def _turns_of(speed: Matrix, still: float, apart: float) -> list[tuple[float, float]]:
+def _of_turn(place: Matrix, before: float, after: float) -> Iterator[Matrix]:
+    """Yield by what dry friction of 1 may differ from what the sign of a smoothed speed says.
+
+    If the port turns at any moment up to a unit of ``place`` (n,) before or after, the force has
+    the other sign than that ``before`` or ``after`` up to then. The covariance of this at s and t
+    is 2 (1 - max(s, t)) on each side, that of Brownian motion from its end, whose Karhunen-Loeve
+    functions are cosines. A rest is a mean of such turns.
+    """
+    for number in range(_OF_TURN):
+        rate = np.pi * (number + 0.5)
+        pulse = 2.0 * np.cos(rate * place) / rate
+        for sign, side in ((before, place < 0.0), (after, place >= 0.0)):
+            yield -sign * pulse * (side & (np.abs(place) < 1.0))
+
+
+def _turns_of(speed: Matrix, still: float, apart: float) -> list[tuple[float, float, float]]:
     """Return the rows, perhaps between two, at which a motion turns, stops or starts.
 
-    Each with the sign of the speed after it. Where a motion is ``still`` for long, it may do so
-    anywhere: at rows that are about so far ``apart``.
+    Each with the signs of the speed before and after it; 0 where that is not known. Where a motion
+    is ``still``, it may do so anywhere: at rows that are about so far ``apart``. It does at the
+    ends of a record as well where it is within so many rows of a rest.
     """
-    turns, moving = list[tuple[float, float]](), np.flatnonzero(np.abs(speed) >= still)
+    turns, moving = list[tuple[float, float, float]](), np.flatnonzero(np.abs(speed) >= still)
+    sign = np.sign(speed)
     for before, after in pairwise(moving.tolist()):
-        if after - before > apart or speed[before] * speed[after] < 0.0:
+        if after - before > 1 or speed[before] * speed[after] < 0.0:
             count = 1 + int((after - before) / apart)
             places = before + (after - before) * (np.arange(count) + 0.5) / count
-            turns += [(place, float(np.sign(speed[after]))) for place in places.tolist()]
+            turns += [(place, sign[before], sign[after]) for place in places.tolist()]
+    last = len(speed) - 1
+    near = min(int(apart), last)
+    if abs(speed[0]) < abs(speed[near] - speed[0]):
+        turns.append((0.0, 0.0, sign[near]))
+    if abs(speed[last]) < abs(speed[last - near] - speed[last]):
+        turns.append((float(last), sign[last - near], 0.0))
     return turns
 
 

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from pymoo_hdte.discrepancy._evidence.order_lines.candidates import out_of_tolerance
 from pymoo_hdte.discrepancy._evidence.order_lines.features import MEANS, Features, measure
-from pymoo_hdte.discrepancy._evidence.order_lines.forms import Ranges, corrections
 from pymoo_hdte.discrepancy._evidence.order_lines.objective import Objective
 from pymoo_hdte.discrepancy._evidence.order_lines.observations import (
     Observations,
@@ -19,20 +18,27 @@ from pymoo_hdte.discrepancy._evidence.order_lines.observations import (
     cell_degrees_of_freedom,
 )
 from pymoo_hdte.discrepancy._evidence.order_lines.parameters import base_parameters
-from pymoo_hdte.discrepancy._evidence.order_lines.prediction import with_readings
+from pymoo_hdte.discrepancy._evidence.order_lines.prediction import coefficients_of, with_readings
 from pymoo_hdte.discrepancy._evidence.order_lines.steady_states import SCREENING
 from pymoo_hdte.discrepancy._evidence.order_lines.torsion_curve import torsion_points
 from pymoo_hdte.discrepancy._records.campaign import Campaign
 from pymoo_hdte.discrepancy._records.line_fit import CHANNELS
 from pymoo_hdte.discrepancy._selection.candidate import Candidate, Layout
-from pymoo_hdte.discrepancy._selection.excess import Excess, HeldOutTest
+from pymoo_hdte.discrepancy._selection.excess import Excess
 from pymoo_hdte.discrepancy._selection.fitting import Fit, Response
 from pymoo_hdte.discrepancy._selection.rules import RULES, Rules
-from pymoo_hdte.drive import DriveEffect
+from pymoo_hdte.drive import DriveEffect, SteadyMotion
+from pymoo_hdte.drive._solve.free_angle import torus_of
+from pymoo_hdte.drive._solve.torus import Torus
 from pymoo_hdte.effects.unknowns import Parameter
 
 Vector = NDArray[np.float64]
 
+CHANGED_NOISE = 1.5
+"""Ratio of variances from which on the noise of another model counts as another one.
+
+Set by hand: chi-square of what changes most is then off by half.
+"""
 PARTS = (*CHANNELS, "torsion_sweep")
 """Parts of the data, as in `Excess`: channels of the running records, and the sweeps."""
 
@@ -52,11 +58,6 @@ class Data(Observations):
     rules: Rules = RULES
     evident: frozenset[str] = frozenset()
 
-    @property
-    def model_error_share(self) -> float:
-        """Share of the base's excess up to which a residual counts as the model's own error."""
-        return self.rules.model_accuracy**2
-
     def objective(self, candidates: Sequence[Candidate]) -> Objective:
         """Return whitened residuals of the drive with candidates."""
         return Objective(self, candidates)
@@ -64,7 +65,9 @@ class Data(Observations):
     def response(self, fitted: Fit) -> Response:
         """Return how the whitened residuals of a fit respond to further effects."""
         base = fitted.values[None, : len(self.base)]
+        believed, values = self.campaign.believed, self._values_by_name(base)
         unchanged = self.prediction(base, fitted.effects)
+        here, on_torus = unchanged.balance, dict[Torus, SteadyMotion]()
         input_gain = 1.0 + float(base[0, Layout(self.base).index("input_torque_gain")])
         before = self.features.of_prediction(unchanged)
         before_torsion = self.torsion_residuals(base, fitted.effects)
@@ -75,22 +78,22 @@ class Data(Observations):
             if all(effect.only_reads for effect in added):
                 moved = with_readings(
                     unchanged, added, self.features.conditions,
-                    self.features.orders.tolist(), self.campaign.believed.ratio, input_gain,
+                    self.features.orders.tolist(), believed.ratio, input_gain,
                 )  # fmt: skip
             else:
-                moved = self.prediction(base, effects, unchanged.balance, SCREENING)
+                torus = torus_of(coefficients_of(believed, values, effects, 1))
+                moved = self.prediction(base, effects, on_torus.get(torus, here), SCREENING)
+                # Linear systems of many harmonics take longer than all else.
+                if moved.balance.torus is not here.torus and moved.balance.converged.all():
+                    on_torus.setdefault(torus, moved.balance)
             # A record without a steady state says nothing about the effect.
-            steady = (moved.balance.converged & unchanged.balance.converged)[:, None]
+            steady = (moved.balance.converged & here.converged)[:, None]
             changed = self.features.of_prediction(moved) - before
             running = self.whiten(np.where(steady, changed, 0.0))[0]
             torsion = self.torsion_residuals(base, effects) - before_torsion
             return np.concatenate([running, np.nan_to_num(torsion[0]), priors])
 
         return change
-
-    def corrections(self, candidate: Candidate) -> list[DriveEffect]:
-        """Return the corrections of a law's form: see `forms.corrections`."""
-        return corrections(candidate, _ranges_of(self))
 
     def rows_of_parts(self) -> list[NDArray[np.int_]]:
         """Return the indices of the residuals of each channel, and of the sweeps."""
@@ -131,34 +134,6 @@ class Data(Observations):
             self.base, at_bounds, believed.error_orders, together, believed.effects
         )
 
-    def held_out_test(self, base: Fit, fitted: Fit) -> HeldOutTest | None:
-        """Return what the records kept out of the fit say of two fits; None without any.
-
-        Creep in these records is noise or an error of the model: as noise it covers most of what a
-        loop that forgets does, and as an error it outweighs that. The version that speaks better
-        for the change counts, so that a change is denied only if both deny it.
-        """
-        if (data := self.held_out) is None:
-            return None
-        if not self.creep:
-            return data._held_out_test(base, fitted)
-        settled = replace(data.features.conditions, fading=None)
-        versions = data, replace(data, features=replace(data.features, conditions=settled))
-        tests = [version._held_out_test(base, fitted) for version in versions]
-        return max(tests, key=lambda test: (test.before - test.after) / max(test.change, 1e-300))
-
-    def _held_out_test(self, base: Fit, fitted: Fit) -> HeldOutTest:
-        """Return what these records say of two fits."""
-        before, after = (
-            self.whiten(
-                self.predict(fit.values[None, : len(self.base)], fit.effects)[0]
-                - self.features.values
-            )
-            for fit in (base, fitted)
-        )
-        change = after - before
-        return HeldOutTest(float(before @ before), float(after @ after), float(change @ change))
-
     @cached_property
     def held_out(self) -> Data | None:
         """Features of the records kept out of the fit, or None without such records.
@@ -174,6 +149,15 @@ class Data(Observations):
             features = features.rows(np.flatnonzero(held))
         return replace(self, features=features, torsion=()) if features.records else None
 
+    @property
+    def with_held_out(self) -> Data:
+        """The data with the records that are kept out of fits."""
+        if (held_out := self.held_out) is None:
+            return self
+        records = (*self.features.records, *held_out.features.records)
+        orders = self.features.orders.tolist()
+        return replace(self, features=measure(self.campaign, records, orders, self.rules))
+
     def with_noise_of(self, fitted: Fit) -> Data | None:
         """Return the data with the noise of another model, or None where the noise hardly grows.
 
@@ -183,8 +167,7 @@ class Data(Observations):
         base = fitted.values[: len(self.base)]
         renewed = replace(self, reference=base, reference_effects=fitted.effects)
         variances = (np.diagonal(data.covariance, axis1=1, axis2=2) for data in (renewed, self))
-        ratio = np.divide(*variances).max()
-        return renewed if ratio > self.rules.changed_noise_ratio else None
+        return renewed if np.divide(*variances).max() > CHANGED_NOISE else None
 
     @property
     def loaded(self) -> Data:
@@ -196,29 +179,6 @@ class Data(Observations):
         if np.all(held) or held.sum() < self.rules.fewest_records:
             return self
         return replace(self, features=self.features.rows(np.flatnonzero(held)))
-
-
-def _ranges_of(data: Data) -> Ranges:
-    """Return the ranges of speed, torque and time of the records."""
-    when, believed = data.features.conditions, data.campaign.believed
-    torques = [
-        np.abs(when.output_torque).max(),
-        *(np.abs(points.path).max() for points in data.torsion),
-    ]
-    lines = zip(believed.error_orders, believed.error_amplitudes, strict=True)
-    return Ranges(
-        np.abs(when.input_speed),
-        float(max(torques)),
-        float(max(torques)) / believed.stiffness,
-        float(np.ptp(when.elapsed)),
-        believed.ratio,
-        believed.stiffness,
-        believed.damping,
-        max(believed.load_inertia, believed.output_inertia),
-        tuple(order for order, amplitude in lines if amplitude > 0.0),
-        tuple(data.features.orders.tolist()),
-        data.rules.form_terms,
-    )
 
 
 def flanks_held(features: Features, torque_scale: float, rules: Rules) -> NDArray[np.bool_]:

@@ -10,15 +10,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pymoo_hdte.discrepancy._evidence.order_lines.corrections import Correction
-from pymoo_hdte.discrepancy._evidence.order_lines.evidence import Data, _ranges_of
+from pymoo_hdte.discrepancy._evidence.order_lines.corrections import Correction, LoadRate
+from pymoo_hdte.discrepancy._evidence.order_lines.evidence import Data
 from pymoo_hdte.discrepancy._evidence.order_lines.features import MEANS
-from pymoo_hdte.discrepancy._evidence.order_lines.forms import load_series
 from pymoo_hdte.discrepancy._records.line_fit import CHANNELS
 from pymoo_hdte.discrepancy._selection.candidate import Candidate
 from pymoo_hdte.discrepancy._selection.fitting import Fit, Response
@@ -48,6 +46,9 @@ _FREQUENCY_LENGTH = 0.3
 """Length over which a response errs, where the logarithm of the frequency runs from -1 to 1."""
 _STEP = 0.01
 """Relative step by which a law is changed to see what follows."""
+_RATES = (1, 2, 3, 4)
+"""Derivatives of the load's acceleration: a line that a coupling delays by a third of a radian
+needs no more for a hundredth of its torque."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -230,23 +231,23 @@ class LawErrors:
             for effect in candidate.build([float(value) for value in values])
             if isinstance(effect, LawAtPort) and effect.port == "mesh"
         ]
-        ranges = _ranges_of(self.data)
+        travel = self._torque / self.data.campaign.believed.stiffness
         for effect in laws:
             if effect.law.states:
-                yield self._springs(ranges, response, float(np.abs(values[0])))
+                yield self._springs(travel, response, float(np.abs(values[0])))
                 continue
             changes = [
-                response((Correction("mesh", ScaledLaw(effect.law, ranges.travel, k, _STEP)),))
+                response((Correction("mesh", ScaledLaw(effect.law, travel, k, _STEP)),))
                 for k in range(1, TERMS + 1)
             ]
             yield np.column_stack(changes)[: self.n_rows] / _STEP
 
-    def _springs(self, ranges: Any, response: Response, force: float) -> Matrix:
+    def _springs(self, travel: float, response: Response, force: float) -> Matrix:
         """Return what springs do that slip elsewhere, each of a share of the force, (n, m)."""
         shares = np.geomspace(0.01, 1.0, TERMS)
         size = max(_STEP * force, 1e-12)
         changes = [
-            response((Correction("mesh", MaxwellSlip(size, share * ranges.travel, 1e-3)),))
+            response((Correction("mesh", MaxwellSlip(size, share * travel, 1e-3)),))
             for share in shares
         ]
         return np.column_stack(changes)[: self.n_rows] / (_STEP * np.sqrt(TERMS))
@@ -256,7 +257,7 @@ class LawErrors:
         """What no law holds: a process over speed and load at each line and mean of a channel.
 
         And a torque at each port and order, as it shows in all channels. Each has a scale from
-        what is visible up to the misfit of the base.
+        what is visible up to all that is measured.
         """
         return tuple(self._outside())
 
@@ -275,10 +276,11 @@ class LawErrors:
                 values[block, :, row] = self._noise[row] * self.conditions.T
             yield self._place(name, self.data.whiten(values).T, len(rows) * n_records)
         yield from self._responses()
-        ranges = _ranges_of(self.data)
-        for port, size in (("input", ranges.torque / ranges.ratio), ("output", ranges.torque)):
+        ratio = self.data.campaign.believed.ratio
+        for port, slower in (("input", 1.0), ("output", ratio)):
+            size = self._torque * slower / ratio
             for order in features.orders:
-                at_port = float(order) * ranges.slower(port)
+                at_port = float(order) * slower
                 parts = [
                     self._running(Correction(port, PeriodicTorque(at_port, phase, _STEP * size)))
                     for phase in (0.0, np.pi / 2.0)
@@ -288,7 +290,7 @@ class LawErrors:
                     f"torque of order {order:.4g} at {port}", np.hstack(columns), 2 * n_records
                 )
         response = self.data.response(self.base)
-        hanging = np.column_stack([response((effect,)) for effect in load_series(ranges)])
+        hanging = np.column_stack([response((effect,)) for effect in self._load_series])
         running = features.values.size
         yield self._place("what hangs at the output", hanging[:running], running)
         start = features.values.size
@@ -301,6 +303,20 @@ class LawErrors:
             swept[start:stop] = points.whitening @ sines * np.median(points.deviation)
             start = stop
             yield self._place("torsion sweep", swept, len(points.angle))
+
+    @property
+    def _torque(self) -> float:
+        """Largest torque at the output, N.m."""
+        paths = [np.abs(points.path).max() for points in self.data.torsion]
+        return float(max(np.abs(self.data.features.conditions.output_torque).max(), *paths, 0.0))
+
+    @property
+    def _load_series(self) -> list[LoadRate]:
+        """Torques of a load that hangs on a spring, a damper or both: a series in the rate."""
+        believed = self.data.campaign.believed
+        inertia = max(believed.load_inertia, believed.output_inertia)
+        fastest = np.abs(self.data.features.conditions.input_speed).max()
+        return [LoadRate(k, 1e-3 * inertia / fastest**k) for k in _RATES]
 
     def _running(self, effect: DriveEffect) -> Matrix:
         """Return how a further effect changes the running records of the base, (n_running,).
@@ -336,13 +352,20 @@ class LawErrors:
             columns = self.data.whiten(change.reshape(-1, *features.values.shape)).T
             yield self._place(f"response of {name}", columns, 2 * place.size)
 
+    @cached_property
+    def _measured(self) -> float:
+        """Square of all that is measured, or of the misfit if that is larger, in its noise."""
+        measured = float(np.sum(self.data.whiten(self.data.features.values) ** 2))
+        return max(measured, self.base.chi_square)
+
     def _place(self, name: str, columns: Matrix, n_rows: int) -> Sized:
-        """Return what may be at a place: from as large as the noise of its rows to the misfit."""
+        """Return what may be at a place: from as large as the noise of its rows to all there is.
+
+        Up to the misfit only, it would lose nothing where that is small, and come for nothing
+        beside every effect.
+        """
         whole, m = self._whole(columns), columns.shape[1]
         size = max(float(np.sum(whole**2)), 1e-24)
-        least, most = (
-            np.sqrt(n_rows / size),
-            np.sqrt(max(self.base.chi_square, 4.0 * n_rows) / size),
-        )
+        least, most = np.sqrt(n_rows / size), np.sqrt(self._measured / size)
         none = np.zeros(m)
         return Sized(f"outside: {name}", whole, float(least), float(most), none, none > 0.0)

@@ -32,6 +32,7 @@ from pymoo_hdte.discrepancy._records.campaign import Campaign
 from pymoo_hdte.discrepancy._records.known_values import of_equal_numbers
 from pymoo_hdte.discrepancy._records.line_fit import CHANNELS
 from pymoo_hdte.discrepancy._selection.candidate import Candidate, Layout
+from pymoo_hdte.discrepancy._selection.linearised import LEAST_ERROR
 from pymoo_hdte.drive import DriveEffect, LawAtPort, SteadyMotion, mean_torsion
 from pymoo_hdte.effects.unknowns import Parameter
 
@@ -89,13 +90,27 @@ class Observations:
     def covariance(self) -> NDArray[np.float64]:
         """Covariance of the features of each record, shape (r, f, f).
 
-        It is the sum of those of sensors, of the repeatability, and of creep in laws that forget
-        gradually.
+        It is the sum of those of sensors, of the repeatability, of creep in laws that forget
+        gradually, and of the model's own error where an effect dominates.
         """
         layout = Layout(self.base)
         start = layout.array("start") if self.reference is None else self.reference
-        known = self._of_sensors(start) + self._repeatability(layout, start)
+        known = self._of_sensors(start) + self._repeatability(layout, start) + self._of_model(start)
         return known + self._creep(float(start[layout.index("stiffness")]))
+
+    def _of_model(self, start: Vector) -> NDArray[np.float64] | float:
+        """Return the covariance by what the model does not hold of what the effects change.
+
+        Of a line as a whole, as that may be in its phase as well.
+        """
+        if not self.reference_effects:
+            return 0.0
+        change = self.predict(start[None], self.reference_effects)[0]
+        change = change - self.predict(start[None], ())[0]
+        for channel in range(len(CHANNELS)):
+            places = self.features.places(channel)
+            change[:, places] = np.linalg.norm(change[:, places], axis=2, keepdims=True)
+        return np.asarray((LEAST_ERROR * change[:, :, None]) ** 2 * np.eye(change.shape[1]))
 
     def _of_sensors(self, start: Vector) -> NDArray[np.float64]:
         """Return the covariance by the noise of the sensors, (r, f, f).

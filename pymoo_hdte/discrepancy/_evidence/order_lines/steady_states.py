@@ -126,12 +126,7 @@ class Lead:
 
     def on(self, torus: Torus) -> NDArray[np.complex128]:
         """Return the harmonics (n, n_harmonics) of a torus; those that it has not are left out."""
-        harmonics = np.zeros((len(self.phasors), len(torus.orders)), dtype=complex)
-        for order, column in zip(self.orders.tolist(), self.phasors.T, strict=True):
-            if (place := torus.find(order)) is not None:
-                index, conjugate = place
-                harmonics[:, index] = column.conj() if conjugate else column
-        return harmonics
+        return torus.harmonics(self.orders, self.phasors)
 
 
 class Continuation:

@@ -1,1 +1,0 @@
-"""Whether one score of probability decides as well as the rules of the verdict: a pilot."""
