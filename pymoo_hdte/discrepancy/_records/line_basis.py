@@ -23,6 +23,10 @@ FADING = (0.02, 0.05, 0.1, 0.25, 0.6, 2.0)
 record of an output turn: from two turns of its input, before which a loop is not yet formed, to
 what hardly fades, some three times apart. A loop that forgets takes several, as it slows down."""
 
+_FASTEST = 2.0
+"""Speed up to which a row's own one counts, in mean speeds: far above a noisy one."""
+_STILL = 1e-9
+"""Phase between samples below which averaging changes nothing, rad."""
 ROWS_A_BLOCK = 1 << 15
 """Rows worked on at once, to bound the memory."""
 
@@ -149,6 +153,8 @@ class LineFit:
 def _design(record: RunningRecord, orders: NDArray[np.float64], part: slice) -> NDArray[np.float64]:
     """Return the columns of the fit in some rows, (b, p), as `LineFit` has them."""
     waves = _waves(record.input_angle[part], orders)
+    if record.samples_averaged > 1:
+        waves *= _averaging_at_rows(record, orders, part)
     time = centred(record, part)
     settling = []
     if record.settling is not None:
@@ -157,6 +163,38 @@ def _design(record: RunningRecord, orders: NDArray[np.float64], part: slice) -> 
     steps = [record.time[part] >= jump.time for jump in record.jumps]
     lines = waves.real, -waves.imag
     return np.vstack([np.ones_like(time), time, *lines, *settling, *steps]).T
+
+
+def _averaging_at_rows(
+    record: RunningRecord, orders: NDArray[np.float64], part: slice
+) -> NDArray[np.float64]:
+    """Return the gain of averaging in some rows beside that at the mean speed, shape (m, b).
+
+    A row is a mean over a time, in which an order passes faster where the input does. To the second
+    order in that time, the mean of exp(i order angle) is this gain times exp(i order angle) at the
+    mean of the angle, which is measured: what the speed's change does to the two of them cancels.
+    """
+    mean = mean_speed(record)
+    first, last, _ = part.indices(len(record.time))
+    around = slice(max(first - 1, 0), min(last + 1, len(record.time)))
+    speed = np.abs(np.gradient(record.input_angle[around], record.time[around]))
+    speed = np.clip(speed[first - around.start :][: last - first], 0.0, _FASTEST * mean)
+    at_mean = averaging_gain(orders, record, mean)[:, None]
+    return averaging_gain(orders[:, None], record, speed) / at_mean
+
+
+def averaging_gain(
+    orders: ArrayLike, record: RunningRecord, speed: ArrayLike
+) -> NDArray[np.float64]:
+    """Return the factor by which averaging of raw samples reduces a line; as both broadcast.
+
+    The mean of n samples, Delta apart, of exp(i w t) is exp(i w t_mid) times
+    ``sin(n w Delta / 2) / (n sin(w Delta / 2))``, with w = order x speed of the input, rad/s.
+    """
+    n = record.samples_averaged
+    half = np.asarray(orders) * speed / (2.0 * n * record.sample_rate)
+    half = np.maximum(half, _STILL)
+    return np.asarray(np.sin(n * half) / (n * np.sin(half)))
 
 
 def _waves(angle: NDArray[np.float64], orders: NDArray[np.float64]) -> NDArray[np.complex128]:

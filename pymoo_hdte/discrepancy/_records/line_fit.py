@@ -23,7 +23,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from pymoo_hdte.checks import finite_array
 from pymoo_hdte.discrepancy._records.believed import Rig
-from pymoo_hdte.discrepancy._records.line_basis import LineFit, mean_speed, nyquist_order
+from pymoo_hdte.discrepancy._records.line_basis import (
+    LineFit,
+    averaging_gain,
+    mean_speed,
+    nyquist_order,
+)
 from pymoo_hdte.discrepancy._records.records import RunningRecord
 
 CHANNELS = ("transmission_error", "input_torque", "output_torque", "input_angle")
@@ -146,7 +151,7 @@ def order_lines(
     fit = LineFit.of(record, ratio, [*checked, *_doubles(checked, record, ratio)])
     m, n_fitted = len(checked), len(fit.orders)
     of_lines = np.r_[2 : 2 + m], np.r_[2 + n_fitted : 2 + n_fitted + m]
-    gains, coefficients = averaging_gain(checked, record), fit.coefficients
+    gains, coefficients = averaging_gain(checked, record, mean_speed(record)), fit.coefficients
     real, imaginary = (coefficients[rows].T for rows in of_lines)
     inverse = np.linalg.inv(fit.triangle)
     columns = np.r_[0, of_lines[0], of_lines[1]]
@@ -170,7 +175,7 @@ def order_lines(
     beyond = beyond[(between > 1.0) & (between < record.samples_averaged)]
     parts_of_folded = np.zeros((len(folded), 2, 1 + m), dtype=complex)
     if beyond.size:
-        shares = averaging_gain(beyond, record)
+        shares = averaging_gain(beyond, record, mean_speed(record))
 
         def waves(part: slice) -> NDArray[np.float64]:
             turned = np.outer(record.input_angle[part], beyond)
@@ -247,7 +252,7 @@ def unsteady_lines(
     parts = np.linalg.solve(fit.triangle, fit.projected(signals))
     m, n_fitted = len(orders), len(fit.orders)
     shown = parts[2 : 2 + m] + 1j * parts[2 + n_fitted : 2 + n_fitted + m]
-    shown = shown.T / averaging_gain(orders, record)
+    shown = shown.T / averaging_gain(orders, record, mean_speed(record))
     rate = 1j * orders * lines.slope[3]
     beyond = np.stack([shown[1] - rate * shown[0], shown[2] - rate**2 * shown[0]])
     # Of a motion under white noise of acceleration whose position is seen in white noise: the
@@ -295,17 +300,6 @@ def _doubles(orders: NDArray[np.float64], record: RunningRecord, ratio: float) -
         if order < highest and distances.min() > _APART / ratio:
             doubles.append(order)
     return doubles
-
-
-def averaging_gain(orders: ArrayLike, record: RunningRecord) -> NDArray[np.float64]:
-    """Return the factor by which averaging of raw samples reduces each line, shape (m,).
-
-    The mean of n samples, Delta apart, of exp(i w t) is exp(i w t_mid) times
-    ``sin(n w Delta / 2) / (n sin(w Delta / 2))``, with w = order x mean input speed.
-    """
-    n = record.samples_averaged
-    half = np.asarray(orders) * mean_speed(record) / (2.0 * n * record.sample_rate)
-    return np.sin(n * half) / (n * np.sin(half))
 
 
 def row_covariance(rig: Rig, ratio: float, samples_averaged: int) -> NDArray[np.float64]:

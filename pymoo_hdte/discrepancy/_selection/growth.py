@@ -150,18 +150,20 @@ class Growth:
     candidates : sequence of Candidate
         Effects that may be missing, and nuisances of the bench.
     errors : Errors
+    screened : dict of str to Screened
+        What each candidate does alone, if it is known.
     """
 
     data: Evidence
     base: Fit
     candidates: Sequence[Candidate]
     errors: Errors
+    screened: dict[str, Screened] = field(default_factory=dict)
     counts: Counter[str] = field(init=False)
     _known: dict[frozenset[str], Weighed] = field(default_factory=dict)
     _invisible: set[frozenset[str]] = field(default_factory=set)
     _extended: set[frozenset[str]] = field(default_factory=set)
     _complete: set[frozenset[str]] = field(default_factory=set)
-    _signatures: dict[str, Screened] = field(default_factory=dict)
     _outside: dict[Weighed, Weighed] = field(default_factory=dict)
     _varied: set[frozenset[str]] = field(default_factory=set)
     _tried: set[tuple[frozenset[str], bytes]] = field(default_factory=set)
@@ -196,7 +198,6 @@ class Growth:
         self._weigh(self.base)
         for fitted in likely:
             self._fit(fitted.candidates, fitted.values)
-        self._extend(self._known[frozenset()])
         yield from self._settled()
         for _ in range(MOST_FIRSTS):
             further = [weighed for weighed in self.ranked if self._may_be_extended(weighed)]
@@ -234,12 +235,14 @@ class Growth:
         lacking = [weighed for weighed in self.ranked if self._lacks_evident(weighed.candidates)]
         ranked = [weighed for weighed in self.ranked if weighed not in lacking] or lacking
         best = ranked[0]
-        # Far behind the likeliest set only one without some of its members may gain by that.
+        # Far behind the likeliest set only one without some of its members may gain by that, and
+        # only what the likeliest one leaves.
+        lacks = self._lacks_something(best)
         near = [
             weighed
             for weighed in ranked
             if weighed.weight >= best.weight - WINDOW
-            or label_of(weighed.candidates) < label_of(best.candidates)
+            or (lacks and label_of(weighed.candidates) < label_of(best.candidates))
         ]
         looked_beside = [
             weighed
@@ -344,19 +347,19 @@ class Growth:
         integral = Integral(weighed.linearised)
         integral.score()
         n = len(weighed.linearised.residuals)
-        if self._signatures:
-            before = [self._signatures[c.label] for c in candidates if c.label in self._signatures]
+        if self.screened:
+            before = [self.screened[c.label] for c in candidates if c.label in self.screened]
             hopeful = self._gains(integral, before, n)
             candidates = [
                 effect.candidate
                 for effect, gain in zip(before, hopeful, strict=True)
-                if gain >= -WINDOW and self._may_reach(weighed.weight, effect, gain)
-            ] + [c for c in candidates if c.label not in self._signatures]
+                if self._may_raise(effect, gain) and self._may_reach(weighed.weight, effect, gain)
+            ] + [c for c in candidates if c.label not in self.screened]
         if not candidates:
             return
         screened = screen(self.data, weighed.fit, candidates)
         if not members:
-            self._signatures.update((effect.candidate.label, effect) for effect in screened)
+            self.screened.update((effect.candidate.label, effect) for effect in screened)
         gains = self._gains(integral, screened, n)
         ranked = np.argsort(-gains, kind="stable")
         taken = Counter[str]()
@@ -367,7 +370,10 @@ class Growth:
             if taken[effect.candidate.name] == OF_ONE_NAME:
                 continue
             tried = bool(members) or taken.total() >= FEWEST
-            if tried and not self._may_reach(weighed.weight, effect, gains[place]):
+            if tried and not (
+                self._may_raise(effect, gains[place])
+                and self._may_reach(weighed.weight, effect, gains[place])
+            ):
                 break
             taken[effect.candidate.name] += 1
             self._fit((*members, effect.candidate), np.append(weighed.fit.values, effect.start))
@@ -396,11 +402,23 @@ class Growth:
         """Tell whether a set of a weight is within the window of the likeliest one."""
         return weight >= self.ranked[0].weight - WINDOW
 
+    def _may_raise(self, effect: Screened, gain: float) -> bool:
+        """Tell whether a set may become likelier by an effect: what is not has no say.
+
+        A set that is less likely than a part of it says nothing that this part does not (the second
+        principle of Occam's window).
+        """
+        return self._at_most(effect, gain) >= 0.0
+
     def _may_reach(self, weight: float, effect: Screened, gain: float) -> bool:
         """Tell whether a set of a weight may come near the likeliest one by an effect's gain."""
+        return self._near(weight + self._at_most(effect, gain))
+
+    def _at_most(self, effect: Screened, gain: float) -> float:
+        """Return by how much an effect may raise a probability that it raises to first order."""
         prior = self._prior((effect.candidate,))
         trusted = OF_LINEAR if effect.candidate.linear else TRUSTED
-        return self._near(weight + trusted * max(gain - prior, 0.0) + prior)
+        return trusted * max(gain - prior, 0.0) + prior
 
     def _gains(self, integral: Integral, screened: Sequence[Screened], n: int) -> Vector:
         """Return by how much each effect could raise the probability of a set to first order."""
@@ -425,7 +443,7 @@ class Growth:
         label, effects = label_of(others), [effect for effect, _ in weighed.fit.places]
         if label in self._invisible:
             return None
-        if member.releases is not None or not self._signatures:
+        if member.releases is not None or not self.screened:
             self._trial(others, values)
             return self._known.get(label)
         linearised = weighed.linearised.without(effects.index(member))
@@ -436,7 +454,7 @@ class Growth:
         if known is None and not self._near(weighed.weight - (weighed.weight - weight) / TRUSTED):
             further = [
                 effect
-                for effect in self._signatures.values()
+                for effect in self.screened.values()
                 if effect.candidate.name != member.name
                 and all(effect.candidate.goes_with(other) for other in others)
             ]
@@ -495,11 +513,13 @@ class Growth:
     def _with_outside(self, weighed: Weighed) -> Weighed:
         """Return a set with something outside of the library as well."""
         if weighed not in self._outside:
-            score, places = score_with_outside(weighed.linearised, self.errors.outside)
+            prior = self._prior(weighed.candidates, True)
+            hopeless = self.ranked[0].weight - WINDOW - prior
+            score, places = score_with_outside(weighed.linearised, self.errors.outside, hopeless)
             self._outside[weighed] = replace(
                 weighed,
                 score=score,
-                prior=self._prior(weighed.candidates, True),
+                prior=prior,
                 worst_chance=score.worst_chance(self.errors.groups),
                 outside=True,
                 places=tuple(places),

@@ -217,7 +217,9 @@ def score(hypothesis: Linearised) -> Score:
     return Integral(hypothesis).score()
 
 
-def score_with_outside(hypothesis: Linearised, places: Sequence[Sized]) -> tuple[Score, list[str]]:
+def score_with_outside(
+    hypothesis: Linearised, places: Sequence[Sized], hopeless: float = -np.inf
+) -> tuple[Score, list[str]]:
     """Return the marginal likelihood beside something outside of the library, and where that is.
 
     It may be at any of the places. A further one is taken as long as that raises the probability;
@@ -228,6 +230,9 @@ def score_with_outside(hypothesis: Linearised, places: Sequence[Sized]) -> tuple
     hypothesis : Linearised
     places : sequence of Sized
         What could be at each place.
+    hopeless : float
+        Logarithm of a likelihood below which nobody asks for it: the search ends where all further
+        places together would not reach that if each brought `FURTHER` times as much as the best.
 
     Returns
     -------
@@ -248,6 +253,8 @@ def score_with_outside(hypothesis: Linearised, places: Sequence[Sized]) -> tuple
                 mean = largest + float(np.log(np.sum(np.exp(gains - largest)))) - price
                 return replace(best, ln=best.ln + mean), []
             break
+        if taken and best.ln + FURTHER * (MOST_PLACES - len(taken)) * largest < hopeless:
+            break
         place = remaining.pop(int(np.argmax(gains)))
         integral = Integral(hypothesis.beside(*taken, place))
         trial = integral.score()
@@ -261,6 +268,9 @@ def score_with_outside(hypothesis: Linearised, places: Sequence[Sized]) -> tuple
 MOST_PLACES = 12
 """Most places at which something outside of the library is looked for. What needs more leaves more
 than noise, which the check of the likeliest explanation sees."""
+FURTHER = 3.0
+"""Factor by which a place may bring more than to first order, as less of the rest is noise then:
+width of the search."""
 
 
 @dataclass(eq=False)

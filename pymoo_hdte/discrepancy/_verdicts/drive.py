@@ -28,6 +28,7 @@ from pymoo_hdte.discrepancy._evidence.order_lines.sizes import (
 from pymoo_hdte.discrepancy._evidence.order_lines.steady_states import PREDICTION, Lead
 from pymoo_hdte.discrepancy._records.campaign import Campaign
 from pymoo_hdte.discrepancy._records.cleaning.cleaning import cleaned_rows
+from pymoo_hdte.discrepancy._records.line_fit import CHANNELS
 from pymoo_hdte.discrepancy._records.records import RunningRecord
 from pymoo_hdte.discrepancy._selection.candidate import Candidate
 from pymoo_hdte.discrepancy._selection.fitting import Fit, fit
@@ -101,23 +102,26 @@ def examine_drive(campaign: Campaign, rules: Rules = RULES) -> DriveFinding:
         data = rattling.with_clearance(data)
     _check_steady(data)
     base = fit(data)
-    if harmonics := _harmonics(data, base):
-        orders = sorted([*data.features.orders.tolist(), *harmonics])
-        wider = replace(data, features=measure(campaign, data.features.records, orders, rules))
+    harmonics, exciting = _beyond(data, base)
+    if further := [*harmonics, *exciting]:
+        orders = sorted([*data.features.orders.tolist(), *further])
+        records = data.features.records
+        wider = replace(data, features=measure(campaign, records, orders, rules, exciting))
         judged = rattling.judged(wider, fit(wider, start=base.values), _candidates)
-    if not harmonics or judged[-1].status == "unlisted":
+    if not further or judged[-1].status == "unlisted":
         # Where no fit follows the harmonics, as in a record that then has no steady state, the
         # lower orders may still be explained.
         judged, harmonics = rattling.judged(data, base, _candidates), []
     return DriveFinding(campaign, *judged, (*unexpected, *harmonics), rows)
 
 
-def _harmonics(data: Data, base: Fit) -> list[float]:
-    """Return what strong lines bring above the orders looked at, where that is strong, too.
+def _beyond(data: Data, base: Fit) -> tuple[list[float], list[float]]:
+    """Return what strong lines bring above the orders looked at, and where that only excites.
 
-    The harmonics of a line belong to its effect, and what they leave out of a fit ends in other
-    values, as in the gains of sensors; lines of poles and slots belong to one motor. Each record is
-    asked for what its rows show.
+    The harmonics of a strong line belong to its effect, if they are strong, too: what they leave
+    out of a fit ends in other values, as in the gains of sensors; lines of poles and slots belong
+    to one motor. Where the input moves at such an order, perhaps in a single record, the drive is
+    excited by that. Each record is asked for what its rows show.
     """
     campaign, features, rules = data.campaign, data.features, data.rules
     orders, lowest = features.orders.tolist(), highest_order(campaign, rules)
@@ -134,12 +138,24 @@ def _harmonics(data: Data, base: Fit) -> list[float]:
         if lowest < order <= most and not is_among(orders, order)
     ]
     if not further:
-        return []
+        return [], []
     everything = measure(campaign, features.records, sorted([*orders, *further]), rules)
     wider = replace(data, features=everything)
     residuals = wider.objective(()).residuals(base.values)
     strong = _strong_lines(everything, residuals, rules)
-    return [order for order in further if is_among(strong, order)]
+    moved = _moved_lines(everything, rules)
+    harmonics = [order for order in further if is_among(strong, order)]
+    exciting = [order for order in further if is_among(moved, order) and order not in harmonics]
+    return harmonics, exciting
+
+
+def _moved_lines(features: Features, rules: Rules) -> list[float]:
+    """Return the orders at which the measured input moves in some record, whatever the cause."""
+    places = features.places(CHANNELS.index("input_angle"))
+    variances = np.diagonal(features.covariance, axis1=1, axis2=2)[:, places]
+    power = np.sum(features.values[:, places] ** 2 / variances, axis=2)
+    chance = rules.order_line_chance / power.shape[0]
+    return features.orders[power.max(axis=0) > _threshold(2, chance)].tolist()
 
 
 def _check_steady(data: Data) -> None:

@@ -21,6 +21,7 @@ from pymoo_hdte.discrepancy._selection.decided import verdict_of
 from pymoo_hdte.discrepancy._selection.fitting import Fit, fit
 from pymoo_hdte.discrepancy._selection.growth import MOST_MEMBERS, Growth
 from pymoo_hdte.discrepancy._selection.rules import RULES, Rules
+from pymoo_hdte.discrepancy._selection.screening import Screened
 from pymoo_hdte.discrepancy._selection.verdict import Verdict
 from pymoo_hdte.effects.effect import effect_named, known_effects
 
@@ -97,9 +98,9 @@ def _grown(data: Data, base: Fit, candidates: Sequence[Candidate]) -> tuple[Data
     channel, and one that creeps leaves what fades. Where the likeliest set does so, the sets are
     compared anew: without it, what creeps seemed to be further effects beside a hysteresis.
     """
-    likely: Sequence[Fit] = ()
+    likely, screened = list[Fit](), dict[str, Screened]()
     for renewals in range(MOST_RENEWED + 1):
-        growth, renewed = Growth(data, base, candidates, LawErrors(data, base)), None
+        growth, renewed = Growth(data, base, candidates, LawErrors(data, base), screened), None
         for fitted in growth.steps(likely):
             renewed = data.with_noise_of(fitted) if renewals < MOST_RENEWED else None
             if renewed is not None:
@@ -107,6 +108,10 @@ def _grown(data: Data, base: Fit, candidates: Sequence[Candidate]) -> tuple[Data
         likely = growth.likeliest
         if renewed is None:
             break
+        screened = {
+            label: replace(effect, signatures=renewed.rewhitened(effect.signatures, data))
+            for label, effect in growth.screened.items()
+        }
         data, base = renewed, fit(renewed, start=base.values)
     return data, growth
 

@@ -23,6 +23,7 @@ from pymoo_hdte.discrepancy._evidence.order_lines.steady_states import SCREENING
 from pymoo_hdte.discrepancy._evidence.order_lines.torsion_curve import torsion_points
 from pymoo_hdte.discrepancy._records.campaign import Campaign
 from pymoo_hdte.discrepancy._records.line_fit import CHANNELS
+from pymoo_hdte.discrepancy._records.records import RunningRecord
 from pymoo_hdte.discrepancy._selection.candidate import Candidate, Layout
 from pymoo_hdte.discrepancy._selection.excess import Excess
 from pymoo_hdte.discrepancy._selection.fitting import Fit, Response
@@ -143,7 +144,7 @@ class Data(Observations):
         records = self.campaign.held_out
         if not records:
             return None
-        features = measure(self.campaign, records, self.features.orders.tolist())
+        features = self._measured(records)
         if len(self.features.records) < len(self.campaign.train):
             held = flanks_held(features, self.campaign.torque_scale, self.rules)
             features = features.rows(np.flatnonzero(held))
@@ -155,8 +156,14 @@ class Data(Observations):
         if (held_out := self.held_out) is None:
             return self
         records = (*self.features.records, *held_out.features.records)
-        orders = self.features.orders.tolist()
-        return replace(self, features=measure(self.campaign, records, orders, self.rules))
+        return replace(self, features=self._measured(records))
+
+    def _measured(self, records: Sequence[RunningRecord]) -> Features:
+        """Return records as these features are."""
+        features = self.features
+        return measure(
+            self.campaign, records, features.orders.tolist(), self.rules, features.only_exciting
+        )
 
     def with_noise_of(self, fitted: Fit) -> Data | None:
         """Return the data with the noise of another model, or None where the noise hardly grows.
@@ -168,6 +175,16 @@ class Data(Observations):
         renewed = replace(self, reference=base, reference_effects=fitted.effects)
         variances = (np.diagonal(data.covariance, axis1=1, axis2=2) for data in (renewed, self))
         return renewed if np.divide(*variances).max() > CHANGED_NOISE else None
+
+    def rewhitened(self, changes: Vector, before: Data) -> Vector:
+        """Return changes (k, n) of residuals that were whitened ``before``, with this noise."""
+        if not changes.size:
+            return changes
+        shape = self.features.values.shape
+        n_running = self.features.values.size
+        running = changes[:, :n_running].reshape(-1, *shape)
+        running = np.einsum("rij,krj->kri", before.whiteners, running)
+        return np.hstack([self.whiten(running), changes[:, n_running:]])
 
     @property
     def loaded(self) -> Data:

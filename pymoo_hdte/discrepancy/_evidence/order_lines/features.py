@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,7 +58,7 @@ class Features:
     covariance : ndarray, shape (r, n_features, n_features)
         Covariance of the sensors' noise only.
     shown : ndarray of bool, shape (r, m), optional
-        Which lines each record shows; by default all.
+        Which lines each record shows, and is judged by; by default all.
     wander : ndarray, shape (r, m), optional
         Variance of the lines of the input angle by what the motor does beside its loop, rad2: see
         `wander_of_lines`; by default none.
@@ -88,6 +89,19 @@ class Features:
             None if self.ends is None else self.ends[rows],
         )
 
+    @property
+    def only_exciting(self) -> list[float]:
+        """Orders of lines of the input that no record is judged by."""
+        return [] if self.shown is None else self.orders[~self.shown.any(axis=0)].tolist()
+
+    @cached_property
+    def judged(self) -> NDArray[np.bool_]:
+        """Which features are measured, and not those of lines that are not shown: (r, n)."""
+        if self.shown is None:
+            return np.ones(self.values.shape, dtype=bool)
+        means = np.ones((len(self.shown), len(MEANS)), dtype=bool)
+        return np.hstack([means, *[self.shown] * (2 * len(CHANNELS))])
+
     def of_prediction(self, prediction: Prediction) -> NDArray[np.float64]:
         """Return predicted features, shape (v, r, n_features)."""
         phasors = prediction.phasors
@@ -114,8 +128,11 @@ def measure(
     records: Sequence[RunningRecord],
     orders: Sequence[float],
     rules: Rules = RULES,
+    only_exciting: Sequence[float] = (),
 ) -> Features:
     """Return the features of records, each at those of the orders that it shows.
+
+    By lines at some of them, which are ``only_exciting``, no record is judged.
 
     Raises
     ------
@@ -161,7 +178,13 @@ def measure(
         lead_share=wander / (wander + noise),
         unsteady=unsteady,
     )
-    values = np.array([stack(line.mean, line.phasors) for line in lines])
+    shown &= ~np.isin(all_orders, only_exciting)
+    values = np.array(
+        [
+            stack(line.mean, np.where(of_record, line.phasors, 0.0))
+            for line, of_record in zip(lines, shown, strict=True)
+        ]
+    )
     stiffness = campaign.believed.stiffness
     covariance = np.array([_sensor_covariance(line, rig, stiffness) for line in lines])
     # The load is the measured output torque, whose error also shifts the predicted input torque.

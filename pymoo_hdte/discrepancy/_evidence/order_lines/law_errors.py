@@ -37,6 +37,8 @@ LENGTH = 1.0
 Its process has one derivative (Matern, 3/2): one with all of them, known at some records, would be
 known at the others to a ten-thousandth, which no error of a law is.
 """
+_NOTHING = 1e-12
+"""Values for which a residual counts that is zero by definition."""
 _SMALLEST = 1e-9
 """Least share of the variance of a process for which a direction counts."""
 REPEATABLE = (0.03, 30.0)
@@ -176,7 +178,16 @@ class LawErrors:
             whole = whole[:, np.linalg.norm(whole, axis=0) > 0.0]
             return whole if whole.size else None
 
-        return linearise(fitted, self.channels, errors).beside(*self.of_records)
+        hypothesis = linearise(fitted, self.channels, errors, shares=self._shares)
+        return hypothesis.beside(*self.of_records)
+
+    @property
+    def _shares(self) -> Matrix:
+        """1 for residuals of what is measured, and as good as 0 for lines that are not shown."""
+        shares = np.ones(self.n_rows)
+        judged = self.data.features.judged.ravel()
+        shares[: judged.size][~judged] = _NOTHING
+        return shares
 
     @cached_property
     def of_records(self) -> tuple[Sized, ...]:
@@ -264,10 +275,14 @@ class LawErrors:
     def _outside(self) -> Iterator[Sized]:
         features = self.data.features
         n_records, n_features = features.values.shape
+        exciting = features.only_exciting
+        judged = [order for order in features.orders.tolist() if order not in exciting]
         places = [(f"mean of {CHANNELS[channel]}", [row]) for row, channel in enumerate(MEANS)]
         for channel, name in enumerate(CHANNELS):
-            for order, pair in zip(features.orders, features.places(channel), strict=True):
-                places.append((f"order {order:.4g} of {name}", pair.tolist()))
+            pairs = zip(features.orders.tolist(), features.places(channel).tolist(), strict=True)
+            places += [
+                (f"order {order:.4g} of {name}", pair) for order, pair in pairs if order in judged
+            ]
         k = self.conditions.shape[1]
         for name, rows in places:
             values = np.zeros((len(rows) * k, n_records, n_features))
@@ -279,8 +294,8 @@ class LawErrors:
         ratio = self.data.campaign.believed.ratio
         for port, slower in (("input", 1.0), ("output", ratio)):
             size = self._torque * slower / ratio
-            for order in features.orders:
-                at_port = float(order) * slower
+            for order in judged:
+                at_port = order * slower
                 parts = [
                     self._running(Correction(port, PeriodicTorque(at_port, phase, _STEP * size)))
                     for phase in (0.0, np.pi / 2.0)

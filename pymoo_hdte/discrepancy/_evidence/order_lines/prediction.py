@@ -41,6 +41,10 @@ LOOP = ("loop_gain", "loop_lag")
 """Unknowns of the speed loop: the share by which it is stronger than stated, and its lag in s."""
 _SAME = 1e-8
 """Orders nearer to each other are one; those of a torus are sums of rounded numbers."""
+_AROUND = 64
+"""Points of a period of the strongest line of the lead, to which its powers are exact."""
+_FASTEST = 0.9
+"""Slope of the lead at which its powers are cut off: ten times the mean speed."""
 _UNRESOLVED = 0.1
 """Cycles in an output turn within which two lines are read as one; records of a few turns tell
 lines further apart."""
@@ -311,14 +315,15 @@ def _follow_lead(
     Over the angle of the input its speed is Omega / (1 - l') for a lead l of slope l' = dl/dangle,
     and its acceleration half the slope of the square of that. So two lines of the lead, as of a
     strong ripple at a low speed, beat to the second order: speed is Omega (1 + l' + l'^2), and its
-    square Omega^2 (1 + 2 l' + 3 l'^2). What ``inertia`` (n,) takes of that at the input, N.m.
+    square Omega^2 (1 + 2 l' + 3 l'^2). The strongest line beats with its harmonics to any order.
+    What ``inertia`` (n,) takes of that at the input, N.m.
     """
-    held = tuple(balance.torus.find(order) is not None for order in lead.orders.tolist())
+    held, within = lead.held(balance.torus), lead.within(balance.torus)
     rates = response.rate * lead.phasors
     phasors = np.where(held, 0.0, lead.phasors)
     lines[:, :3] += response.channels * phasors[:, None]
     lines[:, 5] -= np.where(held, 0.0, rates)
-    beats = _beats(tuple(lead.orders.tolist()), held)
+    beats = _beats(*(tuple(values.tolist()) for values in (lead.orders, held, within)))
     if beats.places.any():
         speed = (response.rate[:, :1] / (1j * lead.orders[0])).real
         second = rates[:, beats.second]
@@ -327,6 +332,39 @@ def _follow_lead(
         losses = balance.slopes[:, 3:] + 1.5 * inertia[:, None] * response.rate
         lines[:, 1] += losses * beating
         lines[:, 5] -= beating
+    if not held.all():
+        slopes = 1j * lead.orders * lead.phasors
+        strongest = int(np.argmax(np.abs(slopes).max(axis=0)))
+        multiples = np.rint(lead.orders / lead.orders[strongest]).astype(int)
+        family = np.abs(multiples * lead.orders[strongest] - lead.orders) < _SAME
+        family &= (multiples > 0) & (multiples < _AROUND // 2)
+        powers = np.zeros((2, *slopes.shape), dtype=complex)
+        powers[:, :, family] = _higher_powers(slopes[:, family], multiples[family])
+        # Those of held lines are in the steady state.
+        known = _higher_powers(np.where(held, slopes, 0.0)[:, family], multiples[family])
+        powers[:, :, family] -= np.where(within[family], known, 0.0)
+        of_speed, of_square = powers
+        speed = (response.rate[:, :1] / (1j * lead.orders[0])).real
+        lines[:, 1] += balance.slopes[:, 3:] * speed * of_speed
+        lines[:, 1] += 0.5 * inertia[:, None] * response.rate * speed * of_square
+        lines[:, 5] -= speed * of_speed
+
+
+def _higher_powers(
+    slopes: NDArray[np.complex128], multiples: NDArray[np.int_]
+) -> NDArray[np.complex128]:
+    """Return what speed and its square have from the third order on, in units of the mean speed.
+
+    ``slopes`` (n, m) are the lines of the lead's slope at ``multiples`` (m,) of one order, at which
+    the results (2, n, m) are as well.
+    """
+    angle = 2.0 * np.pi * np.arange(_AROUND) / _AROUND
+    slope = (slopes @ np.exp(1j * np.outer(multiples, angle))).real
+    # An input that turns back has no speed over its angle.
+    slope = np.minimum(slope, _FASTEST)
+    speed = 1.0 / (1.0 - slope)
+    beyond = speed - 1.0 - slope - slope**2, speed**2 - 1.0 - 2.0 * slope - 3.0 * slope**2
+    return 2.0 / _AROUND * np.fft.rfft(beyond)[..., multiples]
 
 
 class _Beats(NamedTuple):
@@ -342,8 +380,13 @@ class _Beats(NamedTuple):
 
 
 @lru_cache(maxsize=64)
-def _beats(orders: tuple[float, ...], held: tuple[bool, ...]) -> _Beats:
-    """Return the pairs of lines that beat at one of the orders; without those of a torus alone."""
+def _beats(
+    orders: tuple[float, ...], held: tuple[bool, ...], within: tuple[bool, ...]
+) -> _Beats:
+    """Return the pairs of lines that beat at one of the orders; without those of a torus alone.
+
+    ``held`` and ``within`` are those of `Lead`.
+    """
     pairs = list[tuple[int, int, bool, int, float]]()
     for k, order in enumerate(orders):
         for j, lower in enumerate(orders[: k + 1]):
@@ -353,7 +396,7 @@ def _beats(orders: tuple[float, ...], held: tuple[bool, ...]) -> _Beats:
                 pairs += [
                     (k, j, of_difference, place, share)
                     for place in at.tolist()
-                    if not (held[k] and held[j] and held[place])
+                    if not (held[k] and held[j] and within[place])
                 ]
     places = np.zeros((len(pairs), len(orders)))
     for row, (_, _, _, place, share) in enumerate(pairs):

@@ -43,6 +43,9 @@ SLOPES = Effort(3e-7, slopes=True)
 """For difference quotients. Forward quotients give the worst slope of a seen campaign to .3 %; this
 moves it by .2 %, and beside a strong ripple of the motor that by the input's inertia by 2 %."""
 
+_HELD = 0.75
+"""Share of the highest harmonic of a torus up to which it holds a line of the lead: from there on
+what the line makes of others is cut off."""
 _LONGEST = 0.5
 """Largest change to first order from which to begin, as a share of torsion and energy.
 
@@ -124,9 +127,17 @@ class Lead:
         """Return the motion of some of the rows."""
         return Lead(self.orders, self.phasors[rows])
 
+    def within(self, torus: Torus) -> NDArray[np.bool_]:
+        """Return which orders are harmonics of a torus, shape (m,)."""
+        return np.array([torus.find(order) is not None for order in self.orders.tolist()])
+
+    def held(self, torus: Torus) -> NDArray[np.bool_]:
+        """Return which lines a torus holds with what they make of others, shape (m,)."""
+        return self.within(torus) & (self.orders <= _HELD * torus.highest[0])
+
     def on(self, torus: Torus) -> NDArray[np.complex128]:
-        """Return the harmonics (n, n_harmonics) of a torus; those that it has not are left out."""
-        return torus.harmonics(self.orders, self.phasors)
+        """Return the harmonics (n, n_harmonics) of a torus; lines not `held` are left out."""
+        return torus.harmonics(self.orders, np.where(self.held(torus), self.phasors, 0.0))
 
 
 class Continuation:
