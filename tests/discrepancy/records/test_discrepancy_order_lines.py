@@ -11,7 +11,8 @@ from scipy.stats import chi2, kstest
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy import Rig, RunningRecord, order_lines, residual_spectrum
 from pymoo_hdte.discrepancy._records import line_basis
-from pymoo_hdte.discrepancy._records.line_fit import averaging_gain, row_covariance
+from pymoo_hdte.discrepancy._records.line_basis import averaging_gain
+from pymoo_hdte.discrepancy._records.line_fit import row_covariance
 from pymoo_hdte.units import ARCSEC
 
 RATIO = 101.0
@@ -139,6 +140,24 @@ def test_averaging_of_raw_samples_is_undone(samples_averaged, order, phase):
     np.testing.assert_allclose(lines.phasors[1:3, 0], np.exp(1j * phase), rtol=1e-8)
 
 
+def test_averaging_is_undone_where_the_input_moves_unevenly():
+    """A fifth of its speed at order 2: a row averages the more of a line the faster it passes."""
+    rows = np.arange(len(ANGLE)) / RATE
+    offsets = ((np.arange(50) + 0.5) / 50.0 - 0.5) / RATE
+    time = rows[:, None] + offsets
+    angle = SPEED * time
+    for _ in range(60):
+        angle = SPEED * time + 0.1 * np.cos(2.0 * angle + 0.4)
+    channel = np.cos(6.0 * angle + 1.0).mean(axis=1)
+    uneven = replace(
+        record(1e-5 * channel, channel, channel, samples_averaged=50),
+        input_angle=angle.mean(axis=1),
+    )
+    lines = order_lines(uneven, RIG, RATIO, [2.0, 4.0, 6.0, 8.0])
+    assert lines.phasors[1] == pytest.approx([0.0, 0.0, np.exp(1.0j), 0.0], abs=4e-3)
+    assert lines.phasors[3, 0] == pytest.approx(0.1 * np.exp(0.4j), rel=1e-3)
+
+
 @pytest.mark.parametrize("order", [13.0, 21.0, 64.0])
 def test_what_averaging_folds_down_is_known_line_by_line(order):
     """Rows show up to ten cycles a turn, and the samples that they average six times as many."""
@@ -156,7 +175,7 @@ def test_what_averaging_folds_down_is_known_line_by_line(order):
     np.testing.assert_allclose(of_order[:, 0].real, lines.mean[1:3], atol=1e-10)
     np.testing.assert_allclose(of_order[:, 1:], lines.phasors[1:3], atol=1e-10)
     # 20 - 13 and 21 - 20 are among the analysed orders.
-    size = averaging_gain([order], plain) / averaging_gain([abs(20.0 - order)], plain)
+    size = averaging_gain([order], plain, SPEED) / averaging_gain([abs(20.0 - order)], plain, SPEED)
     place = 1 + orders.index(abs(20.0 - order))
     np.testing.assert_allclose(np.abs(of_order[:, place]), np.abs(size[0]), rtol=1e-3)
 
@@ -165,7 +184,7 @@ def test_averaging_gain_tends_to_that_of_a_continuous_mean():
     many = record(ANGLE * 1e-9, ANGLE, ANGLE, samples_averaged=10_000)
     orders = np.array([0.5, 3.0, 9.0])
     expected = np.sinc(orders * SPEED / (2.0 * np.pi) / RATE)
-    np.testing.assert_allclose(averaging_gain(orders, many), expected, rtol=1e-7)
+    np.testing.assert_allclose(averaging_gain(orders, many, SPEED), expected, rtol=1e-7)
 
 
 def test_covariance_is_that_of_simulated_noise():
