@@ -42,8 +42,10 @@ _NOTHING = 1e-12
 _SMALLEST = 1e-9
 """Least share of the variance of a process for which a direction counts."""
 REPEATABLE = (0.03, 30.0)
-"""Range of what a record is off by: in standard deviations of the noise of a mean, or as a multiple
-of what is stated of the static error."""
+"""Range of what the mean of a record is off by, in standard deviations of its noise."""
+STATED = (0.03, 2.0)
+"""Range of what the static error of a record is off by beyond what is stated, as a multiple of
+that: who states it may be wrong by a factor of two, as of the noise."""
 _FREQUENCY_LENGTH = 0.3
 """Length over which a response errs, where the logarithm of the frequency runs from -1 to 1."""
 _STEP = 0.01
@@ -221,7 +223,7 @@ class LawErrors:
             columns.append(self.data.whiten(changes).T)
         whole = self._whole(np.hstack(columns))
         none = np.zeros(whole.shape[1])
-        return Sized("repeatability of the static error", whole, *REPEATABLE, none, none > 0)
+        return Sized("repeatability of the static error", whole, *STATED, none, none > 0)
 
     @cached_property
     def _noise(self) -> Matrix:
