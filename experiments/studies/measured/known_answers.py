@@ -79,7 +79,7 @@ class KnownRig:
     reach: float = 0.0
 
 
-def judged(rig: KnownRig, status: str, names: Collection[str]) -> str:
+def judged(rig: KnownRig, status: str, names: Collection[str], others: Collection[str] = ()) -> str:
     """Return the judgement on an answer.
 
     Parameters
@@ -89,11 +89,13 @@ def judged(rig: KnownRig, status: str, names: Collection[str]) -> str:
         Of a verdict; ``"named"`` for a tool that has no doubts.
     names : collection of str
         Effects that it names.
+    others : collection of str
+        Effects of the other members of a class, which says that one of its members is there.
     """
     if not rig.effects:
         beyond = set(names) - rig.also if rig.also else set()
         return CONFIDENT if beyond and status in PLAIN else UNKNOWN
-    main = bool(rig.effects[0] & set(names))
+    main = bool(rig.effects[0] & {*names, *others})
     every = all(effect & set(names) for effect in rig.effects)
     known = frozenset().union(*rig.effects, rig.also)
     if main and status in PLAIN:

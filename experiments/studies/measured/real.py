@@ -508,7 +508,9 @@ def _said(rig: KnownRig, machine: Study) -> tuple[str, str]:
     words = " + ".join(names).replace("_", " ") or "nothing"
     if machine.joint and machine.joint.torsion.verdict.status == "unlisted":
         words += "; of the torsion nothing"
-    return judged(rig, machine.status, names), words
+    verdict = machine.finding.verdict
+    others = {effect.name for member in verdict.equivalent for effect in member.effects}
+    return judged(rig, machine.status, names, others), words
 
 
 def _tool_cells(rig: KnownRig, answer: Answer) -> list[str]:

@@ -515,7 +515,9 @@ class Growth:
         if weighed not in self._outside:
             prior = self._prior(weighed.candidates, True)
             hopeless = self.ranked[0].weight - WINDOW - prior
-            score, places = score_with_outside(weighed.linearised, self.errors.outside, hopeless)
+            hypothesis = weighed.linearised
+            anywhere = *self.errors.outside, *hypothesis.other_laws
+            score, places = score_with_outside(hypothesis, anywhere, hopeless)
             self._outside[weighed] = replace(
                 weighed,
                 score=score,

@@ -83,10 +83,9 @@ def linearise(
                 free.append(columns[:, k] * unit)
         if (changes := errors(candidate, place)) is not None:
             most = LEAST_ERROR if candidate.exact else MOST_ERROR
-            none = np.zeros(changes.shape[1])
-            sized.append(
-                Sized(f"form of {candidate.label}", changes, LEAST_ERROR, most, none, none > 0.0)
-            )
+            none, name = np.zeros(changes.shape[1]), f"form of {candidate.label}"
+            wide = not candidate.exact
+            sized.append(Sized(name, changes, LEAST_ERROR, most, none, none > 0.0, of_form=wide))
         members.append(Member(slice(begin[0], len(free)), slice(begin[1], len(sized))))
     of_free = np.column_stack(free) if free else np.empty((n, 0))
     stated = np.array(priors).reshape(-1, 5).T

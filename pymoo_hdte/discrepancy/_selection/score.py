@@ -89,6 +89,8 @@ class Sized:
         stated, and large enough to be visible: see `VISIBLE`. What is smaller is nothing, and
         belongs to the hypothesis without it. For one coefficient, or two of about the same
         curvature.
+    of_form : bool
+        Whether it is by how much the form of a law errs: beyond ``most`` it is another law.
     """
 
     name: str
@@ -98,8 +100,12 @@ class Sized:
     at: Vector
     positive: NDArray[np.bool_]
     cut: bool = False
+    of_form: bool = False
 
 
+OTHER_LAW = 10.0
+"""Largest error of another law in the place of one, as a multiple of what its form may err by: it
+is then three times the law."""
 VISIBLE = 16.0
 """Chi-square beyond all other unknowns from which on something counts as visible: four standard
 deviations of one unknown. Of twenty effects, together as likely as that nothing is missing, noise
@@ -158,6 +164,15 @@ class Linearised:
         }
         sized = (*self.sized[: member.sized.start], *self.sized[member.sized.stop :])
         return replace(self, residuals=residuals, free=Free(**values), sized=sized, members=())
+
+    @property
+    def other_laws(self) -> tuple[Sized, ...]:
+        """Errors of the laws beyond those that their forms may have."""
+        return tuple(
+            replace(part, least=part.most, most=OTHER_LAW * part.most)
+            for part in self.sized
+            if part.of_form
+        )
 
     def beside(self, *sized: Sized) -> Linearised:
         """Return it with further quantities of unknown size."""

@@ -249,6 +249,18 @@ def test_something_outside_is_found_where_it_is(rng):
     assert found.ln > score(something).ln + 100.0
 
 
+@pytest.mark.parametrize(("error", "another"), [(0.1, False), (2.0, True)])
+def test_a_law_that_errs_by_more_than_its_form_may_is_another_one(error, another):
+    law = np.full(40, 50.0)
+    wrong = law * np.sin(2.0 * np.pi * np.arange(40) / 40.0)
+    form = replace(sized(wrong[:, None], 1e-3, 0.3), of_form=True)
+    noise = np.random.default_rng(4).normal(size=40)
+    with_law = hypothesis(noise + error * wrong, free(law[:, None]), form)
+    beyond, places = score_with_outside(with_law, with_law.other_laws)
+    assert (beyond.ln > score(with_law).ln) == another
+    assert bool(places) == another
+
+
 def test_said_probabilities_are_the_shares_that_are_right():
     """With data from the prior: effects along two directions, as likely as nothing, of any size."""
     rng = np.random.default_rng(20)

@@ -380,9 +380,7 @@ class _Beats(NamedTuple):
 
 
 @lru_cache(maxsize=64)
-def _beats(
-    orders: tuple[float, ...], held: tuple[bool, ...], within: tuple[bool, ...]
-) -> _Beats:
+def _beats(orders: tuple[float, ...], held: tuple[bool, ...], within: tuple[bool, ...]) -> _Beats:
     """Return the pairs of lines that beat at one of the orders; without those of a torus alone.
 
     ``held`` and ``within`` are those of `Lead`.
