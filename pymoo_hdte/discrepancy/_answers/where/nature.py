@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from pymoo_hdte.discrepancy._answers.where.map import Flags, Location
 from pymoo_hdte.discrepancy._answers.where.trend import strongest, trends
 from pymoo_hdte.discrepancy._evidence.order_lines.evidence import Data
+from pymoo_hdte.discrepancy._evidence.order_lines.features import shown_order
 from pymoo_hdte.discrepancy._records.believed import BelievedDrive
 from pymoo_hdte.discrepancy._records.line_fit import CHANNELS
 from pymoo_hdte.discrepancy._records.residual_spectrum import residual_spectrum
@@ -195,7 +196,8 @@ def stray_lines(data: Data, unexpected: Sequence[float]) -> StrayLines:
     speeds = np.abs(features.conditions.input_speed)
     peaks, widths = [], []
     for record, speed in zip(features.records, speeds, strict=True):
-        orders, amplitudes = residual_spectrum(record, rig, ratio, known, rules.highest_order)
+        shown = [order for order in known if order <= shown_order(record, rules)]
+        orders, amplitudes = residual_spectrum(record, rig, ratio, shown, rules.highest_order)
         power = amplitudes**2
         power[power < np.log(power.size * len(speeds) / rules.unexpected_line_chance)] = 0.0
         widths.append(_lines_in_effect(power))

@@ -185,11 +185,17 @@ class LawErrors:
 
     @property
     def _shares(self) -> Matrix:
-        """1 for residuals of what is measured, and as good as 0 for lines that are not shown."""
-        shares = np.ones(self.n_rows)
-        judged = self.data.features.judged.ravel()
-        shares[: judged.size][~judged] = _NOTHING
-        return shares
+        """Values that each residual counts for: nearly none of a line that is not shown.
+
+        Nor of one of the input where the motor does most of it beside its loop: how much that is in
+        a record, is estimated from a few lines beside it, and says nothing about the drive.
+        """
+        features = self.data.features
+        shares = np.where(features.judged, 1.0, _NOTHING)
+        if (by_motor := features.conditions.lead_share) is not None:
+            of_lead = features.places(CHANNELS.index("input_angle"))
+            shares[:, of_lead] *= np.maximum(1.0 - by_motor, _NOTHING)[..., None]
+        return np.append(shares.ravel(), np.ones(self.data.n_sweep_residuals))
 
     @cached_property
     def of_records(self) -> tuple[Sized, ...]:

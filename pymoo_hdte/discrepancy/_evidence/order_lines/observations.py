@@ -316,7 +316,10 @@ def cell_degrees_of_freedom(data: Observations) -> Values:
 
 
 def cell_chi_square(data: Observations, difference: Values) -> Values:
-    """Return the chi-square of each cell for differences of features (r, f); (r, 4, 1 + m)."""
+    """Return the chi-square of each cell for differences of features (r, f); (r, 4, 1 + m).
+
+    Nan where a channel has no mean among the features, or a record does not show a line.
+    """
     covariance = data.covariance
     chi_square = np.full((len(difference), *cell_degrees_of_freedom(data).shape), np.nan)
     for channel in range(len(CHANNELS)):
@@ -329,6 +332,8 @@ def cell_chi_square(data: Observations, difference: Values) -> Values:
             part = difference[:, pair, None]
             solved = np.linalg.solve(block, part)
             chi_square[:, channel, 1 + line] = np.sum(part * solved, axis=(1, 2))
+    if (shown := data.features.shown) is not None:
+        chi_square[:, :, 1:] = np.where(shown[:, None], chi_square[:, :, 1:], np.nan)
     return chi_square
 
 
