@@ -29,8 +29,8 @@ from pymoo_hdte.mechanism import BelievedValue, Input, Mechanism, Port, Record
 # ---------------------------------
 #
 # Records become *features*: the spectrum of the force balance. Prediction minus feature, divided by
-# the noise (*whitened*, which removes correlations of the noise), gives residuals :math:`r` that are
-# independent and of unit variance if the model is right. The misfit is
+# the noise (*whitened*, which removes correlations of the noise), gives residuals :math:`r` that
+# are independent and of unit variance if the model is right. The misfit is
 #
 # .. math::
 #

@@ -2,9 +2,9 @@ r"""
 Mathematics: the score of a drive
 =================================
 
-``pymoo-hdte discrepancy`` compares sets of effects that a drive may lack. Each set is a model of
-all records, and its posterior probability decides what is said. This page gives the model, and
-recomputes the posterior of a small campaign by brute force.
+``pymoo-hdte discrepancy`` compares sets of effects that a drive, or a machine of your own, may
+lack. Each set is a model of all records, and its posterior probability decides what is said. This
+page gives the model, and recomputes the posterior of a small campaign by brute force.
 """
 
 import numpy as np
@@ -169,7 +169,10 @@ print(f"prior of a name {PRESENT}, of something outside of the library {OUTSIDE}
 #    * - ``class``
 #      - A few sets have `SURE` together, and something outside is less likely than not.
 #    * - ``partial``
-#      - Some names have it, and no set does.
+#      - Some names have it, whatever else is missing. Of values alone that is said only where
+#        something outside is less likely than not.
+#    * - ``class`` again
+#      - One of a few names is there with `SURE`, whatever else is missing.
 #    * - ``unlisted``
 #      - Neither.
 #

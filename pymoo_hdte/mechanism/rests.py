@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from pymoo_hdte.mechanism.mechanism import Mechanism
 from pymoo_hdte.mechanism.motion import smoothed_noise
-from pymoo_hdte.mechanism.parts import LawAt, Port
+from pymoo_hdte.mechanism.parts import LawAt
 from pymoo_hdte.mechanism.port_motion import PortMotion
 from pymoo_hdte.mechanism.records import Record
 
@@ -134,11 +134,6 @@ def moving_rows(
     if not rests.any():
         return MovingRows(np.ones_like(away))
     return MovingRows(away) if enough else MovingRows(np.ones_like(away), rests=True)
-
-
-def speed_noise(port: Port, record: Record, cutoff: float) -> float:
-    """Return the standard deviation of the noise of the smoothed speed at a port, SI."""
-    return _noise_of_speed({**port.motion, **port.followed}, record, cutoff)
 
 
 def _noise_of_speed(channels: Mapping[str, float], record: Record, cutoff: float) -> float:

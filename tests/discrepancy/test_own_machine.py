@@ -73,6 +73,18 @@ def test_dry_friction_is_named_with_its_level(analysis):
     assert analysis.revised_model().values["damping"] == pytest.approx(DAMPING, rel=0.02)
 
 
+def test_no_effect_of_a_machine_of_one_s_own_is_a_nuisance_of_a_bench(machine, monkeypatch):
+    """Its ports may be called "load": what hangs there was then explained, and nothing was said."""
+    model = type(machine.evidence(machine.records))
+    candidates = model.candidates
+    monkeypatch.setattr(
+        model,
+        "candidates",
+        lambda self, base: [replace(one, nuisance=True) for one in candidates(self, base)],
+    )
+    assert analyse(machine).verdict.status == "named"
+
+
 def test_held_out_test_is_predicted_to_the_noise(analysis):
     errors = analysis.validate()
     assert errors.overall.before > 5.0

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from pymoo_hdte._reports.html import number, percent
 from pymoo_hdte.discrepancy._evidence.order_lines.parameters import labels_by_order, words_of
+from pymoo_hdte.discrepancy._report.words import sure_in_words
 from pymoo_hdte.discrepancy._selection.hypothesis import Hypothesis, adequate
 from pymoo_hdte.discrepancy._selection.verdict import Verdict
 from pymoo_hdte.discrepancy._verdicts.drive_finding import DriveFinding
@@ -154,9 +155,9 @@ def _probably(finding: DriveFinding) -> str:
         "partial": "what is named is missing, though perhaps not all of it",
         "unlisted": "something is missing",
     }.get(verdict.status, "this is the cause")
-    whole = int(100.0 * (verdict.probability or 0.0))
+    sure = sure_in_words(verdict.probability or 0.0)
     included = ", those held out included" if finding.campaign.held_out else ""
-    return f"Probability that {what}: {whole} %, by all records{included}."
+    return f"Probability that {what}: {sure}, by all records{included}."
 
 
 def _others(verdict: Verdict, chosen: Hypothesis) -> list[Hypothesis]:

@@ -10,7 +10,7 @@ import numpy as np
 
 from pymoo_hdte._reports.html import digits, number
 from pymoo_hdte.discrepancy._report.tables import EffectRow, effect_rows
-from pymoo_hdte.discrepancy._report.words import bench_in_words
+from pymoo_hdte.discrepancy._report.words import bench_in_words, sure_in_words
 
 MOST_LINES = 10
 
@@ -74,7 +74,7 @@ def _size(row: EffectRow) -> str:
 
 def _probability(probability: float | None) -> Iterable[str]:
     if probability is not None:
-        yield f"Probability: {int(100.0 * probability)} %"
+        yield f"Probability: {sure_in_words(probability)}"
 
 
 def _prediction_errors(held_out: Any) -> Iterable[str]:

@@ -51,9 +51,6 @@ _SENTENCES: dict[str, Callable[[Reason, Label], str]] = {
     codes.ABOVE_NOISE: lambda reason, label: (
         f"the unexplained residual is {dict(reason.numbers)['times_noise']:.3g} times the noise"
     ),
-    codes.NEEDS_ANOTHER_FORM: lambda reason, label: (
-        f"{label(reason.effect)} needs another form to explain the residual"
-    ),
     codes.EXPLAINS_TOO_LITTLE: lambda reason, label: (
         f"it explains {100.0 * dict(reason.numbers)['share']:.0f} % of the misfit, "
         "too little to name it alone"
@@ -62,7 +59,7 @@ _SENTENCES: dict[str, Callable[[Reason, Label], str]] = {
         f"{label(reason.effect)} fits better, but its {', '.join(reason.names)} ended at a bound"
     ),
     codes.MORE_MISSING: lambda reason, label: (
-        "it leaves something, which is outside the library with a probability of "
+        "whether more is missing is open; outside the library it is with a probability of "
         f"{100.0 * dict(reason.numbers)['outside']:.0f} %"
     ),
     codes.AT_TOLERANCE: lambda reason, label: (
@@ -226,3 +223,9 @@ def caveats(verdict: Verdict, error_orders: Sequence[float] = ()) -> list[str]:
         in_a_sentence(reason, lambda label: labels_by_order(label, error_orders))
         for reason in verdict.reasons
     ]
+
+
+def sure_in_words(probability: float) -> str:
+    """Return a probability in whole per cent; no model is right with 100 %."""
+    whole = int(100.0 * probability)
+    return f"{whole} %" if whole < 100 else "more than 99 %"

@@ -1,9 +1,8 @@
 """How a verdict chooses among the sets that a search has fitted.
 
 It chooses the set of least BIC that explains the misfit, or a special case of it that does as well,
-without small members that the data deny. If no set explains the misfit, it chooses a single effect
-that does so in another form than the listed one. The listed form may then remove next to nothing,
-since the base imitates what most forms of the law share.
+without small members that the data deny. If no set explains the misfit, it chooses the one of least
+BIC among those whose members are significant.
 """
 
 from __future__ import annotations

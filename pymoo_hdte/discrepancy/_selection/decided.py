@@ -60,7 +60,7 @@ def verdict_of(
         base,
         said[0] if said else None,
         decision.status != "unlisted",
-        tuple(known.values()),
+        tuple(other for other in known.values() if not said or other is not said[0]),
         tuple(said[1:]),
         freedom,
         data.rules,

@@ -52,7 +52,7 @@ class FittedSets:
         self._left_out: set[frozenset[str]] = set()
         self._finished: set[frozenset[str]] = set()
         self._from_all_starts: set[frozenset[str]] = set()
-        self._resumed = self._whole_only = False
+        self._resumed = False
 
     @property
     def hypotheses(self) -> list[Hypothesis]:
@@ -62,10 +62,6 @@ class FittedSets:
             for label, hypothesis in self._by_label.items()
             if label not in self._left_out
         ]
-        if self._whole_only:
-            hypotheses = [
-                hypothesis for hypothesis in hypotheses if not self.lacks_evident(hypothesis)
-            ]
         return sorted(hypotheses, key=lambda hypothesis: hypothesis.bic)
 
     def of_size(self, size: int) -> list[Hypothesis]:
@@ -82,33 +78,15 @@ class FittedSets:
         return max(rules.contradicting_chi_square * best[0].fit.chi_square, share)
 
     def enough(self, hypothesis: Hypothesis) -> bool:
-        """Tell whether a set explains the data down to the noise, with any evident effect."""
-        noise = down_to_noise(hypothesis.fit, self.degrees_of_freedom, self.data.rules)
-        return noise and not self.lacks_evident(hypothesis)
-
-    def lacks_evident(self, hypothesis: Hypothesis) -> bool:
-        """Tell whether a set lacks an evident effect, that is, has none that it may be."""
-        evident = self.data.evident
-        return bool(evident) and not any(
-            candidate.name in evident for candidate in hypothesis.candidates
-        )
-
-    def add_evident(self, hypothesis: Hypothesis, candidates: Sequence[Candidate]) -> None:
-        """Fit a set that lacks an evident effect with each candidate that it may be."""
-        for candidate in candidates if self.lacks_evident(hypothesis) else ():
-            for start in candidate.starts if candidate.name in self.data.evident else ():
-                self.extended(hypothesis, candidate, start, again=True)
-
-    def leave_out_lacking(self) -> None:
-        """Leave out all sets that lack an evident effect, if any set has it."""
-        self._whole_only = not all(map(self.lacks_evident, self.hypotheses))
+        """Tell whether a set explains the data down to the noise."""
+        return down_to_noise(hypothesis.fit, self.degrees_of_freedom, self.data.rules)
 
     def could_count(self, hypothesis: Hypothesis) -> bool:
         """Tell whether a further effect could be justified.
 
         An effect at a bound may stand for two, as may a zero or gain far beyond what is stated.
         """
-        if self.held_by_sensors(hypothesis) or self.lacks_evident(hypothesis):
+        if self.held_by_sensors(hypothesis):
             return True
         if self.enough(hypothesis):
             return is_bounded(hypothesis.fit)
@@ -141,18 +119,13 @@ class FittedSets:
     def _member_is_significant(
         self, hypothesis: Hypothesis, member: Effects, simpler: Hypothesis
     ) -> bool:
-        """Tell whether a member is significant beside the others, as listed or in any form.
-
-        An evident effect always is. ``simpler`` is the set without the member.
-        """
-        if self.lacks_evident(simpler) and not self.lacks_evident(hypothesis):
-            return True
+        """Tell whether a member is significant; ``simpler`` is the set without it."""
         return is_significant(
             self.data, self.base, hypothesis, simpler, member
         ) or self._brings_sensors_back(hypothesis, simpler)
 
     def _brings_sensors_back(self, hypothesis: Hypothesis, simpler: Hypothesis) -> bool:
-        """Tell whether sensors are as stated in a set, and in no form of the simpler set.
+        """Tell whether sensors are as stated in a set, and not in the simpler set.
 
         Friction that grows with the load is nearly a gain of the torque sensor.
         """
@@ -253,11 +226,10 @@ class FittedSets:
             if is_special_case(special, law) and law.fit.chi_square > limit:
                 self._finished.discard(label)
 
-    def resume(self, hypotheses: Sequence[Hypothesis], go_on: bool = False) -> None:
+    def resume(self, hypotheses: Sequence[Hypothesis]) -> None:
         """Fit sets from the values that another search found on nearly the same data.
 
-        The first set is the chosen one. Sets that came nowhere near it are only evaluated. If the
-        search is to ``go_on``, all later fits are as in any search.
+        The first set is the chosen one. Sets that came nowhere near it are only evaluated.
         """
         self._resumed = True
         chosen, *others = hypotheses
@@ -274,7 +246,6 @@ class FittedSets:
             self.finished(self._by_label[label_of(hypothesis.candidates)])
         for size in {len(hypothesis.members) for hypothesis in hypotheses}:
             self.finish_near(size)
-        self._resumed = not go_on
 
     def leave_out(self, hypothesis: Hypothesis) -> None:
         """Leave a set out of all comparisons: it is known under another name."""

@@ -254,7 +254,11 @@ class Growth:
             key=lambda weighed: -weighed.weight,
         )
         explanations = [weighed.explanation for weighed in every]
-        return decide(explanations, [weighed.prior for weighed in every]), every
+        decision = decide(explanations, [weighed.prior for weighed in every])
+        if ranked is lacking and decision.status == "adequate":
+            # Something is evident that no effect that was fitted makes visible.
+            decision = replace(decision, status="unlisted", members=(), probability=1.0)
+        return decision, every
 
     def _prune_likeliest(self) -> None:
         """Fit the likeliest set without each member if something else is missing beside it.

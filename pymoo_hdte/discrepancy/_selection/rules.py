@@ -1,4 +1,4 @@
-"""All thresholds that decide a verdict: `Rules`, one line each.
+"""The thresholds of evidence, and of the verdict on a mechanism: `Rules`, one line each.
 
 ``rules_explained.toml`` beside this file says of each what it decides, its unit and its derivation.
 Steps of difference quotients, orders of filters and tolerances of solvers are no rules: finer ones

@@ -26,7 +26,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
-from scipy.special import log_ndtr
 from scipy.stats import chi2, ncx2, norm
 
 Vector = NDArray[np.float64]
@@ -140,9 +139,6 @@ class Linearised:
         factors are 1.
     shares : ndarray, shape (n,), optional
         Independent values that each residual counts for, at most 1: less where they are correlated.
-    least_noise : ndarray, shape (n_channels,), optional
-        Least factor of the noise of each channel, that of its sensors alone. Else what cancels the
-        data, with all that is known of them, leaves none.
     members : tuple of Member
         What belongs to each effect of the hypothesis.
     """
@@ -153,7 +149,6 @@ class Linearised:
     sized: tuple[Sized, ...] = ()
     noise: float = float(np.log(2.0))
     shares: Vector | None = None
-    least_noise: Vector | None = None
     members: tuple[Member, ...] = ()
 
     def without(self, number: int) -> Linearised:
@@ -320,9 +315,7 @@ class Integral:
         whole *= self.weights[:, None]
         self.grams = np.array([(part := whole[rows]).T @ part for rows in self.rows])
         self.counts = np.array([np.sum(shares[rows]) for rows in self.rows])
-        least = hypothesis.least_noise
-        self.least_log = np.full(n_channels, -np.inf) if least is None else np.log(least)
-        self.factors = np.maximum(np.exp(self.least_log), 1.0)
+        self.factors = np.ones(n_channels)
         self._set_priors()
         self.least = [self._least(number) for number in range(len(sized))]
         self.log_scales = [
@@ -589,7 +582,6 @@ class Integral:
         power = np.zeros_like(before)
         np.add.at(power, channels, left**2)
         after = before + _log_factor(power, freedom, before, spread)
-        after = np.maximum(after, self.least_log)
         of_prior = (before**2 - after**2) / (2.0 * spread**2)
         ratio = after - before
         of_data = -freedom * ratio + 0.5 * power * (1.0 - np.exp(-2.0 * ratio))
@@ -610,16 +602,11 @@ class Integral:
         left = self.grams @ whole @ whole
         freedom = self._freedom(covariance)
         log = np.log(self.factors)
-        log = np.maximum(
-            log + _log_factor(left / self.factors**2, freedom, log, spread), self.least_log
-        )
+        log += _log_factor(left / self.factors**2, freedom, log, spread)
         self.factors = np.exp(log)
         power = left / self.factors**2
         root = np.sqrt(2.0 * power + 1.0 / spread**2)
-        # At the least factor the slope is not zero, and half of the Gaussian or less is within.
-        slope = (power - freedom - log / spread**2) / root
-        within = log_ndtr((log - self.least_log) * root + slope) + 0.5 * slope**2
-        return float(np.sum(-0.5 * (log / spread) ** 2 - np.log(spread * root) + within))
+        return float(np.sum(-0.5 * (log / spread) ** 2 - np.log(spread * root)))
 
 
 def _log_factor(power: Vector, freedom: Vector, log: Vector, spread: float) -> Vector:

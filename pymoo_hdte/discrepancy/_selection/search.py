@@ -1,8 +1,7 @@
 """Search for the set of effects that explains a misfit; sets that decide are fitted to the end.
 
-Sets grow by the effects that could remove most of what is left: in total, in the part of the data
-that is explained worst, or beyond all forms of their laws. Base parameters that they leave at
-bounds are released as well. Members are also exchanged, and each has to be significant.
+Sets grow by the effects that could remove most of what is left: in total, or in the part of the
+data that is explained worst. Members are also exchanged, and each has to be significant.
 """
 
 from __future__ import annotations
@@ -187,7 +186,6 @@ class Search(FittedSets):
         self._extended.add(label)
         if not (candidates := self._addable(hypothesis)):
             return
-        self.add_evident(hypothesis, candidates)
         rules, excess = self.data.rules, hypothesis.fit.chi_square - self.degrees_of_freedom
         if sensor_excess := self.held_by_sensors(hypothesis):
             # An effect that brings a sensor back to what is stated removes at least its excess.

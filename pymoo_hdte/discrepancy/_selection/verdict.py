@@ -1,11 +1,12 @@
 """The verdict: whether an effect is missing, which one it is, and how certain the answer is.
 
-The base is fitted within its tolerances first. If it is not adequate, candidates are screened, the
-best few are fitted jointly with the base, and the one with the least BIC is named, provided that it
-removes most of the excess, and at least half of it in each part of the data. Hypotheses that the
-data cannot separate from it are named with it. A second effect must remove most of the first one's
-residual, in total or in the part that the first explains worst. What stands out from all else but
-leaves more than noise is named in part.
+Of a drive, and of a machine of one's own, the posterior decides: see `decided`. Of mechanisms rules
+do. The base is fitted within its tolerances first. If it is not adequate, candidates are screened,
+the best few are fitted jointly with the base, and the one with the least BIC is named, provided
+that it removes most of the excess, and at least half of it in each part of the data. Hypotheses
+that the data cannot separate from it are named with it. A second effect must remove most of the
+first one's residual, in total or in the part that the first explains worst. What stands out from
+all else but leaves more than noise is named in part.
 """
 
 from __future__ import annotations
@@ -17,7 +18,6 @@ from pymoo_hdte.discrepancy._selection import probability
 from pymoo_hdte.discrepancy._selection.candidate import Candidate
 from pymoo_hdte.discrepancy._selection.caveats import (
     above_noise,
-    explains_as_listed,
     reasons_of,
 )
 from pymoo_hdte.discrepancy._selection.choice import replaced
@@ -71,7 +71,8 @@ class Verdict:
     shown_in_held_out : bool
         Whether the records kept out of the fit, if there are any, show what is chosen.
     probability : float or None
-        That it is right: see `probability`. None where it names nothing, or nothing was compared.
+        That it is right: its posterior, or of a mechanism as of `probability`. None where it names
+        nothing, or nothing was compared.
     seen_beyond : tuple of str
         Names of effects that are seen in what no fit holds, as ripple beyond the band of a motion.
     rivals_beyond : tuple of str
@@ -137,9 +138,8 @@ class Verdict:
         self,
         held_out_test: HeldOutTest | None = None,
         worse: Mapping[str, float] | None = None,
-        condemned: bool = False,
     ) -> Verdict:
-        """Return it as the held-out records leave it; every verdict with such records ends here.
+        """Return it as the held-out records leave it: those of mechanisms and joints end here.
 
         Parameters
         ----------
@@ -147,8 +147,6 @@ class Verdict:
             Theirs on the named effects, where it has not been heard yet.
         worse : mapping of str to float, optional
             Prediction errors that grow with the named effects, after over before: see `grows`.
-        condemned : bool
-            Whether it grows where it matters most.
 
         Returns
         -------
@@ -156,7 +154,7 @@ class Verdict:
             ``unlisted`` where they contradict it, and no better than ``partial`` where any error
             of theirs grows.
         """
-        if condemned or (held_out_test and held_out_test.denies(self.rules, self.accepted.misfit)):
+        if held_out_test and held_out_test.denies(self.rules, self.accepted.misfit):
             reasons = (*self.reasons, Reason(NOT_VALIDATED))
             return replace(self, equivalent=(), reasons=reasons, probability=None)
         shown = self.shown_in_held_out and (
@@ -181,17 +179,15 @@ def judge(
     base: Fit,
     candidates: Sequence[Candidate],
     known: Sequence[Hypothesis] = (),
-    go_on: bool = False,
 ) -> Verdict:
     """Return the verdict on a fitted base, by the rules of its data.
 
-    If sets are ``known`` from nearly the same data, only these are compared; where the best
-    is a single effect that does not explain them in any form, the search may ``go_on``.
+    If sets are ``known`` from nearly the same data, only these are compared.
     """
     rules = data.rules
     degrees_of_freedom = len(base.residuals) - len(base.values)
     candidates = [*candidates, *data.out_of_tolerance(base.at_bounds)]
-    quiet = down_to_noise(base, degrees_of_freedom, rules) and not data.evident
+    quiet = down_to_noise(base, degrees_of_freedom, rules)
     # A sensor far from what is stated of it may have taken what is missing.
     quiet = quiet and not beyond_stated(base, rules).any()
     # Screening is slow, and known sets need none unless the base itself may be adequate.
@@ -207,18 +203,9 @@ def judge(
     search = Search(data, base, searched, screened, forms)
     if known:
         search.resume(known)
-        search.leave_out_lacking()
-        chosen = chosen_of(search)
-        alone = len(chosen.members) == 1
-        if not (go_on and alone) or explains_as_listed(search, chosen):
-            return _verdict(search, answer_of(search, chosen))
-        screened = screened or screen(data, base, searched)
-        search = Search(data, base, searched, screened, forms)
-        search.resume(known, go_on=True)
-    else:
-        search.singles()
+        return _verdict(search, answer_of(search, chosen_of(search)))
+    search.singles()
     search.grow()
-    search.leave_out_lacking()
     chosen = chosen_of(search)
     completed = set[frozenset[tuple[str, str]]]()
     while len(chosen.members) > 1 and chosen.names not in completed:
@@ -247,7 +234,7 @@ def _verdict(search: Search, answer: Answer) -> Verdict:
             chosen, equivalent, search.hypotheses, degrees_of_freedom
         )
     equivalent = distinct(chosen, equivalent)
-    known = (certain or in_part) and not search.lacks_evident(chosen)
+    known = certain or in_part
     verdict = Verdict(
         search.base,
         chosen,

@@ -83,7 +83,7 @@ def examine_drive(campaign: Campaign, rules: Rules = RULES) -> DriveFinding:
     ratio = campaign.believed.ratio
     expected = expected_orders(campaign, rules)
     campaign, rows = cleaned_rows(campaign, expected, rules)
-    features = measure(campaign, campaign.train, expected)
+    features = measure(campaign, campaign.train, expected, rules)
     lines = unexpected_lines(features, ratio, campaign.rig, rules)
     held = flanks_held(features, campaign.torque_scale, rules)
     enough = held.sum() >= rules.fewest_records
@@ -94,7 +94,7 @@ def examine_drive(campaign: Campaign, rules: Rules = RULES) -> DriveFinding:
     unexpected = unexpected_orders([lines[row] for row in repeating], ratio, rules)
     if unexpected:
         orders = _apart(unexpected, campaign, expected, rules)
-        features = measure(campaign, campaign.train, orders)
+        features = measure(campaign, campaign.train, orders, rules)
     data = training_data(campaign, features, rules)
     if any(effect_named(effect.name).rattles for effect in campaign.believed.effects):
         data = data.loaded
@@ -108,7 +108,7 @@ def examine_drive(campaign: Campaign, rules: Rules = RULES) -> DriveFinding:
         records = data.features.records
         wider = replace(data, features=measure(campaign, records, orders, rules, exciting))
         judged = rattling.judged(wider, fit(wider, start=base.values), _candidates)
-    if not further or judged[-1].status == "unlisted":
+    if not further or (harmonics and judged[-1].status == "unlisted"):
         # Where no fit follows the harmonics, as in a record that then has no steady state, the
         # lower orders may still be explained.
         judged, harmonics = rattling.judged(data, base, _candidates), []

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
@@ -48,7 +48,7 @@ class Machine(Protocol):
         Parameters
         ----------
         records : sequence
-            Of `records`, those of one role.
+            Of `records`, those of one role, or all.
 
         Returns
         -------
@@ -135,7 +135,9 @@ def examine_machine(machine: Machine, rules: Rules = RULES) -> MachineFinding:
     # Those kept out of fits count by their predictive density, with the same coefficients.
     every = PredictedRecords(machine.evidence(machine.records), rules=rules) if held_out else data
     of_every = fit(every, start=base.values)
-    growth = Growth(every, of_every, data.model.candidates(base), RecordErrors(every, of_every))
+    # A machine of one's own has no bench whose nuisances would be told apart from effects.
+    candidates = [replace(effect, nuisance=False) for effect in data.model.candidates(base)]
+    growth = Growth(every, of_every, candidates, RecordErrors(every, of_every))
     growth.grow()
     verdict = verdict_of(data, *growth.decide(), base)
     title = str(getattr(machine, "title", type(machine).__name__))

@@ -121,7 +121,8 @@ def _explains_by_a_clearance(verdict: Verdict) -> bool:
     sure = verdict.status in ("named", "class")
     named = (verdict.chosen, *verdict.equivalent) if sure else ()
     several = [item.effects for item in named if item is not None and len(item.effects) > 1]
-    return any(effect_named(member.name).rattles for effects in several for member in effects)
+    members = [member for effects in several for member in effects if member.listed]
+    return any(effect_named(member.name).rattles for member in members)
 
 
 def is_heard(

@@ -96,6 +96,20 @@ def test_a_local_misfit_does_not_bias_the_refitted_base():
     )
 
 
+def test_cells_that_a_record_does_not_show_do_not_count():
+    data, truth = measured(rng=np.random.default_rng(4), stiffness=0.97)
+    features = data.features
+    shown = np.ones((len(features.records), len(features.orders)), dtype=bool)
+    shown[:2, -1] = False
+    values = features.values.copy()
+    values[features.conditions.output_torque == 40.0, 0] += 20.0 * ARCSEC
+    of_line = np.concatenate([features.places(channel)[-1] for channel in range(4)])
+    values[np.ix_([0, 1], of_line)] = 0.0
+    data = replace(data, features=replace(features, values=values, shown=shown))
+    row = Layout(data.base).index("stiffness")
+    assert refit_clean(data, fit(data)).values[row] == pytest.approx(truth[row], rel=0.005)
+
+
 def test_a_named_line_flags_the_cells_that_it_moves():
     data, truth = measured()
     candidate = listed(data, "kinematic_error", [3.0])

@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 
 from pymoo_hdte.discrepancy._selection.candidate import Candidate
-from pymoo_hdte.discrepancy._selection.excess import Excess
 from pymoo_hdte.discrepancy._selection.fitting import Unknowns, built, fit
 from pymoo_hdte.discrepancy._selection.growth import Growth
 from pymoo_hdte.discrepancy._selection.linearised import linearise
@@ -69,9 +68,6 @@ class LinearData:
 
     def rows_of_parts(self):
         return [np.arange(N)]
-
-    def excess(self, fitted):
-        return Excess(np.array([[fitted.chi_square - N]]), np.array([[float(N)]]))
 
     def out_of_tolerance(self, at_bounds, together=False):
         return []
@@ -169,3 +165,13 @@ def test_what_no_column_holds_is_outside(rng, place):
     assert decision.status == "unlisted"
     assert decision.outside > 0.95
     assert every[0].places == ("place",)
+
+
+def test_nothing_is_not_enough_where_an_effect_is_evident(rng):
+    """Parts that lose contact are heard, and no effect that was fitted shows in what is left."""
+    data = LinearData(rng.normal(size=N), np.zeros((N, 1)), np.ones(N))
+    data.evident = frozenset({"effect_0"})
+    growth = Growth(data, fit(data), [candidate(0)], data)
+    growth.grow()
+    decision, _ = growth.decide()
+    assert decision.status == "unlisted"

@@ -167,22 +167,6 @@ def test_factors_of_the_noise_are_integrated(rng):
     )
 
 
-def test_noise_is_at_least_that_of_the_sensors(rng):
-    """What is left may be less by chance, and what cancels the data leaves nothing at all."""
-    count, spread = 60, np.log(10.0)
-    for size, least in ((1.0, 0.8), (0.75, 0.8), (1e-3, 0.8)):
-        residuals = size * rng.normal(size=count)
-        logs = np.linspace(np.log(least), 2.0, 4000)
-        ln = -count * (logs + 0.5 * np.log(2.0 * np.pi)) + norm.logpdf(logs, 0.0, spread)
-        ln -= 0.5 * np.sum(residuals**2) * np.exp(-2.0 * logs)
-        wanted = np.log(np.trapezoid(np.exp(ln - np.max(ln)), logs)) + np.max(ln)
-        without = hypothesis(residuals, free(np.empty((count, 0))), noise=spread)
-        bounded = replace(without, least_noise=np.array([least]))
-        found = score(bounded)
-        assert found.ln == pytest.approx(wanted, abs=0.1)
-        assert found.factors[0] >= least * (1.0 - 1e-12)
-
-
 def test_units_of_unknowns_do_not_matter(rng):
     residuals, columns = rng.normal(size=N), rng.normal(size=(N, 2))
     lower, upper, width = np.array([-1.0, -2.0]), np.array([0.5, 1.0]), np.array([0.1, 0.2])

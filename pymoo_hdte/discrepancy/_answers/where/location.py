@@ -231,7 +231,8 @@ def _robust_step(data: Data, fitted: Fit) -> Values:
         )
         if np.allclose(before, factor, rtol=_SETTLED, atol=0.0, equal_nan=True):
             break
-        weakened = _weakened(data, factor, False)
+        # What is not compared weakens nothing.
+        weakened = _weakened(data, np.where(np.isfinite(factor), factor, 1.0), False)
         matrix = np.concatenate([weakened.whiten(slopes), others_slopes], axis=1).T
         right = -np.concatenate([weakened.whiten(difference), others])
         # Values at a bound may exceed it by rounding.
