@@ -345,6 +345,12 @@ class Integral:
             for place, part in zip(self.places, self.hypothesis.sized, strict=True)
         ]
         self.signed = np.concatenate([np.empty(0, dtype=int), *signs]).astype(int)
+        # A size is no larger than its fit may be.
+        largest = [
+            np.full(len(places), part.most if part.of_effect else np.inf)
+            for places, part in zip(signs, self.hypothesis.sized, strict=True)
+        ]
+        self.largest = np.concatenate([np.empty(0), *largest]) * self.units[self.signed]
         lower, upper, width = (
             (array * units)[self.boxed] for array in (free.lower, free.upper, free.shoulder)
         )
@@ -477,7 +483,7 @@ class Integral:
             )
             if len(self.signed):
                 ln[signed], first[signed], second[signed] = _piece(
-                    away[signed], 1.0 / cavity[signed], 0.0, np.inf
+                    away[signed], 1.0 / cavity[signed], 0.0, self.largest
                 )
             wanted = np.maximum(1.0 / second - cavity, 0.0)
             wanted_linear = first * (wanted + cavity) - away * cavity

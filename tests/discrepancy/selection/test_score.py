@@ -233,6 +233,21 @@ def test_something_outside_is_found_where_it_is(rng):
     assert found.ln > score(something).ln + 100.0
 
 
+def test_a_size_is_no_larger_than_it_may_be(rng):
+    """A softening beyond 1 was taken for one of .95, which was likelier than a gap then."""
+    column, most = np.full((N, 1), 4.0), 1.0
+    residuals = rng.normal(size=N) - 1.3 * column[:, 0]
+    part = replace(sized(column, 0.1, most, positive=True), of_effect=True)
+    size = np.linspace(0.0, most, 4001)
+    scales = np.exp(np.linspace(np.log(0.1), np.log(most), 200))
+    prior = np.mean([2.0 * norm.pdf(size, 0.0, s) for s in scales], axis=0)
+    ln = -0.5 * np.sum((residuals[:, None] + column * size) ** 2, axis=0)
+    ln -= 0.5 * N * np.log(2.0 * np.pi)
+    wanted = np.log(np.trapezoid(np.exp(ln - ln.max()) * prior, size)) + ln.max()
+    found = score(hypothesis(residuals, free(np.empty((N, 0))), part)).ln
+    assert found == pytest.approx(wanted, abs=0.5)
+
+
 def test_what_another_size_of_an_effect_can_do_is_not_visible(rng):
     """Friction that falls a little from the first to the last speed, beside its level."""
     level = np.full((N, 1), 10.0)
