@@ -70,7 +70,8 @@ def run(context: Context) -> Result:
         paragraphs=(
             *stored_outcome(context, "blind"),
             f"These figures are pooled over the runs since case {recent(runs)[0].first}, which met "
-            f"about the code of now. {_extent(outcomes)}",
+            "the rules that decided of drives before the score does. The decision about the score "
+            f"has what it was compared on. {_extent(outcomes)}",
             SETTING,
         ),
         tables=(

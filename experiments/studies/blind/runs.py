@@ -18,7 +18,7 @@ from pymoo_hdte._runner.result import Cell, Column, Table
 
 RUNS = "blind_runs.csv"
 SINCE = 2305
-"""First case of the runs that met about the code of now, which the figures are pooled from."""
+"""First case of the runs that met the last rules for drives, which the figures are pooled from."""
 
 
 @dataclass(frozen=True)
