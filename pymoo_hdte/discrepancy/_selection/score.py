@@ -373,7 +373,9 @@ class Integral:
             return sized[number].least
         precision = self.precision.copy()
         precision[self.boxed] += self.site_precision[: len(self.boxed)]
-        others = [np.arange(self.n_free)]
+        # Shapes of an effect that is not there do nothing.
+        own = [m.free for m in self.hypothesis.members if m.sized.start <= number < m.sized.stop]
+        others = [np.delete(np.arange(self.n_free), np.r_[tuple(own)] if own else [])]
         for other, (place, part) in enumerate(zip(self.places, sized, strict=True)):
             if other != number and (part.cut or part.of_effect):
                 precision[place] = 1.0 / (part.most * self.units[place]) ** 2

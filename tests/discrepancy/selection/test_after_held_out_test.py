@@ -33,7 +33,7 @@ def test_an_error_that_grows_leaves_no_unqualified_status(status):
 
 @pytest.mark.parametrize("status", ["named", "parameter", "class", "partial"])
 def test_a_model_that_is_not_to_be_used_is_not_offered(status):
-    found = verdict(status).after_held_out_test(worse={"overall": 1.5}, condemned=True)
+    found = verdict(status).after_held_out_test(HeldOutTest(426.1, 451.3, 9.36))
     assert (found.status, found.probability) == ("unlisted", None)
     assert found.has_reason(NOT_VALIDATED)
     assert found.accepted is found.base
