@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 from pymoo_hdte.discrepancy._evidence.own_records import PredictedRecords
 from pymoo_hdte.discrepancy._selection.candidate import Candidate
 from pymoo_hdte.discrepancy._selection.fitting import Fit
-from pymoo_hdte.discrepancy._selection.linearised import amplitudes, linearise
+from pymoo_hdte.discrepancy._selection.linearised import linearise, modulated
 from pymoo_hdte.discrepancy._selection.process import TERMS, sines_of
-from pymoo_hdte.discrepancy._selection.score import Linearised, Sized
+from pymoo_hdte.discrepancy._selection.score import Linearised, Sized, groups_of
 
 Matrix = NDArray[np.float64]
 
@@ -40,27 +40,16 @@ class RecordErrors:
     @property
     def groups(self) -> list[NDArray[np.int_]]:
         """Rows of each record and of each channel."""
-        return [
-            np.flatnonzero(labels == label)
-            for labels in self.data.layout
-            for label in np.unique(labels)
-        ]
+        return groups_of(*self.data.layout)
 
     def linearised(self, fitted: Fit) -> Linearised:
         """Return a fit as a hypothesis."""
         record, channel = self.data.layout
         in_record = (record[:, None] == np.unique(record)).astype(float)
 
-        def errors(candidate: Candidate, place: slice) -> Matrix | None:
+        def errors(candidate: Candidate, place: slice) -> list[Matrix]:
             columns = fitted.jacobian[: len(channel), place]
-            parts = [
-                in_record * (columns[:, [row]] * amplitude)
-                for rows, amplitude in amplitudes(candidate, fitted.values[place])
-                for row in rows
-            ]
-            whole = np.column_stack(parts) if parts else np.empty((len(channel), 0))
-            whole = whole[:, np.any(whole != 0.0, axis=0)]
-            return whole if whole.size else None
+            return modulated(candidate, fitted.values[place], columns, in_record)
 
         return linearise(fitted, channel, errors)
 

@@ -115,6 +115,6 @@ def error_sentence(finding: MachineFinding, errors: HeldOutErrors | None) -> str
     words = f"Prediction error on held-out records: {before} before, {after} after."
     if error.shrinkage is not None:
         words += f" The correction removes {percent(min(error.shrinkage, 1.0))} of the excess."
-    if errors.growths:
-        words += f" Worse than before: {', '.join(errors.growths)}."
+    if errors.worse:
+        words += f" Worse than before: {', '.join(errors.worse)}."
     return words

@@ -25,7 +25,6 @@ from pymoo_hdte.discrepancy._selection.choice import (
     special_case,
     stands_out,
 )
-from pymoo_hdte.discrepancy._selection.fitted_sets import may_be_together
 from pymoo_hdte.discrepancy._selection.fitting import Fit
 from pymoo_hdte.discrepancy._selection.hypothesis import (
     Hypothesis,
@@ -34,6 +33,7 @@ from pymoo_hdte.discrepancy._selection.hypothesis import (
     is_bounded,
     label_of,
     leave_the_same,
+    may_be_together,
     near_by_evidence,
 )
 from pymoo_hdte.discrepancy._selection.rules import Rules

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
@@ -279,14 +278,6 @@ class FittedSets:
 def is_special_case(hypothesis: Hypothesis, law: Hypothesis) -> bool:
     """Tell whether a set is a special case of a law that has more unknowns."""
     return contains(law, hypothesis) and len(hypothesis.fit.values) < len(law.fit.values)
-
-
-def may_be_together(effects: Effects) -> bool:
-    """Tell whether a machine may have all these effects together, none of them twice."""
-    twice = len(label_of(effects)) < len(effects)
-    return not twice and all(
-        effect.goes_with(partner) for effect, partner in combinations(effects, 2)
-    )
 
 
 def is_significant(

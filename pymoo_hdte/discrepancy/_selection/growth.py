@@ -12,7 +12,6 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import combinations
 from typing import Protocol
 
 import numpy as np
@@ -27,7 +26,12 @@ from pymoo_hdte.discrepancy._selection.decision import (
     log_prior,
 )
 from pymoo_hdte.discrepancy._selection.fitting import Evidence, Fit, fit
-from pymoo_hdte.discrepancy._selection.hypothesis import Hypothesis, hypothesis_of, label_of
+from pymoo_hdte.discrepancy._selection.hypothesis import (
+    Hypothesis,
+    hypothesis_of,
+    label_of,
+    may_be_together,
+)
 from pymoo_hdte.discrepancy._selection.levenberg_marquardt import SETTLED_SHARE
 from pymoo_hdte.discrepancy._selection.released import gain_of_released, released_together
 from pymoo_hdte.discrepancy._selection.score import (
@@ -312,7 +316,7 @@ class Growth:
         for candidate in self.candidates:
             if candidate.is_form_of(member) or candidate.replaces(member):
                 members = (*others, candidate)
-                if not _may_be_together(members) or self._was_worse(weighed, member, candidate):
+                if not may_be_together(members) or self._was_worse(weighed, member, candidate):
                     continue
                 residuals = self.data.objective(members).residuals
                 starts = [np.append(values, start) for start in candidate.starts]
@@ -357,7 +361,7 @@ class Growth:
             candidates = [
                 effect.candidate
                 for effect, gain in zip(before, hopeful, strict=True)
-                if self._may_raise(effect, gain) and self._may_reach(weighed.weight, effect, gain)
+                if self._may_lead(weighed.weight, effect, gain)
             ] + [c for c in candidates if c.label not in self.screened]
         if not candidates:
             return
@@ -374,10 +378,7 @@ class Growth:
             if taken[effect.candidate.name] == OF_ONE_NAME:
                 continue
             tried = bool(members) or taken.total() >= FEWEST
-            if tried and not (
-                self._may_raise(effect, gains[place])
-                and self._may_reach(weighed.weight, effect, gains[place])
-            ):
+            if tried and not self._may_lead(weighed.weight, effect, gains[place]):
                 break
             taken[effect.candidate.name] += 1
             self._fit((*members, effect.candidate), np.append(weighed.fit.values, effect.start))
@@ -406,13 +407,14 @@ class Growth:
         """Tell whether a set of a weight is within the window of the likeliest one."""
         return weight >= self.ranked[0].weight - WINDOW
 
-    def _may_raise(self, effect: Screened, gain: float) -> bool:
-        """Tell whether a set may become likelier by an effect: what is not has no say.
+    def _may_lead(self, weight: float, effect: Screened, gain: float) -> bool:
+        """Tell whether a set of a weight may become likelier by an effect, and near the likeliest.
 
         A set that is less likely than a part of it says nothing that this part does not (the second
         principle of Occam's window).
         """
-        return self._at_most(effect, gain) >= 0.0
+        raised = self._at_most(effect, gain) >= 0.0
+        return raised and self._may_reach(weight, effect, gain)
 
     def _may_reach(self, weight: float, effect: Screened, gain: float) -> bool:
         """Tell whether a set of a weight may come near the likeliest one by an effect's gain."""
@@ -475,7 +477,7 @@ class Growth:
         """
         label = label_of(members)
         known = label in self._known or label in self._invisible
-        if (known and not again) or not _may_be_together(members):
+        if (known and not again) or not may_be_together(members):
             return
         if _size(members) > MOST_MEMBERS:
             return
@@ -549,13 +551,6 @@ def _others(fitted: Fit, member: Candidate) -> tuple[tuple[Candidate, ...], Vect
     values += [fitted.values[place] for other, place in fitted.places if other is not member]
     others = tuple(candidate for candidate in fitted.candidates if candidate is not member)
     return others, np.concatenate(values)
-
-
-def _may_be_together(members: Sequence[Candidate]) -> bool:
-    """Tell whether a machine may have all these effects together, none of them twice."""
-    twice = len(label_of(members)) < len(members)
-    pairs = combinations(members, 2)
-    return not twice and all(effect.goes_with(partner) for effect, partner in pairs)
 
 
 def _size(members: Sequence[Candidate]) -> int:

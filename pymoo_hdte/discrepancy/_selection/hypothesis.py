@@ -10,6 +10,7 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
@@ -92,6 +93,13 @@ class Hypothesis:
 def label_of(effects: Sequence[Candidate]) -> frozenset[str]:
     """Return the labels of a set of effects, which identify it whatever their order."""
     return frozenset(candidate.label for candidate in effects)
+
+
+def may_be_together(effects: Sequence[Candidate]) -> bool:
+    """Tell whether a machine may have all these effects together, none of them twice."""
+    twice = len(label_of(effects)) < len(effects)
+    pairs = combinations(effects, 2)
+    return not twice and all(effect.goes_with(partner) for effect, partner in pairs)
 
 
 def hypothesis_of(fitted: Fit, of_base: float) -> Hypothesis:

@@ -30,9 +30,10 @@ absent. Any other size of a law has to be visible: a law without it has another 
 _BY_LOGARITHM = 5.0
 """Ratio of a shape's bounds from which on it is known by its logarithm."""
 
-Modulations = Callable[[Candidate, slice], NDArray[np.float64] | None]
-"""From a candidate and the places of its unknowns to changes (n, m) of the residuals by a relative
-error of its law, as a Gaussian process over its arguments with a standard deviation of 1."""
+Modulations = Callable[[Candidate, slice], Sequence[NDArray[np.float64]]]
+"""From a candidate and the places of its unknowns to changes of the residuals by a relative error
+of its law, parts of (n, m), as a Gaussian process over its arguments with a standard deviation of
+1."""
 
 
 def linearise(
@@ -81,7 +82,9 @@ def linearise(
                 prior, unit = _shape(parameters[0], float(fitted.values[k]))
                 priors.append(prior)
                 free.append(columns[:, k] * unit)
-        if (changes := errors(candidate, place)) is not None:
+        changes = np.column_stack([np.empty((n, 0)), *errors(candidate, place)])
+        changes = changes[:, np.any(changes != 0.0, axis=0)]
+        if changes.size:
             most = LEAST_ERROR if candidate.exact else MOST_ERROR
             none, name = np.zeros(changes.shape[1]), f"form of {candidate.label}"
             wide = not candidate.exact
@@ -100,7 +103,32 @@ def linearise(
     )
 
 
-def amplitudes(candidate: Candidate, values: Vector) -> list[tuple[list[int], float]]:
+def modulated(
+    candidate: Candidate,
+    values: Vector,
+    columns: NDArray[np.float64],
+    process: NDArray[np.float64],
+) -> list[NDArray[np.float64]]:
+    """Return what a candidate does if each of its sizes errs by a process, parts of (n, k).
+
+    Parameters
+    ----------
+    candidate : Candidate
+    values : ndarray, shape (m,)
+        Of its unknowns.
+    columns : ndarray, shape (n, m)
+        Change of the residuals by each of them.
+    process : ndarray, shape (n, k)
+        Relative error of each residual.
+    """
+    return [
+        process * (columns[:, [row]] * amplitude)
+        for rows, amplitude in _amplitudes(candidate, values)
+        for row in rows
+    ]
+
+
+def _amplitudes(candidate: Candidate, values: Vector) -> list[tuple[list[int], float]]:
     """Return the places of each size of a candidate, and its fitted amplitude in its scales.
 
     Parts of a line share their amplitude. A factor counts by how far it is from 1.

@@ -225,6 +225,11 @@ class Score:
         return min(chances, default=1.0)
 
 
+def groups_of(*labels: NDArray[np.int_]) -> list[NDArray[np.int_]]:
+    """Return the rows of each record, of each channel, or of what else labels (n,) tell apart."""
+    return [np.flatnonzero(each == label) for each in labels for label in np.unique(each)]
+
+
 def score(hypothesis: Linearised) -> Score:
     """Return the marginal likelihood of a hypothesis."""
     return Integral(hypothesis).score()

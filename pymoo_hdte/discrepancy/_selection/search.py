@@ -15,13 +15,13 @@ from pymoo_hdte.discrepancy._selection.fitted_sets import (
     Effects,
     FittedSets,
     ill_explained,
-    may_be_together,
 )
 from pymoo_hdte.discrepancy._selection.fitting import Fit, JudgedEvidence
 from pymoo_hdte.discrepancy._selection.hypothesis import (
     Hypothesis,
     label_of,
     leave_the_same,
+    may_be_together,
     misfit_of,
 )
 from pymoo_hdte.discrepancy._selection.released import released_together

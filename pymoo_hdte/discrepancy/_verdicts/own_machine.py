@@ -94,10 +94,10 @@ class HeldOutErrors:
     overall: PredictionError
 
     @property
-    def growths(self) -> dict[str, float]:
-        """What grew, with after over before."""
+    def worse(self) -> tuple[str, ...]:
+        """What the correction made worse: channels and records by their name."""
         together = {**self.parts, **self.records}
-        return {name: error.after / error.before for name, error in together.items() if error.worse}
+        return tuple(name for name, error in together.items() if error.worse)
 
     def as_dict(self) -> dict[str, Any]:
         """Return them as plain values."""

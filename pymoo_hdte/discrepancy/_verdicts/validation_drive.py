@@ -106,18 +106,9 @@ class Validation:
 
         Of a record, its transmission error.
         """
-        return tuple(self.growths)
-
-    @property
-    def growths(self) -> dict[str, float]:
-        """Errors that the correction made worse, by their name in `worse`: after over before."""
         errors = {**self.channels, "overall": self.overall}
         records = zip(self.records, self.by_record, strict=True)
-        return {
-            name: error.after / max(error.before, 1e-300)
-            for name, error in (*errors.items(), *records)
-            if error.worse
-        }
+        return tuple(name for name, error in (*errors.items(), *records) if error.worse)
 
     def as_dict(self) -> dict[str, Any]:
         """Return the entry in the verdict as plain values, the transmission error first."""

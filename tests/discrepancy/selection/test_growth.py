@@ -77,7 +77,7 @@ class LinearData:
         return [np.arange(N)]
 
     def linearised(self, fitted) -> Linearised:
-        return linearise(fitted, np.zeros(N, int), lambda candidate, place: None, 0.0)
+        return linearise(fitted, np.zeros(N, int), lambda candidate, place: (), 0.0)
 
 
 def candidate(number):

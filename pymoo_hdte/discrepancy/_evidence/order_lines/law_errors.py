@@ -7,9 +7,9 @@ within a turn: there it is the law itself times smooth functions of the torsion.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,9 +20,9 @@ from pymoo_hdte.discrepancy._evidence.order_lines.features import MEANS
 from pymoo_hdte.discrepancy._records.line_fit import CHANNELS
 from pymoo_hdte.discrepancy._selection.candidate import Candidate
 from pymoo_hdte.discrepancy._selection.fitting import Fit, Response
-from pymoo_hdte.discrepancy._selection.linearised import amplitudes, linearise
+from pymoo_hdte.discrepancy._selection.linearised import linearise, modulated
 from pymoo_hdte.discrepancy._selection.process import TERMS, sine_of, sines_of
-from pymoo_hdte.discrepancy._selection.score import Linearised, Sized
+from pymoo_hdte.discrepancy._selection.score import Linearised, Sized, groups_of
 from pymoo_hdte.drive import DriveEffect, LawAtPort
 from pymoo_hdte.effects.hysteresis import MaxwellSlip
 from pymoo_hdte.effects.law import Behaviour, Law, PortState
@@ -133,11 +133,7 @@ class LawErrors:
     @property
     def groups(self) -> list[NDArray[np.int_]]:
         """Rows of each record and of each channel."""
-        return [
-            np.flatnonzero(labels == label)
-            for labels in (self.records, self.channels)
-            for label in np.unique(labels)
-        ]
+        return groups_of(self.records, self.channels)
 
     @cached_property
     def conditions(self) -> Matrix:
@@ -162,23 +158,18 @@ class LawErrors:
 
     def linearised(self, fitted: Fit) -> Linearised:
         """Return a fit as a hypothesis."""
-        response = self.data.response(fitted)
 
-        def errors(candidate: Candidate, place: slice) -> Matrix | None:
+        @cache
+        def response() -> Response:
+            # A prediction, which only laws of the torsion need.
+            return self.data.response(fitted)
+
+        def errors(candidate: Candidate, place: slice) -> list[Matrix]:
             if candidate.releases is not None or not candidate.parameters:
-                return None
-            columns = fitted.jacobian[: self.n_rows, place]
-            parts = [
-                self._by_row * (columns[:, [row]] * amplitude)
-                for rows, amplitude in amplitudes(candidate, fitted.values[place])
-                for row in rows
-            ]
-            parts += self._within(candidate, fitted.values[place], response)
-            if not parts:
-                return None
-            whole = np.column_stack(parts)
-            whole = whole[:, np.linalg.norm(whole, axis=0) > 0.0]
-            return whole if whole.size else None
+                return []
+            values, columns = fitted.values[place], fitted.jacobian[: self.n_rows, place]
+            parts = modulated(candidate, values, columns, self._by_row)
+            return [*parts, *self._within(candidate, values, response)]
 
         hypothesis = linearise(fitted, self.channels, errors, shares=self._shares)
         return hypothesis.beside(*self.of_records)
@@ -243,7 +234,9 @@ class LawErrors:
         whole[: len(columns)] = columns
         return whole
 
-    def _within(self, candidate: Candidate, values: Matrix, response: Response) -> Iterator[Matrix]:
+    def _within(
+        self, candidate: Candidate, values: Matrix, response: Callable[[], Response]
+    ) -> Iterator[Matrix]:
         """Yield what a law of the torsion does if it errs within a turn, (n, m)."""
         laws = [
             effect
@@ -253,10 +246,10 @@ class LawErrors:
         travel = self._torque / self.data.campaign.believed.stiffness
         for effect in laws:
             if effect.law.states:
-                yield self._springs(travel, response, float(np.abs(values[0])))
+                yield self._springs(travel, response(), float(np.abs(values[0])))
                 continue
             changes = [
-                response((Correction("mesh", ScaledLaw(effect.law, travel, k, _STEP)),))
+                response()((Correction("mesh", ScaledLaw(effect.law, travel, k, _STEP)),))
                 for k in range(1, TERMS + 1)
             ]
             yield np.column_stack(changes)[: self.n_rows] / _STEP

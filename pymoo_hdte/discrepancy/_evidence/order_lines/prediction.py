@@ -324,8 +324,8 @@ def _follow_lead(
     lines[:, :3] += response.channels * phasors[:, None]
     lines[:, 5] -= np.where(held, 0.0, rates)
     beats = _beats(*(tuple(values.tolist()) for values in (lead.orders, held, within)))
+    speed = (response.rate[:, :1] / (1j * lead.orders[0])).real
     if beats.places.any():
-        speed = (response.rate[:, :1] / (1j * lead.orders[0])).real
         second = rates[:, beats.second]
         np.conjugate(second, out=second, where=beats.conjugate)
         beating = (rates[:, beats.first] * second) @ beats.places / speed
@@ -344,7 +344,6 @@ def _follow_lead(
         known = _higher_powers(np.where(held, slopes, 0.0)[:, family], multiples[family])
         powers[:, :, family] -= np.where(within[family], known, 0.0)
         of_speed, of_square = powers
-        speed = (response.rate[:, :1] / (1j * lead.orders[0])).real
         lines[:, 1] += balance.slopes[:, 3:] * speed * of_speed
         lines[:, 1] += 0.5 * inertia[:, None] * response.rate * speed * of_square
         lines[:, 5] -= speed * of_speed
