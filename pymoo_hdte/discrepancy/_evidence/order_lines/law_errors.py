@@ -206,17 +206,11 @@ class LawErrors:
 
     @property
     def _of_error(self) -> Sized:
-        """By how much the static error of each record differs beyond what is stated.
-
-        In the directions in which the covariance of the features exceeds that of the sensors.
-        """
+        """By how much the static error of each record differs beyond what is stated."""
         shape, columns = self.data.features.values.shape, list[Matrix]()
-        beyond = self.data.covariance - self.data.features.covariance
-        for record, covariance in enumerate(beyond):
-            values, vectors = np.linalg.eigh(covariance)
-            kept = values > _SMALLEST * values.max()
-            changes = np.zeros((int(kept.sum()), *shape))
-            changes[:, record] = (vectors[:, kept] * np.sqrt(values[kept])).T
+        for record in range(shape[0]):
+            changes = np.zeros((len(self.data.repeatability), *shape))
+            changes[:, record] = self.data.repeatability[:, record]
             columns.append(self.data.whiten(changes).T)
         whole = self._whole(np.hstack(columns))
         none = np.zeros(whole.shape[1])

@@ -93,10 +93,15 @@ class Observations:
         It is the sum of those of sensors, of the repeatability, of creep in laws that forget
         gradually, and of the model's own error where an effect dominates.
         """
-        layout = Layout(self.base)
-        start = layout.array("start") if self.reference is None else self.reference
-        known = self._of_sensors(start) + self._repeatability(layout, start) + self._of_model(start)
-        return known + self._creep(float(start[layout.index("stiffness")]))
+        start, changes = self._start, self.repeatability
+        known = self._of_sensors(start) + self._of_model(start)
+        known = known + np.einsum("vri,vrj->rij", changes, changes)
+        return known + self._creep(float(start[Layout(self.base).index("stiffness")]))
+
+    @property
+    def _start(self) -> Vector:
+        """Base values for responses, shape (n_base,)."""
+        return Layout(self.base).array("start") if self.reference is None else self.reference
 
     def _of_model(self, start: Vector) -> NDArray[np.float64] | float:
         """Return the covariance by what the model does not hold of what the effects change.
@@ -178,11 +183,16 @@ class Observations:
         covariance[:, diagonal, diagonal] *= 1.0 + _COURSE**2
         return np.asarray(size**2 * covariance)
 
-    def _repeatability(self, layout: Layout, start: Vector) -> NDArray[np.float64]:
-        """Return the covariance by small changes of the static error for each record."""
-        rig, believed = self.campaign.rig, self.campaign.believed
-        lines = range(len(believed.error_orders))
-        spread = rig.repeatability / max(len(lines), 1) ** 0.5
+    @cached_property
+    def repeatability(self) -> NDArray[np.float64]:
+        """Changes by the deviation of each part of the static error, shape (2 m + 1, r, f).
+
+        Those of the lines, which reach all channels, and of the mean: the error of each record
+        differs by independent multiples of them.
+        """
+        layout, start = Layout(self.base), self._start
+        lines = range(len(self.campaign.believed.error_orders))
+        spread = self.campaign.rig.repeatability / max(len(lines), 1) ** 0.5
         moved = [start]
         for line in lines:
             places = [layout.index(f"error_{part}_{line}") for part in ("amplitude", "phase")]
@@ -193,10 +203,9 @@ class Observations:
                 shifted[places] = np.abs(phasor), np.angle(phasor)
                 moved.append(shifted)
         predicted = self.predict(np.array(moved), self.reference_effects)
-        change = predicted[1:] - predicted[0]
-        covariance = np.einsum("vri,vrj->rij", change, change)
-        covariance[:, 0, 0] += spread**2
-        return covariance
+        of_mean = np.zeros_like(predicted[:1])
+        of_mean[..., 0] = spread
+        return np.concatenate([predicted[1:] - predicted[0], of_mean])
 
     def predict(self, vectors: Vector, effects: Sequence[DriveEffect]) -> NDArray[np.float64]:
         """Return features, shape (v, r, f), of vectors (v, n_base) of base parameters."""

@@ -231,7 +231,7 @@ def repeatability(
         variances = [np.diag(fit.covariance[0])[1:].sum() for fit in lines]
         sensors += float(np.mean(variances)) * (len(group) - 1)
         number += 2 * n_lines * (len(group) - 1)
-    # Each part of each line has this variance; see `Observations._repeatability`.
+    # Each part of each line has this variance; see `Observations.repeatability`.
     stated = rig.repeatability**2 / n_lines + sensors / number
     estimate = float(np.sqrt(max(power / number - sensors / number, 0.0) * n_lines))
     chance = 2.0 * min(chi2.sf(power / stated, number), chi2.cdf(power / stated, number))
