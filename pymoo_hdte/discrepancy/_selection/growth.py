@@ -10,7 +10,7 @@ nothing is compared but probabilities.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Protocol
 
@@ -156,6 +156,9 @@ class Growth:
     errors : Errors
     screened : dict of str to Screened
         What each candidate does alone, if it is known.
+    guess : callable, optional
+        From what a fit leaves to effects that may be missing, known ones among them: small lines
+        are seen beside the large ones only when these are explained.
     """
 
     data: Evidence
@@ -163,6 +166,7 @@ class Growth:
     candidates: Sequence[Candidate]
     errors: Errors
     screened: dict[str, Screened] = field(default_factory=dict)
+    guess: Callable[[Fit], Sequence[Candidate]] | None = None
     counts: Counter[str] = field(init=False)
     _known: dict[frozenset[str], Weighed] = field(default_factory=dict)
     _invisible: set[frozenset[str]] = field(default_factory=set)
@@ -173,8 +177,26 @@ class Growth:
     _tried: set[tuple[frozenset[str], bytes]] = field(default_factory=set)
 
     def __post_init__(self) -> None:
+        self._count()
+
+    def _count(self) -> None:
         self.counts = Counter(candidate.name for candidate in self.candidates)
         self.counts["parameter"] = len(self.data.base)
+
+    def _guess_further(self, fitted: Fit) -> None:
+        """Take up the effects that are guessed from what a fit leaves."""
+        known = {candidate.label for candidate in self.candidates}
+        guessed = self.guess(fitted) if self.guess is not None else ()
+        if not (further := [effect for effect in guessed if effect.label not in known]):
+            return
+        self.candidates = [*self.candidates, *further]
+        self._count()
+        self._known = {
+            label: replace(weighed, prior=self._prior(weighed.candidates))
+            for label, weighed in self._known.items()
+        }
+        self._extended.clear()
+        self._outside.clear()
 
     @property
     def ranked(self) -> list[Weighed]:
@@ -222,6 +244,7 @@ class Growth:
                 for member in best.candidates:
                     self._exchange(best, member)
                 if label_of((likeliest := self.ranked[0]).candidates) == label:
+                    self._guess_further(likeliest.fit)
                     yield likeliest.fit
             elif weighed is None:
                 return

@@ -188,12 +188,16 @@ def _check_steady(data: Data) -> None:
         raise InvalidInput("believed.effects", names, allowed)
 
 
-def _candidates(data: Data, base: Fit) -> list[Candidate]:
-    features = data.features
-    clear = _strong_lines(features, base.residuals, data.rules)
-    # Above the highest order there are harmonics only.
-    highest = highest_order(data.campaign, data.rules)
-    seen = [order for order in clear if order <= highest][: data.rules.most_order_lines]
+def _candidates(data: Data, base: Fit, further: Fit | None = None) -> list[Candidate]:
+    """Return the effects that the lines suggest which the base, and a further fit, leave."""
+    features, highest = data.features, highest_order(data.campaign, data.rules)
+    clear, seen = list[float](), list[float]()
+    for fitted in (base, further) if further is not None else (base,):
+        strong = _strong_lines(features, fitted.residuals, data.rules)
+        clear += [order for order in strong if not is_among(clear, order)]
+        # Above the highest order there are harmonics only.
+        strongest = [order for order in strong if order <= highest][: data.rules.most_order_lines]
+        seen += [order for order in strongest if not is_among(seen, order)]
     believed, orders = data.campaign.believed, features.orders.tolist()
     sizes = port_sizes(believed, orders, seen, scales_of(data, base), clear, highest)
     return drive_candidates(sizes, believed.effects, data.bench.nuisances)

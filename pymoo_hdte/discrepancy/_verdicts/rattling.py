@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,9 +40,12 @@ An order half-way between two lines shows in both.
 """
 
 
-def judged(
-    data: Data, base: Fit, candidates_of: Callable[[Data, Fit], list[Candidate]]
-) -> tuple[Data, Verdict]:
+Guess = Callable[..., list[Candidate]]
+"""From data, the fit of their base, and perhaps a further one, to the effects that may be missing
+from what they leave."""
+
+
+def judged(data: Data, base: Fit, candidates_of: Guess) -> tuple[Data, Verdict]:
     """Return the verdict on some data, with the data that it is of.
 
     If sweeps speak for a clearance, records in which it would rattle are left out. If they speak
@@ -54,25 +58,24 @@ def judged(
     base : Fit
         Of these data, without effects.
     candidates_of : callable
-        From data and the fit of their base to the effects that may be missing.
+        See `Guess`.
     """
-    candidates = candidates_of(data, base)
-    leading = leading_sweep_effect(data, base, candidates)
+    leading = leading_sweep_effect(data, base, candidates_of(data, base))
     loaded = data if leading is None else data.loaded
     if loaded is data or leading is None:
-        return _judged_on(data, base, candidates)
+        return _judged_on(data, base, candidates_of)
     of_loaded = fit(loaded)
     if effect_named(leading).rattles:
-        return _judged_on(loaded, of_loaded, candidates_of(loaded, of_loaded))
-    overall = _judged_on(data, base, candidates)
+        return _judged_on(loaded, of_loaded, candidates_of)
+    overall = _judged_on(data, base, candidates_of)
     if overall[-1].status in ("unlisted", "partial"):
-        again = _judged_on(loaded, of_loaded, candidates_of(loaded, of_loaded))
+        again = _judged_on(loaded, of_loaded, candidates_of)
         if _explains_by_a_clearance(again[-1]):
             return again
     return overall
 
 
-def _judged_on(data: Data, base: Fit, candidates: list[Candidate]) -> tuple[Data, Verdict]:
+def _judged_on(data: Data, base: Fit, candidates_of: Guess) -> tuple[Data, Verdict]:
     """Return the verdict on all these data, with the data on the bench that they show.
 
     The likelihood of all records is that of those that are fitted, times the predictive density of
@@ -80,7 +83,7 @@ def _judged_on(data: Data, base: Fit, candidates: list[Candidate]) -> tuple[Data
     """
     every = data.with_held_out
     of_every = base if every is data else fit(every, start=base.values)
-    known, growth = _grown(every, of_every, candidates)
+    known, growth = _grown(every, of_every, candidates_of(data, base), candidates_of)
     decision, sets = growth.decide()
     likeliest, bench = sets[0].fit, data
     if known is not every:
@@ -91,7 +94,9 @@ def _judged_on(data: Data, base: Fit, candidates: list[Candidate]) -> tuple[Data
     return bench, verdict_of(bench, decision, sets, base if bench is data else None)
 
 
-def _grown(data: Data, base: Fit, candidates: Sequence[Candidate]) -> tuple[Data, Growth]:
+def _grown(
+    data: Data, base: Fit, candidates: Sequence[Candidate], candidates_of: Guess
+) -> tuple[Data, Growth]:
     """Return the sets of effects grown with the noise of the likeliest one, and the data with it.
 
     An effect that moves a resonance changes what an error that does not repeat brings to each
@@ -100,12 +105,13 @@ def _grown(data: Data, base: Fit, candidates: Sequence[Candidate]) -> tuple[Data
     """
     likely, screened = list[Fit](), dict[str, Screened]()
     for renewals in range(MOST_RENEWED + 1):
-        growth, renewed = Growth(data, base, candidates, LawErrors(data, base), screened), None
+        guess, renewed = partial(candidates_of, data, base), None
+        growth = Growth(data, base, candidates, LawErrors(data, base), screened, guess)
         for fitted in growth.steps(likely):
             renewed = data.with_noise_of(fitted) if renewals < MOST_RENEWED else None
             if renewed is not None:
                 break
-        likely = growth.likeliest
+        likely, candidates = growth.likeliest, growth.candidates
         if renewed is None:
             break
         screened = {
