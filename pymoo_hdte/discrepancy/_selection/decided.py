@@ -66,6 +66,7 @@ def verdict_of(
         data.rules,
         (more,) if decision.status == "partial" else (),
         probability=decision.probability,
+        outside=decision.outside if decision.possible else 1.0,
     )
 
 

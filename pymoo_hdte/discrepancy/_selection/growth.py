@@ -108,6 +108,8 @@ class Weighed:
         Where that is.
     worst_chance : float
         As of `Explanation`.
+    losses : dict of str to float
+        By how much its probability would fall without each of its effects, to first order.
     """
 
     fit: Fit
@@ -115,6 +117,7 @@ class Weighed:
     score: Score
     prior: float
     worst_chance: float
+    losses: dict[str, float]
     outside: bool = False
     places: tuple[str, ...] = ()
 
@@ -173,7 +176,7 @@ class Growth:
     _extended: set[frozenset[str]] = field(default_factory=set)
     _complete: set[frozenset[str]] = field(default_factory=set)
     _outside: dict[Weighed, Weighed] = field(default_factory=dict)
-    _varied: set[frozenset[str]] = field(default_factory=set)
+    _varied: dict[frozenset[str], set[str]] = field(default_factory=dict)
     _tried: set[tuple[frozenset[str], bytes]] = field(default_factory=set)
 
     def __post_init__(self) -> None:
@@ -236,13 +239,18 @@ class Growth:
         """Extend the likeliest sets, and exchange members of the best one, until it stays best.
 
         Members are exchanged first: beside a wrong form of a law all else seems to be missing.
+        Those that were essential beside fewer members are asked again at the end only.
         """
         while True:
             weighed, best = self._open(), self.ranked[0]
-            if (label := label_of(best.candidates)) not in self._varied:
-                self._varied.add(label)
+            label = label_of(best.candidates)
+            first, varied = label not in self._varied, self._varied.setdefault(label, set())
+            if first or (weighed is None and varied < label):
                 for member in best.candidates:
-                    self._exchange(best, member)
+                    asked = weighed is None or not self._is_essential(best, member)
+                    if asked and member.label not in varied:
+                        varied.add(member.label)
+                        self._exchange(best, member)
                 if label_of((likeliest := self.ranked[0]).candidates) == label:
                     self._guess_further(likeliest.fit)
                     yield likeliest.fit
@@ -331,7 +339,30 @@ class Growth:
         self._weigh(best_fit(self.data, hypothesis, starts, others))
         weighed = self._known[label]
         for member in weighed.candidates if len(weighed.candidates) > 1 else ():
-            self._without(weighed, member)
+            if not self._is_essential(weighed, member):
+                self._without(weighed, member)
+
+    def _is_essential(self, weighed: Weighed, member: Candidate) -> bool:
+        """Tell whether a member is as essential as it was beside fewer members.
+
+        There it was asked for: no set without it, with another effect instead, was anywhere near.
+        """
+        whole, far, loss = label_of(weighed.candidates), TRUSTED * WINDOW, weighed.losses
+        if loss[member.label] < far:
+            return False
+        for label, varied in self._varied.items():
+            part = self._known.get(label)
+            if part is None or not label < whole or member.label not in varied:
+                continue
+            rivals = [
+                known.weight
+                for other, known in self._known.items()
+                if member.label not in other and len(other - label) <= 1
+            ]
+            behind = part.weight - max(rivals, default=-np.inf)
+            if behind > far and loss[member.label] >= part.losses[member.label] / TRUSTED:
+                return True
+        return False
 
     def _exchange(self, weighed: Weighed, member: Candidate) -> None:
         """Fit what a set may have in place of a member: other forms of it, and other effects."""
@@ -392,6 +423,10 @@ class Growth:
         if not members:
             self.screened.update((effect.candidate.label, effect) for effect in screened)
         gains = self._gains(integral, screened, n)
+        if len(evident := self._evident_nuisances(weighed, screened)) > 1:
+            nuisances = [effect.candidate for effect in evident]
+            start = np.concatenate([weighed.fit.values, *(effect.start for effect in evident)])
+            self._fit((*members, *nuisances), start)
         ranked = np.argsort(-gains, kind="stable")
         taken = Counter[str]()
         for place in ranked[gains[ranked] >= -WINDOW]:
@@ -405,6 +440,29 @@ class Growth:
                 break
             taken[effect.candidate.name] += 1
             self._fit((*members, effect.candidate), np.append(weighed.fit.values, effect.start))
+
+    def _evident_nuisances(
+        self, weighed: Weighed, screened: Sequence[Screened]
+    ) -> list[Screened]:
+        """Return nuisances that a set lacks, each by far beside those before.
+
+        A bench may have ten, and one after the other takes ten searches. To first order is enough:
+        what is one too many is left out afterwards.
+        """
+        evident, hypothesis, n = list[Screened](), weighed.linearised, len(weighed.linearised.residuals)
+        remaining = [effect for effect in screened if effect.candidate.nuisance and effect.start]
+        while remaining:
+            integral = Integral(hypothesis)
+            integral.score()
+            gains = self._gains(integral, remaining, n)
+            if gains.max() < TRUSTED * WINDOW:
+                break
+            evident.append(best := remaining[int(np.argmax(gains))])
+            hypothesis = hypothesis.beside(*_first_order(best, n))
+            remaining = [
+                effect for effect in remaining if effect.candidate.goes_with(best.candidate)
+            ]
+        return evident
 
     def _release(self, weighed: Weighed) -> None:
         """Fit a set with the values released that it leaves at the bounds of their tolerance."""
@@ -526,13 +584,16 @@ class Growth:
         if known is not None and known.fit.chi_square <= fitted.chi_square:
             return
         linearised = self.errors.linearised(fitted)
-        score = Integral(linearised).score()
+        integral = Integral(linearised)
+        score = integral.score()
         if score.invisible or (fitted.candidates and self._lacks_evident(fitted.candidates)):
             self._invisible.add(label)
             return
         prior = self._prior(fitted.candidates)
         chance = score.worst_chance(self.errors.groups)
-        self._known[label] = Weighed(fitted, linearised, score, prior, chance)
+        effects = [effect.label for effect, _ in fitted.places]
+        losses = dict(zip(effects, integral.losses().tolist(), strict=True))
+        self._known[label] = Weighed(fitted, linearised, score, prior, chance, losses)
 
     def _lacks_evident(self, members: Sequence[Candidate]) -> bool:
         """Tell whether some effect is evident, and no member is one that it may be."""

@@ -27,6 +27,9 @@ the upper end it is another law."""
 _LEAST_SHARE = 1e-3
 """Least of a further line or level of an effect, as a share of its largest: it may be as good as
 absent. Any other size of a law has to be visible: a law without it has another name."""
+_NO_NOISE = 0.03
+"""Size at which a change is nothing, in standard deviations of the noise: a hundred of them change
+no logarithm of odds by 0.1."""
 _BY_LOGARITHM = 5.0
 """Ratio of a shape's bounds from which on it is known by its logarithm."""
 
@@ -82,10 +85,10 @@ def linearise(
                 prior, unit = _shape(parameters[0], float(fitted.values[k]))
                 priors.append(prior)
                 free.append(columns[:, k] * unit)
+        most = LEAST_ERROR if candidate.exact else MOST_ERROR
         changes = np.column_stack([np.empty((n, 0)), *errors(candidate, place)])
-        changes = changes[:, np.any(changes != 0.0, axis=0)]
+        changes = _that_matter(changes, most)
         if changes.size:
-            most = LEAST_ERROR if candidate.exact else MOST_ERROR
             none, name = np.zeros(changes.shape[1]), f"form of {candidate.label}"
             wide = not candidate.exact
             sized.append(Sized(name, changes, LEAST_ERROR, most, none, none > 0.0, of_form=wide))
@@ -101,6 +104,15 @@ def linearise(
         shares,
         members=tuple(members),
     )
+
+
+def _that_matter(changes: NDArray[np.float64], most: float) -> NDArray[np.float64]:
+    """Return the directions of normal changes (n, k) that a scale makes as large as the noise.
+
+    Independent changes of one scale may be turned at will: (n, m), the largest last.
+    """
+    values, vectors = np.linalg.eigh(changes.T @ changes)
+    return np.asarray(changes @ vectors[:, values * most**2 > _NO_NOISE**2])
 
 
 def modulated(

@@ -583,6 +583,32 @@ class Integral:
                 gains[number] += self._gain_of_noise(after, freedom)
         return gains
 
+    def losses(self) -> Vector:
+        """Return by how much the logarithm would fall without each effect, (n_members,).
+
+        To first order, with renewed noise, at the present scales: by the ratio of the densities of
+        its coefficients at nothing (Dickey, Ann. Math. Statist. 42, 1971).
+        """
+        mean, covariance = self._posterior()
+        by_row = self.factors[self.hypothesis.channels] / self.weights
+        scaled = self.columns / by_row[:, None]
+        left, freedom = (self.shift + self.columns @ mean) / by_row, self._freedom(covariance)
+        losses = np.zeros(len(self.hypothesis.members))
+        for number, member in enumerate(self.hypothesis.members):
+            own = range(member.sized.start, member.sized.stop)
+            if not own:
+                continue
+            rows = np.r_[tuple(self.places[k] for k in own)]
+            precision = _inverse(covariance[np.ix_(rows, rows)])
+            along = precision @ mean[rows]
+            priors = np.concatenate([self.scales[k] * self.units[self.places[k]] for k in own])
+            losses[number] = 0.5 * float(mean[rows] @ along) - 0.5 * float(
+                np.linalg.slogdet(precision * np.outer(priors, priors))[1]
+            )
+            after = left - scaled @ (covariance[:, rows] @ along)
+            losses[number] -= self._gain_of_noise(after, freedom)
+        return losses
+
     def _gain_of_noise(self, left: Vector, freedom: Vector) -> float:
         """Return by how much factors that fit residuals (n,), in units of them, are likelier.
 

@@ -73,6 +73,9 @@ class Verdict:
     probability : float or None
         That it is right: its posterior, or of a mechanism as of `probability`. None where it names
         nothing, or nothing was compared.
+    outside : float
+        Probability that something outside of the library is there; 1 if no set is possible, 0 where
+        rules decide.
     seen_beyond : tuple of str
         Names of effects that are seen in what no fit holds, as ripple beyond the band of a motion.
     rivals_beyond : tuple of str
@@ -89,6 +92,7 @@ class Verdict:
     reasons: tuple[Reason, ...] = ()
     shown_in_held_out: bool = True
     probability: float | None = None
+    outside: float = 0.0
     seen_beyond: tuple[str, ...] = ()
     rivals_beyond: tuple[str, ...] = ()
 

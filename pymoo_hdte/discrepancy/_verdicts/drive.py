@@ -108,7 +108,7 @@ def examine_drive(campaign: Campaign, rules: Rules = RULES) -> DriveFinding:
         records = data.features.records
         wider = replace(data, features=measure(campaign, records, orders, rules, exciting))
         judged = rattling.judged(wider, fit(wider, start=base.values), _candidates)
-    if not further or (harmonics and judged[-1].status == "unlisted"):
+    if not further or (harmonics and judged[-1].outside > 0.5):
         # Where no fit follows the harmonics, as in a record that then has no steady state, the
         # lower orders may still be explained.
         judged, harmonics = rattling.judged(data, base, _candidates), []
