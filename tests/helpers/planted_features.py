@@ -132,4 +132,4 @@ def analysed(data, status="unlisted", candidate=None, start=()):
 
 def judged(data, candidates):
     """Return the verdict on planted data."""
-    return rattling._judged_on(data, fit(data), candidates)[1]
+    return rattling._judged_on(data, fit(data), lambda *_: candidates)[1]

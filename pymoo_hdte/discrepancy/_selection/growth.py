@@ -441,15 +441,17 @@ class Growth:
             taken[effect.candidate.name] += 1
             self._fit((*members, effect.candidate), np.append(weighed.fit.values, effect.start))
 
-    def _evident_nuisances(
-        self, weighed: Weighed, screened: Sequence[Screened]
-    ) -> list[Screened]:
+    def _evident_nuisances(self, weighed: Weighed, screened: Sequence[Screened]) -> list[Screened]:
         """Return nuisances that a set lacks, each by far beside those before.
 
         A bench may have ten, and one after the other takes ten searches. To first order is enough:
         what is one too many is left out afterwards.
         """
-        evident, hypothesis, n = list[Screened](), weighed.linearised, len(weighed.linearised.residuals)
+        evident, hypothesis, n = (
+            list[Screened](),
+            weighed.linearised,
+            len(weighed.linearised.residuals),
+        )
         remaining = [effect for effect in screened if effect.candidate.nuisance and effect.start]
         while remaining:
             integral = Integral(hypothesis)

@@ -47,7 +47,7 @@ ALONE = {
 COULOMB = LawAtPort("coulomb_friction", "input", CoulombFriction(0.02))
 
 
-def candidates_of(data, base):
+def candidates_of(data, *_):
     changes = (150.0, 350.0, 550.0)
     scales = replace(SCALES, changes=changes, duration=700.0, swept=False, loads_differ=True)
     orders = data.features.orders.tolist()
@@ -65,10 +65,10 @@ def verdict_on(effects, seed=6):
 
 def test_a_brake_may_ripple_once_a_turn_beside_a_coupling_or_a_weight():
     """A bench with both was 'unlisted': what was constant took the place of the share."""
-    begin = candidates_of(DATA, fit(measured((), None, DATA)[0]))
+    begin = candidates_of(DATA)
     (coupling,) = (one for one in begin if one.label == "torque_ripple/1+2:load")
     data = DATA.on_bench(coupling, coupling.starts[0])
-    labels = {one.label for one in candidates_of(data, fit(measured((), None, data)[0]))}
+    labels = {one.label for one in candidates_of(data)}
     assert "brake_ripple:load@0.009901" in labels
     assert not any(label.startswith("torque_ripple/1+2:load") for label in labels)
 
