@@ -380,14 +380,21 @@ class Growth:
             self._extend(without)
 
     def _was_worse(self, weighed: Weighed, member: Candidate, candidate: Candidate) -> bool:
-        """Tell whether a candidate in place of a member was far worse beside some of the others."""
+        """Tell whether a candidate in place of a member was far worse beside some of the others.
+
+        Where the members that were not there bring more than that, they may bring as much beside
+        the candidate, and nothing is known.
+        """
         whole, old, new = label_of(weighed.candidates), label_of([member]), label_of([candidate])
         behind = [
-            known.weight - self._known[(label - old) | new].weight
+            (known.weight - self._known[(label - old) | new].weight, weighed.weight - known.weight)
             for label, known in self._known.items()
             if old <= label < whole and (label - old) | new in self._known
         ]
-        return len(behind) > 0 and not self._near(weighed.weight - min(behind) / TRUSTED)
+        return any(
+            loss > brought and not self._near(weighed.weight - loss / TRUSTED)
+            for loss, brought in behind
+        )
 
     def _extend(self, weighed: Weighed) -> None:
         """Fit a set with each effect that could make it likelier."""
