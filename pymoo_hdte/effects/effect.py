@@ -101,6 +101,9 @@ class Effect:
     exact : bool
         Whether its form is known exactly, so that it must explain records down to the noise; the
         curve of a friction law is only an approximation of a real one.
+    exact_at : tuple of str
+        Ports of a drive at which its form is known exactly, though it is not elsewhere: what hangs
+        at the shaft of a load is one body, what hangs at the axis of a mechanism may fold.
     of_reading : bool
         Whether, in a mechanism, only the reading of a force sensor shows it.
     forms : str
@@ -157,6 +160,7 @@ class Effect:
     special_case_of: tuple[str, ...] = ()
     contains: tuple[str, ...] = ()
     exact: bool = False
+    exact_at: tuple[str, ...] = ()
     of_reading: bool = False
     forms: str = ""
     form_of: str = ""
@@ -183,6 +187,8 @@ class Effect:
             raise InvalidInput(f"{self.name}.ports", self.ports, allowed)
         for port in self.nuisance_at:
             one_of(f"{self.name}.nuisance_at", port, self.ports)
+        for port in self.exact_at:
+            one_of(f"{self.name}.exact_at", port, self.ports)
         for number in self.quantities:
             one_of(f"{self.name}.quantities", number, [field.name for field in fields(self.kind)])
         check_sentence(f"{self.name}.sentence", self.sentence)

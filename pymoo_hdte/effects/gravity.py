@@ -88,6 +88,7 @@ register(
         _weight,
         forms="harmonics_of_torque",
         behind_gear=True,
+        exact_at=("load",),
         nuisance_at=("load",),
     )
 )

@@ -153,6 +153,15 @@ class Candidate:
             return self.name == member.covered_by
         return (self.name, self.port) == (member.name, member.port)
 
+    def is_instead_of(self, member: Candidate) -> bool:
+        """Tell whether it may be there in place of an effect: as another form, law or line of it.
+
+        Lines of one effect that share an order are not there twice: once a turn and its harmonic
+        may be missing where a line twice a turn was named first.
+        """
+        shared = self.label != member.label and self.among == 1 and self.places & member.places
+        return self.is_form_of(member) or self.replaces(member) or bool(shared)
+
     def stands_for(self, member: Candidate, any_curve: bool) -> bool:
         """Tell whether it may replace an effect: as another form, or as a special case at its port.
 
@@ -234,7 +243,7 @@ def candidate_of(
         ),
         sentence_at(sentence, port, orders, force),
         order,
-        effect.exact,
+        effect.exact or port in effect.exact_at,
         listed=not guess.name,
         form=guess.form,
         remembers=effect.remembers,

@@ -365,10 +365,10 @@ class Growth:
         return False
 
     def _exchange(self, weighed: Weighed, member: Candidate) -> None:
-        """Fit what a set may have in place of a member: other forms of it, and other effects."""
+        """Fit what a set may have in place of a member: its forms and lines, and other effects."""
         others, values = _others(weighed.fit, member)
         for candidate in self.candidates:
-            if candidate.is_form_of(member) or candidate.replaces(member):
+            if candidate.is_instead_of(member):
                 members = (*others, candidate)
                 if not may_be_together(members) or self._was_worse(weighed, member, candidate):
                     continue
@@ -431,9 +431,8 @@ class Growth:
             self.screened.update((effect.candidate.label, effect) for effect in screened)
         gains = self._gains(integral, screened, n)
         if len(evident := self._evident_nuisances(weighed, screened)) > 1:
-            nuisances = [effect.candidate for effect in evident]
-            start = np.concatenate([weighed.fit.values, *(effect.start for effect in evident)])
-            self._fit((*members, *nuisances), start)
+            values = np.concatenate([weighed.fit.values, *(nuisance.start for nuisance in evident)])
+            self._fit((*members, *(nuisance.candidate for nuisance in evident)), values)
         ranked = np.argsort(-gains, kind="stable")
         taken = Counter[str]()
         for place in ranked[gains[ranked] >= -WINDOW]:

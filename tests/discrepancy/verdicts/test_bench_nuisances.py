@@ -20,6 +20,7 @@ from pymoo_hdte.drive._effects import (
     NewZero,
     WarmingFriction,
 )
+from pymoo_hdte.effects.effect import effect_named
 from pymoo_hdte.effects.friction import CoulombFriction
 from pymoo_hdte.effects.gravity import Gravity
 from pymoo_hdte.effects.ripple import BrakeRipple, CouplingTorque, PeriodicTorque
@@ -54,6 +55,29 @@ def candidates_of(data, *_):
     seen = [1.0 / 101.0, 3.0 / 101.0, 1.0]
     sizes = port_sizes(data.campaign.believed, orders, seen, scales)
     return drive_candidates(sizes, (), data.bench.nuisances)
+
+
+def test_lines_of_one_effect_that_share_an_order_take_the_place_of_each_other():
+    """Beside a brake's line twice a turn, its line once a turn was never tried."""
+    scales = replace(SCALES, loads_differ=True, changes=(150.0, 350.0), duration=700.0)
+    orders = DATA.features.orders.tolist()
+    seen = [1.0 / 101.0, 2.0 / 101.0]
+    candidates = drive_candidates(port_sizes(DATA.campaign.believed, orders, seen, scales))
+    by_label = {candidate.label: candidate for candidate in candidates}
+    once, twice = by_label["brake_ripple:load@0.009901"], by_label["brake_ripple:load@0.0198"]
+    assert once.is_instead_of(twice)
+    assert twice.is_instead_of(once)
+    assert not once.is_instead_of(once)
+    changes = [candidate for candidate in candidates if candidate.name == "new_zero"]
+    assert len(changes) > 1
+    assert not changes[0].is_instead_of(changes[1])
+
+
+def test_a_weight_at_the_shaft_of_a_load_is_known_exactly():
+    """With an error of its form over the load it was the ripple of a brake as well."""
+    gravity = next(one for one in candidates_of(DATA) if one.name == "gravity")
+    assert gravity.exact
+    assert not effect_named("gravity").exact
 
 
 def verdict_on(effects, seed=6):
