@@ -176,6 +176,7 @@ class Growth:
     _extended: set[frozenset[str]] = field(default_factory=set)
     _complete: set[frozenset[str]] = field(default_factory=set)
     _outside: dict[Weighed, Weighed] = field(default_factory=dict)
+    _equipped: set[frozenset[str]] = field(default_factory=set)
     _varied: dict[frozenset[str], set[str]] = field(default_factory=dict)
     _tried: set[tuple[frozenset[str], bytes]] = field(default_factory=set)
 
@@ -239,11 +240,16 @@ class Growth:
         """Extend the likeliest sets, and exchange members of the best one, until it stays best.
 
         Members are exchanged first: beside a wrong form of a law all else seems to be missing.
-        Those that were essential beside fewer members are asked again at the end only.
+        Those that were essential beside fewer members are asked again at the end only. Nuisances
+        that are evident come before, as their laws have one form.
         """
         while True:
+            if self._fit_evident_nuisances(self.ranked[0]):
+                continue
             weighed, best = self._open(), self.ranked[0]
             label = label_of(best.candidates)
+            if label not in self._equipped:
+                continue
             first, varied = label not in self._varied, self._varied.setdefault(label, set())
             if first or (weighed is None and varied < label):
                 for member in best.candidates:
@@ -252,7 +258,6 @@ class Growth:
                         varied.add(member.label)
                         self._exchange(best, member)
                 if label_of((likeliest := self.ranked[0]).candidates) == label:
-                    self._guess_further(likeliest.fit)
                     yield likeliest.fit
             elif weighed is None:
                 return
@@ -375,6 +380,10 @@ class Growth:
                 residuals = self.data.objective(members).residuals
                 starts = [np.append(values, start) for start in candidate.starts]
                 self._fit(members, min(starts, key=lambda s: np.sum(residuals(s) ** 2)), again=True)
+                exchanged = self._known.get(label_of(members))
+                if candidate.nuisance and exchanged is not None:
+                    # Lines of a nuisance may have kept out others of the same.
+                    self._fit_evident_nuisances(exchanged)
         without = self._without(weighed, member)
         if without is not None and self._may_be_extended(without):
             self._extend(without)
@@ -430,9 +439,6 @@ class Growth:
         if not members:
             self.screened.update((effect.candidate.label, effect) for effect in screened)
         gains = self._gains(integral, screened, n)
-        if len(evident := self._evident_nuisances(weighed, screened)) > 1:
-            values = np.concatenate([weighed.fit.values, *(nuisance.start for nuisance in evident)])
-            self._fit((*members, *(nuisance.candidate for nuisance in evident)), values)
         ranked = np.argsort(-gains, kind="stable")
         taken = Counter[str]()
         for place in ranked[gains[ranked] >= -WINDOW]:
@@ -447,30 +453,44 @@ class Growth:
             taken[effect.candidate.name] += 1
             self._fit((*members, effect.candidate), np.append(weighed.fit.values, effect.start))
 
-    def _evident_nuisances(self, weighed: Weighed, screened: Sequence[Screened]) -> list[Screened]:
-        """Return nuisances that a set lacks, each by far beside those before.
+    def _fit_evident_nuisances(self, weighed: Weighed) -> bool:
+        """Fit a set with the nuisances that it lacks by far; tell whether it is likelier for it.
 
         A bench may have ten, and one after the other takes ten searches. To first order is enough:
-        what is one too many is left out afterwards.
+        what is one too many is left out afterwards. Nothing is known of them before the base is
+        extended.
         """
-        evident, hypothesis, n = (
-            list[Screened](),
-            weighed.linearised,
-            len(weighed.linearised.residuals),
-        )
-        remaining = [effect for effect in screened if effect.candidate.nuisance and effect.start]
-        while remaining:
+        if (label := label_of(weighed.candidates)) in self._equipped:
+            return False
+        self._equipped.add(label)
+        if not self.screened:
+            return False
+        self._guess_further(weighed.fit)
+        nuisances = [candidate for candidate in self.candidates if candidate.nuisance]
+        if unknown := [each for each in nuisances if each.label not in self.screened]:
+            effects = screen(self.data, self.base, unknown)
+            self.screened.update((effect.candidate.label, effect) for effect in effects)
+        evident, hypothesis = list[Screened](), weighed.linearised
+        while remaining := [
+            self.screened[each.label]
+            for each in nuisances
+            if may_be_together(
+                (*weighed.candidates, *(effect.candidate for effect in evident), each)
+            )
+        ]:
             integral = Integral(hypothesis)
             integral.score()
-            gains = self._gains(integral, remaining, n)
+            gains = self._gains(integral, remaining, len(hypothesis.residuals))
             if gains.max() < TRUSTED * WINDOW:
                 break
             evident.append(best := remaining[int(np.argmax(gains))])
-            hypothesis = hypothesis.beside(*_first_order(best, n))
-            remaining = [
-                effect for effect in remaining if effect.candidate.goes_with(best.candidate)
-            ]
-        return evident
+            hypothesis = hypothesis.beside(*_first_order(best, len(hypothesis.residuals)))
+        if not evident:
+            return False
+        starts = [effect.start or effect.candidate.starts[0] for effect in evident]
+        members = (*weighed.candidates, *(effect.candidate for effect in evident))
+        self._fit(members, np.concatenate([weighed.fit.values, *starts]))
+        return label_of(self.ranked[0].candidates) != label
 
     def _release(self, weighed: Weighed) -> None:
         """Fit a set with the values released that it leaves at the bounds of their tolerance."""
