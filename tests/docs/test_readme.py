@@ -33,8 +33,10 @@ def output_of(snippet: str) -> str:
 def test_an_example_prints_what_the_readme_says(name):
     printed, _ = example(name)
     assert SHOWN[name]
+    # Algorithms take another path where a processor rounds otherwise.
+    alike = is_shown if name == "fronts.png" else str.__eq__
     for line in SHOWN[name]:
-        assert any(is_shown(line, there) for there in printed.splitlines()), printed
+        assert any(alike(line, there) for there in printed.splitlines()), printed
 
 
 @pytest.mark.parametrize("name", sorted(SHOWN))

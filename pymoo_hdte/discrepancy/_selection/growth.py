@@ -470,13 +470,11 @@ class Growth:
         if unknown := [each for each in nuisances if each.label not in self.screened]:
             effects = screen(self.data, self.base, unknown)
             self.screened.update((effect.candidate.label, effect) for effect in effects)
-        evident, hypothesis = list[Screened](), weighed.linearised
+        evident, hypothesis, members = list[Screened](), weighed.linearised, weighed.candidates
         while remaining := [
-            self.screened[each.label]
-            for each in nuisances
-            if may_be_together(
-                (*weighed.candidates, *(effect.candidate for effect in evident), each)
-            )
+            self.screened[nuisance.label]
+            for nuisance in nuisances
+            if all(nuisance.goes_with(member) for member in members)
         ]:
             integral = Integral(hypothesis)
             integral.score()
@@ -485,10 +483,10 @@ class Growth:
                 break
             evident.append(best := remaining[int(np.argmax(gains))])
             hypothesis = hypothesis.beside(*_first_order(best, len(hypothesis.residuals)))
+            members = (*members, best.candidate)
         if not evident:
             return False
         starts = [effect.start or effect.candidate.starts[0] for effect in evident]
-        members = (*weighed.candidates, *(effect.candidate for effect in evident))
         self._fit(members, np.concatenate([weighed.fit.values, *starts]))
         return label_of(self.ranked[0].candidates) != label
 

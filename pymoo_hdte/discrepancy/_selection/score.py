@@ -415,10 +415,7 @@ class Integral:
             before = ln
         self._integrate_bounds()
         ln = self._ln() + float(self.corrections.sum()) + of_factors
-        mean, covariance = self._posterior()
-        by_row = self.factors[self.hypothesis.channels] / self.weights
-        left = (self.shift + self.columns @ mean) / by_row
-        scaled = self.columns / by_row[:, None]
+        _, covariance, _, scaled, left = self._at_mode()
         followed = np.sum(scaled @ covariance * scaled, axis=1)
         return Score(
             ln,
@@ -450,6 +447,16 @@ class Integral:
         precision, linear = self._natural()
         inverse = _inverse(precision)
         return inverse @ linear, inverse
+
+    def _at_mode(self) -> tuple[Vector, Matrix, Vector, Matrix, Vector]:
+        """Return what `_posterior` does, and rows in standard deviations of their noise.
+
+        These are that deviation (n,), the columns (n, k) and the residuals (n,) in units of it.
+        """
+        mean, covariance = self._posterior()
+        by_row = self.factors[self.hypothesis.channels] / self.weights
+        left = (self.shift + self.columns @ mean) / by_row
+        return mean, covariance, by_row, self.columns / by_row[:, None], left
 
     def _ln(self) -> float:
         """Return the logarithm of the integral at the present scales and factors."""
@@ -550,10 +557,7 @@ class Integral:
         To first order; minus infinity for one that would be invisible at its largest scale. The
         noise stays, or is ``renewed`` as it would be beside the most probable sizes.
         """
-        mean, covariance = self._posterior()
-        by_row = self.factors[self.hypothesis.channels] / self.weights
-        scaled = self.columns / by_row[:, None]
-        left = (self.shift + self.columns @ mean) / by_row
+        _, covariance, by_row, scaled, left = self._at_mode()
         gains = np.full(len(places), -np.inf)
         every = np.column_stack([part.columns for part in places]) / by_row[:, None]
         shared = scaled.T @ every
@@ -589,10 +593,8 @@ class Integral:
         To first order, with renewed noise, at the present scales: by the ratio of the densities of
         its coefficients at nothing (Dickey, Ann. Math. Statist. 42, 1971).
         """
-        mean, covariance = self._posterior()
-        by_row = self.factors[self.hypothesis.channels] / self.weights
-        scaled = self.columns / by_row[:, None]
-        left, freedom = (self.shift + self.columns @ mean) / by_row, self._freedom(covariance)
+        mean, covariance, _, scaled, left = self._at_mode()
+        freedom = self._freedom(covariance)
         losses = np.zeros(len(self.hypothesis.members))
         for number, member in enumerate(self.hypothesis.members):
             own = range(member.sized.start, member.sized.stop)

@@ -207,12 +207,11 @@ class LawErrors:
     @property
     def _of_error(self) -> Sized:
         """By how much the static error of each record differs beyond what is stated."""
-        shape, columns = self.data.features.values.shape, list[Matrix]()
-        for record in range(shape[0]):
-            changes = np.zeros((len(self.data.repeatability), *shape))
-            changes[:, record] = self.data.repeatability[:, record]
-            columns.append(self.data.whiten(changes).T)
-        whole = self._whole(np.hstack(columns))
+        changes = self.data.repeatability.swapaxes(0, 1)
+        records, shape = np.arange(len(changes)), self.data.features.values.shape
+        of_one = np.zeros((*changes.shape[:2], *shape))
+        of_one[records, :, records] = changes
+        whole = self._whole(self.data.whiten(of_one.reshape(-1, *shape)).T)
         none = np.zeros(whole.shape[1])
         return Sized("repeatability of the static error", whole, *STATED, none, none > 0)
 
