@@ -209,7 +209,7 @@ def order_lines(
 
 
 def unsteady_lines(
-    record: RunningRecord, ratio: float, lines: OrderLines
+    record: RunningRecord, ratio: float, lines: OrderLines, share: NDArray[np.float64]
 ) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
     """Return what the rates of a wandering input have in lines beyond those of a steady one.
 
@@ -225,6 +225,8 @@ def unsteady_lines(
         As in `order_lines`.
     lines : OrderLines
         Lines of the record.
+    share : ndarray, shape (m,)
+        How much of each line of the input angle is taken for its motion, and not for noise.
 
     Returns
     -------
@@ -254,7 +256,8 @@ def unsteady_lines(
     shown = parts[2 : 2 + m] + 1j * parts[2 + n_fitted : 2 + n_fitted + m]
     shown = shown.T / averaging_gain(orders, record, mean_speed(record))
     rate = 1j * orders * lines.slope[3]
-    beyond = np.stack([shown[1] - rate * shown[0], shown[2] - rate**2 * shown[0]])
+    of_lines = share * shown[0]
+    beyond = np.stack([shown[1] - rate * of_lines, shown[2] - rate**2 * of_lines])
     # Of a motion under white noise of acceleration whose position is seen in white noise: the
     # steady variance of a Kalman filter's speed.
     variance = math.sqrt(2.0) * (noise * step) ** 0.25 * intensity**0.75

@@ -164,18 +164,18 @@ def measure(
         ),
     )
     wander = np.zeros(shown.shape)
+    for row, of_lines in enumerate(wander_of_lines(records, campaign, measured, rules)):
+        wander[row, shown[row]] = of_lines
+    lead_share = wander / (wander + np.array([line_variances(line) for line in lines]))
     unsteady, ends = np.zeros((2, len(records), 2, len(all_orders)), dtype=complex)
-    of_lines = wander_of_lines(records, campaign, measured, rules)
-    for row, (record, line, of_record) in enumerate(zip(records, measured, shown, strict=True)):
-        wander[row, of_record] = of_lines[row]
-        if wander[row].any():
-            rates = unsteady_lines(record, ratio, line)
-            unsteady[row][:, of_record], ends[row][:, of_record] = rates
-    noise = np.array([line_variances(line) for line in lines])
+    for row in np.flatnonzero(wander.any(axis=1)).tolist():
+        of_record = shown[row]
+        rates = unsteady_lines(records[row], ratio, measured[row], lead_share[row, of_record])
+        unsteady[row][:, of_record], ends[row][:, of_record] = rates
     conditions = replace(
         conditions,
         lead=np.array([line.phasors[3] for line in lines]),
-        lead_share=wander / (wander + noise),
+        lead_share=lead_share,
         unsteady=unsteady,
     )
     shown &= ~np.isin(all_orders, only_exciting)
