@@ -392,6 +392,27 @@ def test_a_wave_that_is_cut_at_its_crests_comes_back(rng):
     assert abs(lines.phasors[2, place] + 1j) < 5.0 * deviation[1 + place]
 
 
+def test_a_crest_that_was_cut_before_its_samples_were_averaged_comes_back(rng):
+    """No row stands at the end of the range: other records show where that is."""
+    true, number = replace(run(rng), samples_averaged=20), 20
+    noise = RIG.output_torque_noise * rng.standard_normal((N_ROWS, number))
+    samples = np.minimum(20.0 + np.sin(2.0 * true.input_angle)[:, None] + noise, 20.95)
+    record = replace(true, output_torque=samples.mean(axis=1))
+    place, ends = ORDERS.index(2.0), {("output_torque", 20.95)}
+    for known in (set(), ends):
+        result = repaired_run(record, RATIO, ORDERS, DEVIATIONS, RULES, known)
+        lines = order_lines(result.record, RIG, RATIO, ORDERS)
+        deviation = np.sqrt(np.diag(lines.covariance[2]))
+        off = abs(lines.phasors[2, place] + 1j) / deviation[1 + place]
+        assert off < 5.0 if known else off > 8.0
+    (fault,) = result.faults
+    assert (fault.kind, fault.size, fault.rows) == (
+        "saturated",
+        20.95,
+        N_ROWS - len(result.record.time),
+    )
+
+
 def test_a_record_that_is_saturated_most_of_the_time_is_not_usable(rng):
     result = repaired(clipped(run(rng), "input_torque", 0.4))
     assert not result.usable

@@ -69,6 +69,14 @@ def cleaned_rows(
     deviations = float(norm.isf(rules.row_fault_chance / tests / 2.0))
     ratio = campaign.believed.ratio
     runs = [repaired_run(record, ratio, orders, deviations, rules) for record in campaign.running]
+    faults = [fault for run in runs for fault in run.faults]
+    if ends := {(fault.channel, fault.size) for fault in faults if fault.kind == "saturated"}:
+        runs = [
+            repaired_run(record, ratio, orders, deviations, rules, ends)
+            if record.samples_averaged > 1
+            else run
+            for record, run in zip(campaign.running, runs, strict=True)
+        ]
     sweeps = [repaired_sweep(sweep, deviations, rules) for sweep in campaign.torsion]
     left_out = _left_out(runs, rules)
     runs_used = [run for run in runs if run.record.name not in left_out]

@@ -8,7 +8,7 @@ on, and the time is corrected.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Generic, TypeVar
 
@@ -213,7 +213,12 @@ class RepairedRun:
 
 
 def repaired_run(
-    record: RunningRecord, ratio: float, orders: Sequence[float], deviations: float, rules: Rules
+    record: RunningRecord,
+    ratio: float,
+    orders: Sequence[float],
+    deviations: float,
+    rules: Rules,
+    ends: Collection[tuple[str, float]] = (),
 ) -> RepairedRun:
     """Return a running record without spikes, jumps, failed or repeated rows, and settling.
 
@@ -227,6 +232,8 @@ def repaired_run(
     deviations : float
         Least size of a fault, in standard deviations.
     rules : Rules
+    ends : collection of (str, float), optional
+        Channels and readings at which their sensors saturate in other records.
     """
     search = _RunSearch(record, ratio, deviations, rules)
     search.take_repeated()
@@ -236,7 +243,7 @@ def repaired_run(
         return RepairedRun(record, tuple(search.faults), None, False)
     search.note_gaps()
     try:
-        if not search.take_near_ends(orders):
+        if not search.take_near_ends(orders, ends):
             return RepairedRun(record, tuple(search.faults), None, False)
         residual = search.run(orders)
     except InvalidInput:
@@ -303,30 +310,41 @@ class _RunSearch(RowSearch[RunningRecord]):
         self._take_settling(self.fitted(orders), ())
         return self.fitted(orders).whole_residual
 
-    def take_near_ends(self, orders: Sequence[float]) -> bool:
+    def take_near_ends(
+        self, orders: Sequence[float], known: Collection[tuple[str, float]] = ()
+    ) -> bool:
         """Leave out rows whose lines come near the end of a saturated range; return if enough stay.
 
         Rows at the end are left out already, but of those that come near it only rows stay whose
-        noise took them away from it. Their mean is off by noise times the density of a normal
-        distribution at the distance: less than that of all rows is known to beyond where the
-        density is one over the root of their number.
+        noise took them away from it, and where samples are averaged none stands at the end. Their
+        mean is off by noise times the density of a normal distribution at the distance: less than
+        that of all samples is known to beyond where the density is one over the root of their
+        number.
         """
-        ends = [fault for fault in self.faults if fault.kind == "saturated"]
-        torques = [fault for fault in ends if fault.channel in RUNNING[2:]]
+        faults = {fault.channel: fault for fault in self.faults if fault.kind == "saturated"}
+        averaged = self.record.samples_averaged
+        ends = {(fault.channel, fault.size) for fault in faults.values()}
+        ends |= {end for end in known if averaged > 1 and end[0] not in faults}
+        torques = sorted(end for end in ends if end[0] in RUNNING[2:])
         if not torques:
             return True
         fit, near = self.fitted(orders), np.zeros(len(self.rows), dtype=bool)
         residual = fit.whole_residual
         lines = np.vstack([fit.values(part) for part in fit.parts]) - residual
-        count = len(self.rows) + sum(fault.rows for fault in ends)
-        distance = float(np.sqrt(max(np.log(count / (2.0 * np.pi)), 0.0)))
-        for fault in torques:
-            place = RUNNING.index(fault.channel) - 1
-            side = np.sign(fault.size - np.median(lines[:, place]))
-            free = side * (fault.size - lines[:, place]) > distance * np.std(residual[:, place])
-            further = int(np.count_nonzero(~(free | near)))
-            self.faults[self.faults.index(fault)] = replace(fault, rows=fault.rows + further)
-            near |= ~free
+        count = len(self.rows) + sum(fault.rows for fault in faults.values())
+        distance = float(np.sqrt(max(np.log(count * averaged / (2.0 * np.pi)), 0.0)))
+        for channel, reading in torques:
+            place = RUNNING.index(channel) - 1
+            side = np.sign(reading - np.median(lines[:, place]))
+            noise = np.std(residual[:, place]) * np.sqrt(averaged)
+            further = ~(side * (reading - lines[:, place]) > distance * noise) & ~near
+            rows = int(np.count_nonzero(further))
+            if channel in faults:
+                fault = faults[channel]
+                self.faults[self.faults.index(fault)] = replace(fault, rows=fault.rows + rows)
+            elif rows:
+                self.note("saturated", channel, int(np.argmax(further)), rows, reading, "left out")
+            near |= further
         kept = int(np.count_nonzero(~near))
         if kept < max(FEWEST_SAMPLES, (1.0 - self.rules.saturated_share) * count):
             return False
