@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -145,6 +145,13 @@ class Weighed:
         )
 
 
+class Invisible(NamedTuple):
+    """A fit of a set, and those of its effects that could not be seen beside the others."""
+
+    fit: Fit
+    effects: list[Candidate]
+
+
 @dataclass(eq=False)
 class Growth:
     """The sets of effects that may explain some data, grown by their probability.
@@ -172,7 +179,7 @@ class Growth:
     guess: Callable[[Fit], Sequence[Candidate]] | None = None
     counts: Counter[str] = field(init=False)
     _known: dict[frozenset[str], Weighed] = field(default_factory=dict)
-    _invisible: set[frozenset[str]] = field(default_factory=set)
+    _invisible: dict[frozenset[str], Invisible] = field(default_factory=dict)
     _extended: set[frozenset[str]] = field(default_factory=set)
     _complete: set[frozenset[str]] = field(default_factory=set)
     _outside: dict[Weighed, Weighed] = field(default_factory=dict)
@@ -244,25 +251,29 @@ class Growth:
         that are evident come before, as their laws have one form.
         """
         while True:
-            if self._fit_evident_nuisances(self.ranked[0]):
+            nothing = self._known[frozenset()]
+            if any(map(self._fit_evident_nuisances, (self.ranked[0], nothing))):
                 continue
             weighed, best = self._open(), self.ranked[0]
             label = label_of(best.candidates)
-            if label not in self._equipped:
+            if self.screened and label not in self._equipped:
                 continue
             first, varied = label not in self._varied, self._varied.setdefault(label, set())
             if first or (weighed is None and varied < label):
                 for member in best.candidates:
                     asked = weighed is None or not self._is_essential(best, member)
-                    if asked and member.label not in varied:
+                    if asked and member.label not in varied and self._is_likeliest(label):
                         varied.add(member.label)
                         self._exchange(best, member)
-                if label_of((likeliest := self.ranked[0]).candidates) == label:
-                    yield likeliest.fit
+                if self._is_likeliest(label):
+                    yield self.ranked[0].fit
             elif weighed is None:
                 return
             else:
                 self._extend(weighed)
+
+    def _is_likeliest(self, label: frozenset[str]) -> bool:
+        return label_of(self.ranked[0].candidates) == label
 
     def _lacks_something(self, weighed: Weighed) -> bool:
         """Tell whether it is not sure that a set leaves nothing to something outside."""
@@ -384,6 +395,12 @@ class Growth:
                 if candidate.nuisance and exchanged is not None:
                     # Lines of a nuisance may have kept out others of the same.
                     self._fit_evident_nuisances(exchanged)
+        is_effect = member.releases is None and not member.nuisance
+        if is_effect and any(other.nuisance for other in others):
+            # A law that errs may stand for several nuisances, none of which brings much alone.
+            effects = [effect for effect, _ in weighed.fit.places]
+            hypothesis = weighed.linearised.without(effects.index(member))
+            self._fit_with_evident(hypothesis, others, values)
         without = self._without(weighed, member)
         if without is not None and self._may_be_extended(without):
             self._extend(without)
@@ -454,27 +471,38 @@ class Growth:
             self._fit((*members, effect.candidate), np.append(weighed.fit.values, effect.start))
 
     def _fit_evident_nuisances(self, weighed: Weighed) -> bool:
-        """Fit a set with the nuisances that it lacks by far; tell whether it is likelier for it.
+        """Fit a set with the nuisances that it lacks by far; tell whether that is the likeliest.
 
         A bench may have ten, and one after the other takes ten searches. To first order is enough:
         what is one too many is left out afterwards. Nothing is known of them before the base is
         extended.
         """
-        if (label := label_of(weighed.candidates)) in self._equipped:
+        if (label := label_of(weighed.candidates)) in self._equipped or not self.screened:
             return False
         self._equipped.add(label)
-        if not self.screened:
-            return False
         self._guess_further(weighed.fit)
         nuisances = [candidate for candidate in self.candidates if candidate.nuisance]
         if unknown := [each for each in nuisances if each.label not in self.screened]:
             effects = screen(self.data, self.base, unknown)
             self.screened.update((effect.candidate.label, effect) for effect in effects)
-        evident, hypothesis, members = list[Screened](), weighed.linearised, weighed.candidates
+        before = self.ranked[0]
+        self._fit_with_evident(weighed.linearised, weighed.candidates, weighed.fit.values)
+        return self.ranked[0] is not before
+
+    def _fit_with_evident(
+        self, hypothesis: Linearised, members: Sequence[Candidate], values: Vector
+    ) -> None:
+        """Fit members with the nuisances they lack by far to first order, if there are any.
+
+        One by one those are left out that the others stand for.
+        """
+        evident = list[Screened]()
         while remaining := [
-            self.screened[nuisance.label]
-            for nuisance in nuisances
-            if all(nuisance.goes_with(member) for member in members)
+            self.screened[candidate.label]
+            for candidate in self.candidates
+            if candidate.nuisance
+            and candidate.label in self.screened
+            and all(candidate.goes_with(member) for member in members)
         ]:
             integral = Integral(hypothesis)
             integral.score()
@@ -484,11 +512,25 @@ class Growth:
             evident.append(best := remaining[int(np.argmax(gains))])
             hypothesis = hypothesis.beside(*_first_order(best, len(hypothesis.residuals)))
             members = (*members, best.candidate)
-        if not evident:
-            return False
-        starts = [effect.start or effect.candidate.starts[0] for effect in evident]
-        self._fit(members, np.concatenate([weighed.fit.values, *starts]))
-        return label_of(self.ranked[0].candidates) != label
+        if evident:
+            starts = [effect.start or effect.candidate.starts[0] for effect in evident]
+            self._fit(members, np.concatenate([values, *starts]))
+        while spare := self._spare(label_of(members), evident):
+            members, values = _others(*spare)
+            self._fit(members, values)
+
+    def _spare(
+        self, label: frozenset[str], added: Sequence[Screened]
+    ) -> tuple[Fit, Candidate] | None:
+        """Return the fit of a set and what it is likeliest without, of what was added to it."""
+        own = [effect.candidate for effect in reversed(added) if effect.candidate.label in label]
+        if (unseen := self._invisible.get(label)) is not None:
+            hidden = [candidate for candidate in own if candidate in unseen.effects]
+            return (unseen.fit, hidden[0]) if hidden else None
+        if not own or (weighed := self._known.get(label)) is None:
+            return None
+        losses = [weighed.losses[member.label] + self._prior((member,)) for member in own]
+        return (weighed.fit, own[int(np.argmin(losses))]) if min(losses) < 0.0 else None
 
     def _release(self, weighed: Weighed) -> None:
         """Fit a set with the values released that it leaves at the bounds of their tolerance."""
@@ -613,7 +655,12 @@ class Growth:
         integral = Integral(linearised)
         score = integral.score()
         if score.invisible or (fitted.candidates and self._lacks_evident(fitted.candidates)):
-            self._invisible.add(label)
+            invisible = [
+                effect
+                for (effect, _), member in zip(fitted.places, linearised.members, strict=True)
+                if any(part.name in score.invisible for part in linearised.sized[member.sized])
+            ]
+            self._invisible[label] = Invisible(fitted, invisible)
             return
         prior = self._prior(fitted.candidates)
         chance = score.worst_chance(self.errors.groups)

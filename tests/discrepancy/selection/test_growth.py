@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import combinations
 from typing import NamedTuple
 
@@ -171,6 +171,37 @@ def test_evident_nuisances_are_found_together(rng):
     first, second, *_ = Growth(data, fit(data), nuisances, data).steps()
     assert first.candidates == ()
     assert {member.port for member in second.candidates} == set("012345")
+
+
+@dataclass(eq=False)
+class ErringData(LinearData):
+    """Linear data of which the first effect errs by a third along some columns."""
+
+    errors: np.ndarray = field(default_factory=lambda: np.empty((N, 0)))
+
+    def linearised(self, fitted) -> Linearised:
+        def errors(effect, place):
+            return (fitted.values[place] * self.errors,) if effect.port == "0" else ()
+
+        return linearise(fitted, np.zeros(N, int), errors, 0.0)
+
+
+def test_nuisances_together_are_likelier_than_a_law_that_errs(rng):
+    """None of four brings much where the law is left out, and a fifth one is one of them."""
+    columns = rng.normal(size=(N, 6))
+    columns[:, 0] = columns[:, 1:5].sum(axis=1) + 0.1 * rng.normal(size=N)
+    columns[:, 5] = columns[:, 4] + 0.01 * rng.normal(size=N)
+    data = ErringData(
+        columns[:, 1:5] @ [17.0, 15.0, 13.0, 14.0] + rng.normal(size=N),
+        columns,
+        np.ones(N),
+        errors=np.column_stack([columns[:, 1:4] - columns[:, 2:5], rng.normal(size=(N, 10))]),
+    )
+    candidates = [replace(candidate(k), nuisance=k > 0) for k in range(6)]
+    growth = Growth(data, fit(data), candidates, data)
+    growth.grow()
+    ports = {member.port for member in growth.ranked[0].candidates}
+    assert ports in (set("1234"), set("1235"))
 
 
 def test_an_effect_is_lost_by_what_its_set_is_likelier_for_it(rng):
