@@ -19,10 +19,16 @@ def how_sure(finding: DriveFinding) -> str:
     limit = adequate(verdict.degrees_of_freedom, verdict.rules)
     residual = verdict.base.chi_square / verdict.degrees_of_freedom
     if verdict.status == "adequate":
+        perhaps = ""
+        if (verdict.probability or 0.0) < 0.5 and verdict.alternatives:
+            nearest = labels_by_order(verdict.alternatives[0].label, orders)
+            perhaps = (
+                f" More likely something is, {nearest} first, but these records do not show it."
+            )
         return (
-            f"{_probably(finding)} The misfit of the nominal drive, fitted within its tolerances, "
-            f"has {residual:.2f} times the variance of the noise; up to {limit:.2f} counts as "
-            "noise. An effect too small for these records may still be there."
+            f"{_probably(finding)}{perhaps} The misfit of the nominal drive, fitted within its "
+            f"tolerances, has {residual:.2f} times the variance of the noise; up to {limit:.2f} "
+            "counts as noise. An effect too small for these records may still be there."
         )
     if verdict.chosen is None:
         return f"{_probably(finding)} No effect comes near it."

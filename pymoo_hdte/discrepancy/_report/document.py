@@ -121,7 +121,10 @@ def sentence(verdict: Verdict, error_orders: Sequence[float] = ()) -> str:
     """Return the verdict in words; lines of the static error of a drive by their orders."""
     chosen = verdict.chosen
     if verdict.status == "adequate":
-        return "Nothing is missing: the nominal drive explains the records within its tolerances."
+        return (
+            "Nothing is shown to be missing: the nominal drive explains the records within its "
+            "tolerances."
+        )
     if chosen is None:
         return "Something is missing that no effect in the library explains."
     what = what_is_missing(chosen.candidates)

@@ -100,7 +100,10 @@ def write_machine_report(
 
 def _sentence(finding: MachineFinding) -> str:
     if finding.verdict.status == "adequate":
-        return "Nothing is missing: the nominal model explains the records within its tolerances."
+        return (
+            "Nothing is shown to be missing: the nominal model explains the records within its "
+            "tolerances."
+        )
     return sentence(finding.verdict)
 
 

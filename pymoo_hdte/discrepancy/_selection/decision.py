@@ -110,14 +110,14 @@ def log_prior(names: Sequence[Name], forms: Sequence[int], outside: bool) -> flo
 def decide(explanations: Sequence[Explanation], priors: Sequence[float]) -> Decision:
     """Return what is said of explanations with their logarithms of prior odds.
 
-    - ``"adequate"``: that nothing is missing is likelier than not. Of who claims nothing no more is
-      asked: with `SURE` one clean campaign in twenty would be said to lack something.
+    - ``"adequate"``: that something is missing is not sure. It claims nothing, and its probability
+      may be low.
     - ``"named"``, ``"parameter"``: one set is sure, and that nothing is outside of the library.
     - ``"class"``: one of a few sets is sure, and something outside is less likely than not.
     - ``"partial"``: some names are sure, and no more than these. Of values alone that says nothing
       if something outside is likely: it has no form yet that a value could not imitate.
     - ``"class"`` again: one of a few names is sure, whatever else there is.
-    - ``"unlisted"``: else.
+    - ``"unlisted"``: something is sure to be missing, and no more.
     """
     weights = np.array([item.ln for item in explanations]) + np.asarray(priors)
     shares = np.exp(weights - logsumexp(weights))
@@ -136,7 +136,7 @@ def decide(explanations: Sequence[Explanation], priors: Sequence[float]) -> Deci
         marginal = {name: float(share) for name, share in of_names.most_common()}
         return Decision(status, tuple(members), probability, outside, possible, marginal)
 
-    if possible and of_nothing > 0.5:
+    if possible and of_nothing > 1.0 - SURE:
         return said("adequate", [], of_nothing)
     members = _fewest(ranked, of_sets)
     sure = possible and bool(members) and frozenset() not in members

@@ -45,7 +45,8 @@ def said(*shares, worst_chance=1.0):
         ([(A, False, 0.9), (A, True, 0.1)], "partial", (A,)),
         ([(A, False, 0.3), (B, False, 0.66), (C, False, 0.04)], "class", (B, A)),
         ([(A | B, True, 0.5), (A | C, True, 0.5)], "partial", (A,)),
-        ([(NOTHING, False, 0.5), (A, False, 0.5)], "unlisted", (NOTHING,)),
+        # That something is missing is a claim, too.
+        ([(NOTHING, False, 0.2), (A, False, 0.5), (NOTHING, True, 0.3)], "adequate", ()),
         ([(NOTHING, True, 1.0)], "unlisted", (NOTHING,)),
         ([(VALUE, False, 1.0)], "parameter", None),
         # A value alone may stand for what is outside.
