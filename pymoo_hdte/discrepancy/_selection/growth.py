@@ -445,10 +445,12 @@ class Growth:
         if self.screened:
             before = [self.screened[c.label] for c in candidates if c.label in self.screened]
             hopeful = self._gains(integral, before, n)
+            # A shaft that gives way does nothing until something else moves it.
             candidates = [
                 effect.candidate
                 for effect, gain in zip(before, hopeful, strict=True)
                 if self._may_lead(weighed.weight, effect, gain)
+                or (effect.candidate.nuisance and not effect.candidate.linear)
             ] + [c for c in candidates if c.label not in self.screened]
         if not candidates:
             return

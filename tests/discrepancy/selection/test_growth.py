@@ -204,6 +204,69 @@ def test_nuisances_together_are_likelier_than_a_law_that_errs(rng):
     assert ports in (set("1234"), set("1235"))
 
 
+class Passing(NamedTuple):
+    """A share of the sizes of all multiples, along a column of its own."""
+
+    name: str
+    number: int
+    share: float
+
+
+class PassingData(LinearData):
+    """Linear data in which a part passes on what the others do."""
+
+    def force(self, effects):
+        multiples = [part for part in effects if isinstance(part, Multiple)]
+        total = sum(part.size for part in multiples)
+        passed = [part for part in effects if isinstance(part, Passing)]
+        beside = sum((total * part.share * self.columns[:, part.number] for part in passed), 0.0)
+        return super().force(multiples) + beside
+
+    def response(self, fitted):
+        known = [part for parts in built(fitted.candidates, fitted.values[1:]) for part in parts]
+        return lambda effects: self.force([*known, *effects]) - self.force(known)
+
+    def objective(self, candidates):
+        return PassingObjective(self, candidates)
+
+
+class PassingObjective(Objective):
+    """Its derivatives by differences."""
+
+    def jacobian(self, values):
+        steps = 1e-6 * np.eye(len(values))
+        return (
+            np.column_stack(
+                [
+                    (self.residuals(values + step) - self.residuals(values - step)) / 2e-6
+                    for step in steps
+                ]
+            )
+            * self.scale
+        )
+
+
+def test_what_does_nothing_alone_is_found_beside_what_moves_it(rng):
+    """A shaft that gives way was taken for an error of the teeth where a motor cogs."""
+    columns = rng.normal(size=(N, 3))
+    columns[:, 2] = 0.7 * columns[:, 1] + 0.7 * columns[:, 2]
+    measured = 9.0 * columns[:, 0] + 1.5 * columns[:, 1] + rng.normal(size=N)
+    data = PassingData(measured, columns, np.ones(N))
+    passing = Candidate(
+        "shaft",
+        "1",
+        (unknown("share", 0.0, 1.0, 0.1, linear=False),),
+        ((0.1,),),
+        lambda values: (Passing("shaft", 1, values[0]),),
+        "",
+        nuisance=True,
+    )
+    moving = replace(candidate(0), nuisance=True)
+    growth = Growth(data, fit(data), [moving, passing, candidate(2)], data)
+    growth.grow()
+    assert {member.name for member in growth.ranked[0].candidates} == {"effect_0", "shaft"}
+
+
 def test_an_effect_is_lost_by_what_its_set_is_likelier_for_it(rng):
     """With noise that is known the ratio of the densities at nothing is that of the integrals."""
     columns = rng.normal(size=(N, 3))
