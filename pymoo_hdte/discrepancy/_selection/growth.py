@@ -22,6 +22,7 @@ from pymoo_hdte.discrepancy._selection.decision import (
     SURE,
     Decision,
     Explanation,
+    Name,
     decide,
     log_prior,
 )
@@ -216,8 +217,11 @@ class Growth:
 
     @property
     def likeliest(self) -> list[Fit]:
-        """Fits of the likeliest sets, which further sets may come from."""
-        return [weighed.fit for weighed in self.ranked[:MOST_FIRSTS]]
+        """Fits of the likeliest sets, each of other names, which further sets may come from."""
+        of_names = dict[frozenset[Name], Fit]()
+        for weighed in self.ranked:
+            of_names.setdefault(weighed.explanation.names, weighed.fit)
+        return list(of_names.values())[:MOST_FIRSTS]
 
     def grow(self) -> None:
         """Extend, exchange and prune sets until none could become as likely as the best."""
