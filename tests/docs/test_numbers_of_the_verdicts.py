@@ -1,16 +1,14 @@
-"""Numbers of README and its pages about blind campaigns."""
+"""Numbers of the pages about blind campaigns."""
 
 import re
 
-import numpy as np
 import pytest
-from places import DOCS, README, ROOT
+from places import DOCS, ROOT
 
 from experiments.runner.committed import DATA
-from experiments.studies.blind.data import read_outcomes
-from experiments.studies.blind.experiment import OUTCOMES, SECONDS, found
+from experiments.studies.blind.experiment import found
 from experiments.studies.blind.runs import RUNS, read_runs, recent, total
-from experiments.studies.blind.targets import MOST_SECONDS, pooled_demands
+from experiments.studies.blind.targets import pooled_demands
 
 PAGE = (DOCS / "model_and_measurements.md").read_text(encoding="utf-8")
 POOLED = total(recent(read_runs(DATA / RUNS)))
@@ -20,10 +18,6 @@ def test_paper_says_what_came_of_the_blind_campaigns():
     words = found(POOLED, intervals=False)
     paper = (ROOT / "paper.md").read_text(encoding="utf-8")
     assert f"{words[0].upper()}{words[1:]}." in " ".join(paper.split())
-
-
-def test_readme_says_how_often_an_answer_is_wrong():
-    assert f"{POOLED.plain_wrong} of {POOLED.plain} answers without a caveat named" in README
 
 
 def test_goals_and_states_are_those_of_the_pooled_runs():
@@ -39,9 +33,3 @@ def test_goals_and_states_are_those_of_the_pooled_runs():
         measured = [100.0 * one.measured.low, 100.0 * one.measured.high]
         assert [float(end) for end in ends] == pytest.approx(measured, abs=0.06)
         assert state == one.verdict.lower()
-
-
-def test_the_time_is_that_of_the_last_run():
-    outcomes = read_outcomes(DATA / OUTCOMES, DATA / SECONDS)
-    middle = np.median([sum(one.seconds) for one in outcomes])
-    assert f"Median time: {middle:.1f} s per campaign (goal: {MOST_SECONDS:g} s)." in PAGE

@@ -78,6 +78,9 @@ def opened(
     file = None if cache is None else RunFile(cache, names, identity(function))
     with progress() as bar, closing(Workers(executor, time_limit)) as workers:
         yield Simulator(function, names, vectorised, workers, count, file, bar, takes_seed)
+        # Fewer runs than the budget are the good end.
+        bar.total = bar.n
+        bar.refresh()
     if file:
         file.finish()
 
