@@ -19,7 +19,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from pymoo.optimize import minimize
 
-from pymoo_hdte.algorithms import ElitistSwarm
+from pymoo_hdte.algorithms import CompactSwarm
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.decision import PREFERENCES, WeightedUtopia, tolerance_band
 from pymoo_hdte.drive import (
@@ -187,7 +187,7 @@ for order in (3, 5):
 
 # %%
 
-result = minimize(problem, ElitistSwarm(), ("n_gen", 100), seed=1)
+result = minimize(problem, CompactSwarm(), ("n_eval", 10_000), seed=1)
 chosen = WeightedUtopia(PREFERENCES["balanced"]).do(result.F)
 before = problem.evaluate(problem.nominal[np.newaxis])[0]
 print(f"nominal  mean {before[0]:.1f}, std {before[1]:.2f} arcsec")

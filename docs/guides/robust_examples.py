@@ -23,7 +23,7 @@ from pymoo.optimize import minimize
 from scipy.integrate import solve_ivp
 from scipy.stats import norm
 
-from pymoo_hdte.algorithms import ElitistSwarm
+from pymoo_hdte.algorithms import CompactSwarm
 from pymoo_hdte.drive import preset
 from pymoo_hdte.problems import (
     Design,
@@ -55,7 +55,7 @@ def pictures(problem, simulator, response, fixed, labels):
         axis.set(title=title, xlabel=labels[first], ylabel=labels[second])
         axis.ticklabel_format(scilimits=(-2, 4))
         fig.colorbar(colours, ax=axis)
-    result = minimize(problem, ElitistSwarm(), ("n_gen", 60), seed=1)
+    result = minimize(problem, CompactSwarm(), ("n_eval", 6_000), seed=1)
     half = problem.band(result.X)
     order = np.argsort(result.F[:, 0])
     x, y, (dx, dy) = *result.F[order].T, half[order].T

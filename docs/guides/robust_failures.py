@@ -14,7 +14,7 @@ import numpy as np
 from pymoo.optimize import minimize
 from scipy.stats import norm, uniform
 
-from pymoo_hdte.algorithms import ElitistSwarm
+from pymoo_hdte.algorithms import CompactSwarm
 from pymoo_hdte.problems import (
     CrashProbability,
     Design,
@@ -88,7 +88,7 @@ print("the bands cover at least 95 % of both:", bool(inside >= 0.95))
 # The problem is optimised like any other. A design around which most runs fail is refused where no
 # ``CrashProbability`` is asked for: its mean would look like that of any other design.
 
-result = minimize(problem, ElitistSwarm(), ("n_gen", 40), seed=1)
+result = minimize(problem, CompactSwarm(), ("n_eval", 4_000), seed=1)
 print("all designs of the front fail in at most 10 %:", bool(np.all(result.G <= 1e-9)))
 
 # %%

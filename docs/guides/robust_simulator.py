@@ -6,7 +6,7 @@ Built parts differ from their drawings, and loads from their forecasts. A robust
 average and scatters little. ``robust_problem`` takes a simulator, what is designed and what
 scatters, and returns a problem of pymoo whose objectives are mean, standard deviation, quantiles
 or other statistics. It builds a polynomial surrogate of the simulator, whose moments are exact, so
-it needs some hundred runs in all instead of thousands for each design.
+it needs some ten to hundred runs in all instead of thousands for each design.
 """
 
 import chaospy
@@ -15,7 +15,7 @@ import numpy as np
 from pymoo.optimize import minimize
 from scipy.stats import norm
 
-from pymoo_hdte.algorithms import ElitistSwarm
+from pymoo_hdte.algorithms import CompactSwarm
 from pymoo_hdte.problems import (
     Design,
     MeanPlusStd,
@@ -79,12 +79,11 @@ print("error of mean + 2 std below 6 % of the scatter:", bool(np.all(problem.acc
 # The response, its surrogate, and the error
 # ------------------------------------------
 #
-# The surrogate is the most probable polynomial given the runs: how much each variable matters, how
-# fast its degrees lose weight, and whether the response is even or odd in it, is learnt from them.
-# Its accuracy is what this leaves open about mean and deviation, scaled by how well each run is
-# predicted from all others, relative to the *scatter* around a design: a surrogate that is good
-# over the whole range can be wrong about the little that scatters. ``python -m experiments robust``
-# sets the runs that it takes beside those of other libraries.
+# The surrogate is the most probable polynomial given the runs. The runs also tell how much each
+# variable matters, and which degrees do. Its accuracy is what this leaves open about mean and
+# deviation, scaled by how well each run is predicted from all others, relative to the *scatter*
+# around a design: a surrogate that is good over the whole range can be wrong about the little that
+# scatters. ``python -m experiments robust`` sets the runs that it takes beside those of others.
 #
 # There are no runs beyond the quantiles of 1e-5 of an unbounded scatter. What lies there counts as
 # the surrogate goes on, if that is tame; otherwise it is left out. An estimate of what it adds, by
@@ -136,7 +135,7 @@ print("the band covers at least 95 % of the designs:", bool(np.all(covered >= 0.
 # ``F_band`` is the estimated half-width of the error of each objective: designs that differ by less
 # are indistinguishable.
 
-result = minimize(problem, ElitistSwarm(), ("n_gen", 60), seed=1)
+result = minimize(problem, CompactSwarm(), ("n_eval", 6_000), seed=1)
 half = problem.band(result.X)
 print(f"{len(result.F)} designs, all feasible: {bool(np.all(result.G <= 1e-9))}")
 
@@ -180,10 +179,9 @@ print(f"with logarithms: {wide.n_runs} runs")
 #
 # ``executor`` takes any executor of `concurrent.futures`, or a Dask client, and ``at_once`` the
 # number of workers. Finished runs go to the file ``cache`` one by one: if the process is killed,
-# the same call goes on from there and makes no run twice. Where the study had come to its end, or
-# the simulator's source, state or globals have changed since, the first run is made again, to see
-# whether the file is this simulator's. Files that it reads and programs that it calls are not seen:
-# delete the file where these have changed. A run that raises or gives NaN is made again before it
-# counts as failed; the coordinates are in ``problem.failed``.
+# the same call goes on from there. Only the first run is made again where the simulator may have
+# changed, to see whether the file is its own. Files that it reads and programs that it calls are
+# not seen: delete the file where these have changed. A run that raises or gives NaN is made again
+# before it counts as failed; the coordinates are in ``problem.failed``.
 # :ref:`Three simulators <sphx_glr_auto_guides_robust_examples.py>` shows an equation of motion, a
 # program that is called by `subprocess`, and the drive.

@@ -28,7 +28,7 @@ from pymoo.indicators.igd import IGD
 from pymoo.optimize import minimize
 from scipy.optimize import minimize as minimize_one
 
-from pymoo_hdte.algorithms import AMPMOPSO, ElitistSwarm
+from pymoo_hdte.algorithms import AMPMOPSO, CompactSwarm
 from pymoo_hdte.decision import PREFERENCES, WeightedUtopia
 from pymoo_hdte.problems import OperatingCondition, RobustDTE, RobustDTETolerance, robust_dte_family
 from pymoo_hdte.units import REVOLUTION_PER_MINUTE
@@ -44,15 +44,15 @@ for name, low, high in zip(problem.var_names, problem.xl, problem.xu, strict=Tru
 #
 # Nothing is special about the problem: any algorithm of pymoo for real variables runs on it. Here
 # are three with 10 000 evaluations each: NSGA-II of pymoo, and two of this package, the paper's
-# ``AMPMOPSO`` and the ``ElitistSwarm``.
+# ``AMPMOPSO`` and ``CompactSwarm``.
 
 algorithms = {
     "NSGA-II": NSGA2(pop_size=100),
     "AMP-MOPSO": AMPMOPSO(pop_size=100, archive_size=50),
-    "ElitistSwarm": ElitistSwarm(pop_size=100),
+    "CompactSwarm": CompactSwarm(),
 }
 results = {
-    name: minimize(problem, algorithm, ("n_gen", 100), seed=1)
+    name: minimize(problem, algorithm, ("n_eval", 10_000), seed=1)
     for name, algorithm in algorithms.items()
 }
 
@@ -98,7 +98,7 @@ plt.show()
 # The paper chooses by a weighted distance from the ideal point. ``WeightedUtopia`` is a
 # ``DecisionMaking`` of pymoo.
 
-F, X = results["ElitistSwarm"].F, results["ElitistSwarm"].X
+F, X = results["CompactSwarm"].F, results["CompactSwarm"].X
 for preference, weights in PREFERENCES.items():
     chosen = WeightedUtopia(weights).do(F)
     mean, std = F[chosen]
@@ -145,9 +145,9 @@ print(f"end of the front {front[:, 0].min():.4f} arcsec")
 # ``robust_dte_family()`` names all members with a stored front. They differ in what makes a problem
 # hard: ``resonant`` has a front of two pieces at order 3, a duty cycle averages over speeds and
 # loads, with a free tolerance there are three objectives, and with grades of the error classes two
-# constraints. Their fronts are those of their surrogates, but for that of the last:
-# `RobustDTEDirect` has none and asks the drive model itself. Each has a card, which says what makes
-# it hard and how twelve algorithms do on it (``docs/cards``, made with the pages).
+# constraints. Their fronts are those of their surrogates. The last, `RobustDTEDirect`, has no
+# surrogate and asks the drive model itself. Each has a card, which says what makes it hard and how
+# twelve algorithms do on it.
 
 for name, build in robust_dte_family().items():
     if "_order" not in name:
@@ -169,7 +169,7 @@ conditions = [
     OperatingCondition(300 * REVOLUTION_PER_MINUTE, load_torque=10.0, weight=0.3),
 ]
 cycle = RobustDTE(conditions=conditions)
-result = minimize(cycle, ElitistSwarm(), ("n_gen", 50), seed=1)
+result = minimize(cycle, CompactSwarm(), ("n_eval", 5_000), seed=1)
 print("stored front:", cycle.pareto_front())
 print(f"mean {result.F[:, 0].min():.2f} to {result.F[:, 0].max():.2f} arcsec")
 
@@ -182,7 +182,7 @@ print(f"mean {result.F[:, 0].min():.2f} to {result.F[:, 0].max():.2f} arcsec")
 # third objective.
 
 priced = RobustDTETolerance()
-result = minimize(priced, ElitistSwarm(pop_size=200), ("n_gen", 50), seed=1)
+result = minimize(priced, CompactSwarm(), ("n_eval", 10_000), seed=1)
 mean, std, cost = result.F.T
 
 fig, ax = plt.subplots(figsize=(6.5, 4.0), layout="constrained")
