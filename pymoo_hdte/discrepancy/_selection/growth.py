@@ -132,11 +132,6 @@ class Weighed:
         """Members of the set."""
         return self.fit.candidates
 
-    def without(self, member: Candidate) -> Linearised:
-        """Return its hypothesis without an effect, to first order."""
-        effects = [effect for effect, _ in self.fit.places]
-        return self.linearised.without(effects.index(member))
-
     @property
     def explanation(self) -> Explanation:
         """It as a decision takes it: nuisances of a bench have no name."""
@@ -392,47 +387,27 @@ class Growth:
     def _exchange(self, weighed: Weighed, member: Candidate) -> None:
         """Fit what a set may have in place of a member: its forms and lines, and other effects."""
         others, values = _others(weighed.fit, member)
-        for candidate in self._rivals(weighed, member):
-            members = (*others, candidate)
-            residuals = self.data.objective(members).residuals
-            starts = [np.append(values, start) for start in candidate.starts]
-            self._fit(members, min(starts, key=lambda s: np.sum(residuals(s) ** 2)), again=True)
-            exchanged = self._known.get(label_of(members))
-            if candidate.nuisance and exchanged is not None:
-                # Lines of a nuisance may have kept out others of the same.
-                self._fit_evident_nuisances(exchanged)
+        for candidate in self.candidates:
+            if candidate.is_instead_of(member):
+                members = (*others, candidate)
+                if not may_be_together(members) or self._was_worse(weighed, member, candidate):
+                    continue
+                residuals = self.data.objective(members).residuals
+                starts = [np.append(values, start) for start in candidate.starts]
+                self._fit(members, min(starts, key=lambda s: np.sum(residuals(s) ** 2)), again=True)
+                exchanged = self._known.get(label_of(members))
+                if candidate.nuisance and exchanged is not None:
+                    # Lines of a nuisance may have kept out others of the same.
+                    self._fit_evident_nuisances(exchanged)
         is_effect = member.releases is None and not member.nuisance
         if is_effect and any(other.nuisance for other in others):
             # A law that errs may stand for several nuisances, none of which brings much alone.
-            self._fit_with_evident(weighed.without(member), others, values)
+            effects = [effect for effect, _ in weighed.fit.places]
+            hypothesis = weighed.linearised.without(effects.index(member))
+            self._fit_with_evident(hypothesis, others, values)
         without = self._without(weighed, member)
         if without is not None and self._may_be_extended(without):
             self._extend(without)
-
-    def _rivals(self, weighed: Weighed, member: Candidate) -> list[Candidate]:
-        """Return what may be there in place of a member, less lines that are far to first order."""
-        others, _ = _others(weighed.fit, member)
-        rivals = [
-            candidate
-            for candidate in self.candidates
-            if candidate.is_instead_of(member)
-            and may_be_together((*others, candidate))
-            and not self._was_worse(weighed, member, candidate)
-        ]
-        known = [self.screened[rival.label] for rival in rivals if rival.label in self.screened]
-        lines = [effect for effect in known if effect.candidate.linear and member.linear]
-        if not lines:
-            return rivals
-        hypothesis = weighed.without(member)
-        integral = Integral(hypothesis)
-        weight = integral.score().ln + self._prior(others)
-        gains = self._gains(integral, lines, len(hypothesis.residuals)).tolist()
-        far = {
-            effect.candidate.label
-            for effect, gain in zip(lines, gains, strict=True)
-            if not self._may_reach(weight, effect, gain)
-        }
-        return [rival for rival in rivals if rival.label not in far]
 
     def _was_worse(self, weighed: Weighed, member: Candidate, candidate: Candidate) -> bool:
         """Tell whether a candidate in place of a member was far worse beside some of the others.
@@ -626,13 +601,13 @@ class Growth:
         minimum, or near the likeliest set: alone, or with an effect in place of the member.
         """
         others, values = _others(weighed.fit, member)
-        label = label_of(others)
+        label, effects = label_of(others), [effect for effect, _ in weighed.fit.places]
         if label in self._invisible:
             return None
         if member.releases is not None or not self.screened:
             self._trial(others, values)
             return self._known.get(label)
-        linearised = weighed.without(member)
+        linearised = weighed.linearised.without(effects.index(member))
         integral = Integral(linearised)
         weight, known = integral.score().ln + self._prior(others), self._known.get(label)
         if known is not None and known.weight >= weight:
