@@ -6,8 +6,8 @@ bench is ``ideal``, a level with all nuisances, or one group of them alone at th
 whose leading number another one may replace. With ``--protocol`` the cases are `protocol_cases`:
 forty pairs of the ideal bench and the level ``mild``, and five with each of `TOLD_AS` alone.
 
-``experiments/data/blind_benches.csv`` is by the rules that decided before: the sixteen clean pairs,
-and 22 others of before set speeds that wander and ripples of brakes were told.
+``experiments/data/blind_benches.csv`` has the sixteen clean pairs, and 22 others by the rules that
+decided before, when set speeds that wander and ripples of brakes were not told yet.
 """
 
 from __future__ import annotations
