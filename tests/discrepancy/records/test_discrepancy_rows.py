@@ -392,6 +392,24 @@ def test_a_wave_that_is_cut_at_its_crests_comes_back(rng):
     assert abs(lines.phasors[2, place] + 1j) < 5.0 * deviation[1 + place]
 
 
+def test_rows_near_both_ends_of_a_range_are_left_out(rng):
+    true = run(rng)
+    torque = true.output_torque + 3.0 * np.sin(2.0 * true.input_angle)
+    result = repaired(replace(true, output_torque=np.clip(torque, 15.9, 24.1)))
+    assert result.usable
+    assert sorted(fault.size for fault in result.faults) == [15.9, 24.1]
+    kept = 4.0 * np.sin(2.0 * result.record.input_angle)
+    nearest = 4.1 - 2.0 * RIG.output_torque_noise
+    assert -nearest < kept.min() < 0.0 < kept.max() < nearest
+
+
+def test_a_record_far_from_the_end_of_a_range_stays_the_same_object(rng):
+    record = replace(run(rng), samples_averaged=20)
+    result = repaired_run(record, RATIO, ORDERS, DEVIATIONS, RULES, {("output_torque", 50.0)})
+    assert result.record is record
+    assert result.usable
+
+
 def test_a_crest_that_was_cut_before_its_samples_were_averaged_comes_back(rng):
     """No row stands at the end of the range: other records show where that is."""
     true, number = replace(run(rng), samples_averaged=20), 20

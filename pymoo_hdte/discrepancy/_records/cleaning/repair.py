@@ -321,17 +321,17 @@ class _RunSearch(RowSearch[RunningRecord]):
         that of all samples is known to beyond where the density is one over the root of their
         number.
         """
-        faults = {fault.channel: fault for fault in self.faults if fault.kind == "saturated"}
-        averaged = self.record.samples_averaged
-        ends = {(fault.channel, fault.size) for fault in faults.values()}
-        ends |= {end for end in known if averaged > 1 and end[0] not in faults}
-        torques = sorted(end for end in ends if end[0] in RUNNING[2:])
+        saturated = [fault for fault in self.faults if fault.kind == "saturated"]
+        faults = {(fault.channel, fault.size): fault for fault in saturated}
+        averaged, own = self.record.samples_averaged, {fault.channel for fault in saturated}
+        beside = [end for end in sorted(known) if averaged > 1 and end[0] not in own]
+        torques = [end for end in (*faults, *beside) if end[0] in RUNNING[2:]]
         if not torques:
             return True
         fit, near = self.fitted(orders), np.zeros(len(self.rows), dtype=bool)
         residual = fit.whole_residual
         lines = np.vstack([fit.values(part) for part in fit.parts]) - residual
-        count = len(self.rows) + sum(fault.rows for fault in faults.values())
+        count = len(self.rows) + sum(fault.rows for fault in saturated)
         distance = float(np.sqrt(max(np.log(count * averaged / (2.0 * np.pi)), 0.0)))
         for channel, reading in torques:
             place = RUNNING.index(channel) - 1
@@ -339,8 +339,7 @@ class _RunSearch(RowSearch[RunningRecord]):
             noise = np.std(residual[:, place]) * np.sqrt(averaged)
             further = ~(side * (reading - lines[:, place]) > distance * noise) & ~near
             rows = int(np.count_nonzero(further))
-            if channel in faults:
-                fault = faults[channel]
+            if (fault := faults.get((channel, reading))) is not None:
                 self.faults[self.faults.index(fault)] = replace(fault, rows=fault.rows + rows)
             elif rows:
                 self.note("saturated", channel, int(np.argmax(further)), rows, reading, "left out")
@@ -348,6 +347,8 @@ class _RunSearch(RowSearch[RunningRecord]):
         kept = int(np.count_nonzero(~near))
         if kept < max(FEWEST_SAMPLES, (1.0 - self.rules.saturated_share) * count):
             return False
+        if not near.any():
+            return True
         self._keep_rows(~near)
         return spans_a_turn(self.record, self.ratio)
 
