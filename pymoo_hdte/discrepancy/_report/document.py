@@ -117,14 +117,14 @@ def believed_in_words(document: Mapping[str, Any]) -> list[str]:
     return texts
 
 
-def sentence(verdict: Verdict, error_orders: Sequence[float] = ()) -> str:
+def sentence(
+    verdict: Verdict, error_orders: Sequence[float] = (), nominal: str = "nominal drive"
+) -> str:
     """Return the verdict in words; lines of the static error of a drive by their orders."""
     chosen = verdict.chosen
     if verdict.status == "adequate":
-        return (
-            "Nothing is shown to be missing: the nominal drive explains the records within its "
-            "tolerances."
-        )
+        explains = f"the {nominal} explains the records within its tolerances"
+        return f"Nothing is shown to be missing: {explains}."
     if chosen is None:
         return "Something is missing that no effect in the library explains."
     what = what_is_missing(chosen.candidates)

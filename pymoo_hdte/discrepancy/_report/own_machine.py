@@ -63,7 +63,7 @@ def write_machine_report(
         "schema_version": SCHEMA_VERSION,
         "campaign": finding.title,
         "status": verdict.status,
-        "sentence": _sentence(finding),
+        "sentence": sentence(finding.verdict, nominal="nominal model"),
         "probability": verdict.probability,
         "doubts": caveats(verdict),
         "reasons": [reason.as_dict() for reason in verdict.reasons],
@@ -96,15 +96,6 @@ def write_machine_report(
     )
     FOLDER.write(Path(out), html, document, {MODEL_FILE: revised_values(finding).to_toml()})
     return document
-
-
-def _sentence(finding: MachineFinding) -> str:
-    if finding.verdict.status == "adequate":
-        return (
-            "Nothing is shown to be missing: the nominal model explains the records within its "
-            "tolerances."
-        )
-    return sentence(finding.verdict)
 
 
 def error_sentence(finding: MachineFinding, errors: HeldOutErrors | None) -> str:

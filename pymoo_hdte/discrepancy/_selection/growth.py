@@ -132,6 +132,11 @@ class Weighed:
         """Members of the set."""
         return self.fit.candidates
 
+    def without(self, member: Candidate) -> Linearised:
+        """Return its hypothesis without one of its effects, to first order."""
+        effects = [effect for effect, _ in self.fit.places]
+        return self.linearised.without(effects.index(member))
+
     @property
     def explanation(self) -> Explanation:
         """It as a decision takes it: nuisances of a bench have no name."""
@@ -402,9 +407,7 @@ class Growth:
         is_effect = member.releases is None and not member.nuisance
         if is_effect and any(other.nuisance for other in others):
             # A law that errs may stand for several nuisances, none of which brings much alone.
-            effects = [effect for effect, _ in weighed.fit.places]
-            hypothesis = weighed.linearised.without(effects.index(member))
-            self._fit_with_evident(hypothesis, others, values)
+            self._fit_with_evident(weighed.without(member), others, values)
         without = self._without(weighed, member)
         if without is not None and self._may_be_extended(without):
             self._extend(without)
@@ -601,13 +604,13 @@ class Growth:
         minimum, or near the likeliest set: alone, or with an effect in place of the member.
         """
         others, values = _others(weighed.fit, member)
-        label, effects = label_of(others), [effect for effect, _ in weighed.fit.places]
+        label = label_of(others)
         if label in self._invisible:
             return None
         if member.releases is not None or not self.screened:
             self._trial(others, values)
             return self._known.get(label)
-        linearised = weighed.linearised.without(effects.index(member))
+        linearised = weighed.without(member)
         integral = Integral(linearised)
         weight, known = integral.score().ln + self._prior(others), self._known.get(label)
         if known is not None and known.weight >= weight:
