@@ -36,6 +36,7 @@ from pymoo_hdte.discrepancy._selection.hypothesis import (
 from pymoo_hdte.discrepancy._selection.levenberg_marquardt import SETTLED_SHARE
 from pymoo_hdte.discrepancy._selection.released import gain_of_released, released_together
 from pymoo_hdte.discrepancy._selection.score import (
+    MOST_PLACES,
     VISIBLE,
     Integral,
     Linearised,
@@ -239,11 +240,9 @@ class Growth:
         Parameters
         ----------
         likely : sequence of Fit
-            Sets that were the `likeliest` with another noise.
+            Sets that were the `likeliest` with another noise, or of a part of the data.
         """
-        self._weigh(self.base)
-        for fitted in likely:
-            self._fit(fitted.candidates, fitted.values)
+        self._weigh_again(likely)
         yield from self._settled()
         for _ in range(MOST_FIRSTS):
             further = [weighed for weighed in self.ranked if self._may_be_extended(weighed)]
@@ -251,6 +250,17 @@ class Growth:
                 break
             self._extend(further[0])
             yield from self._settled()
+
+    def may_do_with(self, sets: Sequence[Fit]) -> bool:
+        """Tell whether one of some sets may leave nothing to something outside of the library."""
+        self._weigh_again(sets)
+        return not self._lacks_something(self.ranked[0])
+
+    def _weigh_again(self, sets: Sequence[Fit]) -> None:
+        """Weigh sets that are known from other data, and none."""
+        self._weigh(self.base)
+        for fitted in sets:
+            self._fit(fitted.candidates, fitted.values)
 
     def _settled(self) -> Iterator[Fit]:
         """Extend the likeliest sets, and exchange members of the best one, until it stays best.
@@ -286,8 +296,14 @@ class Growth:
 
     def _lacks_something(self, weighed: Weighed) -> bool:
         """Tell whether it is not sure that a set leaves nothing to something outside."""
-        odds = self._with_outside(weighed).weight - weighed.weight
-        return odds > np.log((1.0 - SURE) / SURE)
+        sure = np.log((1.0 - SURE) / SURE)
+        if weighed not in self._outside:
+            # A further place only makes it surer.
+            score, _ = self._scored_outside(weighed, most=1)
+            prior = self._prior(weighed.candidates, True)
+            if score.ln + prior - weighed.weight > sure:
+                return True
+        return self._with_outside(weighed).weight - weighed.weight > sure
 
     def decide(self) -> tuple[Decision, list[Weighed]]:
         """Return what is said, and all sets with and without something outside of the library."""
@@ -685,20 +701,23 @@ class Growth:
     def _with_outside(self, weighed: Weighed) -> Weighed:
         """Return a set with something outside of the library as well."""
         if weighed not in self._outside:
-            prior = self._prior(weighed.candidates, True)
-            hopeless = self.ranked[0].weight - WINDOW - prior
-            hypothesis = weighed.linearised
-            anywhere = *self.errors.outside, *hypothesis.other_laws
-            score, places = score_with_outside(hypothesis, anywhere, hopeless)
+            score, places = self._scored_outside(weighed)
             self._outside[weighed] = replace(
                 weighed,
                 score=score,
-                prior=prior,
+                prior=self._prior(weighed.candidates, True),
                 worst_chance=score.worst_chance(self.errors.groups),
                 outside=True,
                 places=tuple(places),
             )
         return self._outside[weighed]
+
+    def _scored_outside(self, weighed: Weighed, most: int = MOST_PLACES) -> tuple[Score, list[str]]:
+        """Return the score of a set with something outside, at some places at most, and where."""
+        hypothesis, prior = weighed.linearised, self._prior(weighed.candidates, True)
+        anywhere = *self.errors.outside, *hypothesis.other_laws
+        hopeless = self.ranked[0].weight - WINDOW - prior
+        return score_with_outside(hypothesis, anywhere, hopeless, most)
 
     def _prior(self, members: Sequence[Candidate], outside: bool = False) -> float:
         """Return the logarithm of the prior odds of a set against nothing."""

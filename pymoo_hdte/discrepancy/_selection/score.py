@@ -235,8 +235,19 @@ def score(hypothesis: Linearised) -> Score:
     return Integral(hypothesis).score()
 
 
+MOST_PLACES = 12
+"""Most places at which something outside of the library is looked for. What needs more leaves more
+than noise, which the check of the likeliest explanation sees."""
+FURTHER = 3.0
+"""Factor by which a place may bring more than to first order, as less of the rest is noise then:
+width of the search."""
+
+
 def score_with_outside(
-    hypothesis: Linearised, places: Sequence[Sized], hopeless: float = -np.inf
+    hypothesis: Linearised,
+    places: Sequence[Sized],
+    hopeless: float = -np.inf,
+    most: int = MOST_PLACES,
 ) -> tuple[Score, list[str]]:
     """Return the marginal likelihood beside something outside of the library, and where that is.
 
@@ -251,6 +262,8 @@ def score_with_outside(
     hopeless : float
         Logarithm of a likelihood below which nobody asks for it: the search ends where all further
         places together would not reach that if each brought `FURTHER` times as much as the best.
+    most : int
+        Most places that are taken.
 
     Returns
     -------
@@ -263,7 +276,7 @@ def score_with_outside(
     price = float(np.log(max(len(places), 1)))
     integral = Integral(hypothesis)
     best, taken, remaining = integral.score(), list[Sized](), list(places)
-    while remaining and len(taken) < MOST_PLACES:
+    while remaining and len(taken) < most:
         gains = integral.gains(remaining)
         if (largest := float(np.max(gains))) <= price:
             if not taken:
@@ -271,7 +284,7 @@ def score_with_outside(
                 mean = largest + float(np.log(np.sum(np.exp(gains - largest)))) - price
                 return replace(best, ln=best.ln + mean), []
             break
-        if taken and best.ln + FURTHER * (MOST_PLACES - len(taken)) * largest < hopeless:
+        if taken and best.ln + FURTHER * (most - len(taken)) * largest < hopeless:
             break
         place = remaining.pop(int(np.argmax(gains)))
         integral = Integral(hypothesis.beside(*taken, place))
@@ -281,14 +294,6 @@ def score_with_outside(
             break
         best, taken = trial, [*taken, place]
     return best, [place.name for place in taken]
-
-
-MOST_PLACES = 12
-"""Most places at which something outside of the library is looked for. What needs more leaves more
-than noise, which the check of the likeliest explanation sees."""
-FURTHER = 3.0
-"""Factor by which a place may bring more than to first order, as less of the rest is noise then:
-width of the search."""
 
 
 @dataclass(eq=False)
@@ -705,7 +710,19 @@ def _chance_beyond(cut: float, away: Vector, spread: Vector, m: int, one_sided: 
         return np.asarray(
             norm.cdf((away - cut) / spread) + other * norm.cdf((-away - cut) / spread)
         )
-    return np.asarray(ncx2.sf((cut / spread) ** 2, m, np.maximum((away / spread) ** 2, 1e-12)))
+    distance, centre = np.broadcast_arrays(cut / spread, away / spread)
+    # Far out a sphere is flat. There the series of the exact chance overflows, or has no end.
+    chance = norm.sf(distance - np.hypot(centre, np.sqrt(m - 1.0)))
+    curved = (centre < _FLAT) & (np.abs(distance - centre) < _SURE)
+    chance[curved] = ncx2.sf(distance[curved] ** 2, m, np.maximum(centre[curved] ** 2, 1e-12))
+    return np.asarray(chance)
+
+
+_FLAT = 100.0
+"""Radius of a sphere, in deviations, from which on the chance to be beyond it is that beyond a plane,
+to some hundredths of itself."""
+_SURE = 30.0
+"""Deviations beyond which a chance is 0 or 1 to all digits."""
 
 
 def _marginal(precision: Matrix, linear: Vector, rows: NDArray[np.int_]) -> tuple[Matrix, Vector]:

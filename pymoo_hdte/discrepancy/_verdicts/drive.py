@@ -103,16 +103,24 @@ def examine_drive(campaign: Campaign, rules: Rules = RULES) -> DriveFinding:
     _check_steady(data)
     base = fit(data)
     harmonics, exciting = _beyond(data, base)
-    if further := [*harmonics, *exciting]:
-        orders = sorted([*data.features.orders.tolist(), *further])
-        records = data.features.records
-        wider = replace(data, features=measure(campaign, records, orders, rules, exciting))
-        judged = rattling.judged(wider, fit(wider, start=base.values), _candidates)
-    if not further or (harmonics and judged[-1].outside > 0.5):
+
+    further = sorted([*data.features.orders.tolist(), *harmonics, *exciting])
+
+    def where_only_excite(above: list[float]) -> tuple[Data, Fit]:
+        features = measure(campaign, data.features.records, further, rules, above)
+        of_lines = replace(data, features=features) if above or harmonics else data
+        return of_lines, fit(of_lines, start=base.values)
+
+    judged = rattling.judged(*where_only_excite([*harmonics, *exciting]), _candidates)
+    if harmonics and judged.verdict.outside <= 0.5:
+        # What the lower orders leave to something outside, all of them do.
+        of_all = rattling.judged(*where_only_excite(exciting), _candidates, judged.likeliest)
         # Where no fit follows the harmonics, as in a record that then has no steady state, the
-        # lower orders may still be explained.
-        judged, harmonics = rattling.judged(data, base, _candidates), []
-    return DriveFinding(campaign, *judged, (*unexpected, *harmonics), rows)
+        # lower orders are explained all the same.
+        if of_all.verdict.outside <= 0.5:
+            judged, unexpected = of_all, [*unexpected, *harmonics]
+    data, verdict, _ = judged
+    return DriveFinding(campaign, data, verdict, tuple(unexpected), rows)
 
 
 def _beyond(data: Data, base: Fit) -> tuple[list[float], list[float]]:

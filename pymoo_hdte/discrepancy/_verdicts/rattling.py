@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,7 +46,17 @@ Guess = Callable[..., list[Candidate]]
 from what they leave."""
 
 
-def judged(data: Data, base: Fit, candidates_of: Guess) -> tuple[Data, Verdict]:
+class Judged(NamedTuple):
+    """The data on the bench that they show, what they show, and sets that others may come from."""
+
+    data: Data
+    verdict: Verdict
+    likeliest: Sequence[Fit]
+
+
+def judged(
+    data: Data, base: Fit, candidates_of: Guess, likely: Sequence[Fit] = ()
+) -> Judged:
     """Return the verdict on some data, with the data that it is of.
 
     If sweeps speak for a clearance, records in which it would rattle are left out. If they speak
@@ -63,19 +74,32 @@ def judged(data: Data, base: Fit, candidates_of: Guess) -> tuple[Data, Verdict]:
     leading = leading_sweep_effect(data, base, candidates_of(data, base))
     loaded = data if leading is None else data.loaded
     if loaded is data or leading is None:
-        return _judged_on(data, base, candidates_of)
-    of_loaded = fit(loaded)
+        return _judged_on(data, base, candidates_of, likely)
+    of_loaded = _judged_on(loaded, fit(loaded), candidates_of, likely)
     if effect_named(leading).rattles:
-        return _judged_on(loaded, of_loaded, candidates_of)
-    overall = _judged_on(data, base, candidates_of)
-    if overall[-1].status in ("unlisted", "partial"):
-        again = _judged_on(loaded, of_loaded, candidates_of)
-        if _explains_by_a_clearance(again[-1]):
-            return again
-    return overall
+        return of_loaded
+    by_a_clearance = _explains_by_a_clearance(of_loaded.verdict)
+    if by_a_clearance and not _explain(of_loaded.likeliest, data, base, candidates_of):
+        return of_loaded
+    overall = _judged_on(data, base, candidates_of, of_loaded.likeliest)
+    lacks = overall.verdict.status in ("unlisted", "partial")
+    return of_loaded if by_a_clearance and lacks else overall
 
 
-def _judged_on(data: Data, base: Fit, candidates_of: Guess) -> tuple[Data, Verdict]:
+def _explain(sets: Sequence[Fit], data: Data, base: Fit, candidates_of: Guess) -> bool:
+    """Tell whether one of some sets of effects may explain all of the data."""
+    every = data.with_held_out
+    known = every.with_noise_of(sets[0]) or every
+    of_every, candidates = fit(known, start=base.values), candidates_of(data, base)
+    return Growth(known, of_every, candidates, LawErrors(known, of_every)).may_do_with(sets)
+
+
+def _judged_on(
+    data: Data,
+    base: Fit,
+    candidates_of: Guess,
+    likely: Sequence[Fit] = (),
+) -> Judged:
     """Return the verdict on all these data, with the data on the bench that they show.
 
     The likelihood of all records is that of those that are fitted, times the predictive density of
@@ -83,7 +107,7 @@ def _judged_on(data: Data, base: Fit, candidates_of: Guess) -> tuple[Data, Verdi
     """
     every = data.with_held_out
     of_every = base if every is data else fit(every, start=base.values)
-    known, growth = _grown(every, of_every, candidates_of(data, base), candidates_of)
+    known, growth = _grown(every, of_every, candidates_of(data, base), candidates_of, likely)
     decision, sets = growth.decide()
     likeliest, bench = sets[0].fit, data
     if known is not every:
@@ -91,11 +115,16 @@ def _judged_on(data: Data, base: Fit, candidates_of: Guess) -> tuple[Data, Verdi
     for nuisance, place in likeliest.places:
         if nuisance.nuisance:
             bench = bench.on_bench(nuisance, likeliest.values[place].tolist())
-    return bench, verdict_of(bench, decision, sets, base if bench is data else None)
+    verdict = verdict_of(bench, decision, sets, base if bench is data else None)
+    return Judged(bench, verdict, growth.likeliest)
 
 
 def _grown(
-    data: Data, base: Fit, candidates: Sequence[Candidate], candidates_of: Guess
+    data: Data,
+    base: Fit,
+    candidates: Sequence[Candidate],
+    candidates_of: Guess,
+    likely: Sequence[Fit],
 ) -> tuple[Data, Growth]:
     """Return the sets of effects grown with the noise of the likeliest one, and the data with it.
 
@@ -103,7 +132,7 @@ def _grown(
     channel, and one that creeps leaves what fades. Where the likeliest set does so, the sets are
     compared anew: without it, what creeps seemed to be further effects beside a hysteresis.
     """
-    likely, screened = list[Fit](), dict[str, Screened]()
+    screened = dict[str, Screened]()
     for renewals in range(MOST_RENEWED + 1):
         guess, renewed = partial(candidates_of, data, base), None
         growth = Growth(data, base, candidates, LawErrors(data, base), screened, guess)

@@ -166,14 +166,23 @@ def test_records_that_rattle_count_unless_a_clearance_explains_all_others(
 ):
     """A play with a soft skin beside a hardening was named a soft wind-up beside it."""
 
-    def judged_on(some, base, candidates):
+    def judged_on(some, *_):
         whole = len(some.features.records) == len(LOADED_OR_NOT)
-        return some, of_all if whole else of_loaded
+        return rattling.Judged(some, of_all if whole else of_loaded, ())
 
     monkeypatch.setattr(rattling, "_judged_on", judged_on)
-    found, verdict = rattling.judged(swept, fit(swept), lambda some, base: library(some))
+    monkeypatch.setattr(rattling, "_explain", lambda *_: True)
+    found, verdict, _ = rattling.judged(swept, fit(swept), lambda some, base: library(some))
     assert len(found.features.records) == kept
     assert verdict is (of_all if kept == len(LOADED_OR_NOT) else of_loaded)
+
+
+def test_all_records_are_not_asked_again_where_a_clearance_cannot_explain_them(monkeypatch, swept):
+    """A clearance beside an error took six minutes to find in vain what explains rattling."""
+    monkeypatch.setattr(rattling, "_judged_on", lambda some, *_: rattling.Judged(some, PLAY, ()))
+    monkeypatch.setattr(rattling, "_explain", lambda *_: False)
+    found, _, _ = rattling.judged(swept, fit(swept), lambda some, base: library(some))
+    assert len(found.features.records) == 6
 
 
 @pytest.mark.parametrize(("name", "kept"), [("backlash", 6), (None, 8)])
@@ -182,8 +191,8 @@ def test_records_that_rattle_do_not_count_where_sweeps_speak_for_a_clearance(
 ):
     data = known_data(LOADED_OR_NOT)
     monkeypatch.setattr(rattling, "leading_sweep_effect", lambda *_: name)
-    monkeypatch.setattr(rattling, "_judged_on", lambda some, *_: (some, SOFT))
-    found, _ = rattling.judged(data, fit(data), lambda some, base: [])
+    monkeypatch.setattr(rattling, "_judged_on", lambda some, *_: rattling.Judged(some, SOFT, ()))
+    found, _, _ = rattling.judged(data, fit(data), lambda some, base: [])
     assert len(found.features.records) == kept
 
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.integrate import quad
-from scipy.stats import binom, kstest, multivariate_normal, norm
+from scipy.stats import binom, kstest, multivariate_normal, ncx2, norm
 
 from pymoo_hdte.discrepancy._selection.process import TERMS, sine_of
 from pymoo_hdte.discrepancy._selection.score import (
@@ -16,6 +16,7 @@ from pymoo_hdte.discrepancy._selection.score import (
     Integral,
     Linearised,
     Sized,
+    _chance_beyond,
     score,
     score_with_outside,
 )
@@ -344,6 +345,20 @@ def test_a_chance_beyond_is_that_of_the_residuals(rng):
         found = score(hypothesis(rng.normal(size=30), free(np.empty((30, 0)))))
         chances.append(found.worst_chance([np.arange(30)]))
     assert kstest(chances, "uniform").pvalue > 1e-3
+
+
+@pytest.mark.parametrize("m", [2, 7, 60])
+def test_a_chance_beyond_a_distance_is_known_however_far_that_is(m):
+    """A ripple of 58,000 times the noise ended in an overflow of the series."""
+    sizes = np.logspace(-12.0, 12.0, 49)
+    chances = np.array([_chance_beyond(cut, sizes, np.ones(49), m, False) for cut in sizes])
+    assert np.all((chances >= 0.0) & (chances <= 1.0))
+    assert np.all(np.diff(chances, axis=0) <= 0.0)
+    assert np.all(np.diff(chances, axis=1) >= -1e-12)
+    for centre, beyond in ((90.0, 2.0), (110.0, 2.0), (110.0, -2.0), (1.0, 3.0), (0.0, 40.0)):
+        (chance,) = _chance_beyond(centre + beyond, np.array([centre]), np.ones(1), m, False)
+        wanted = ncx2.sf((centre + beyond) ** 2, m, max(centre, 1e-6) ** 2)
+        assert chance == pytest.approx(wanted, rel=0.02, abs=1e-99)
 
 
 @pytest.mark.parametrize("cut", [False, True])

@@ -82,7 +82,7 @@ def test_a_weight_at_the_shaft_of_a_load_is_known_exactly():
 
 def verdict_on(effects, seed=6):
     data, _ = measured(effects, np.random.default_rng(seed), DATA)
-    data, verdict = rattling.judged(data, fit(data), candidates_of)
+    data, verdict, _ = rattling.judged(data, fit(data), candidates_of)
     shown = data.bench.shown(verdict.accepted, verdict.rules)
     return verdict, [nuisance.name for nuisance, _ in shown], data
 
