@@ -159,6 +159,16 @@ class Invisible(NamedTuple):
     effects: list[Candidate]
 
 
+class Exchanged(NamedTuple):
+    """A set of which a member was exchanged, how far it was ahead then, and would be to first order
+    of itself without this member."""
+
+    label: frozenset[str]
+    member: str
+    ahead: float
+    loss: float
+
+
 @dataclass(eq=False)
 class Growth:
     """The sets of effects that may explain some data, grown by their probability.
@@ -176,6 +186,8 @@ class Growth:
     guess : callable, optional
         From what a fit leaves to effects that may be missing, known ones among them: small lines
         are seen beside the large ones only when these are explained.
+    asked_before : sequence of Exchanged
+        What was `asked` with another noise.
     """
 
     data: Evidence
@@ -184,6 +196,7 @@ class Growth:
     errors: Errors
     screened: dict[str, Screened] = field(default_factory=dict)
     guess: Callable[[Fit], Sequence[Candidate]] | None = None
+    asked_before: Sequence[Exchanged] = ()
     counts: Counter[str] = field(init=False)
     _known: dict[frozenset[str], Weighed] = field(default_factory=dict)
     _invisible: dict[frozenset[str], Invisible] = field(default_factory=dict)
@@ -384,26 +397,41 @@ class Growth:
                 self._without(weighed, member)
 
     def _is_essential(self, weighed: Weighed, member: Candidate) -> bool:
-        """Tell whether a member is as essential as it was beside fewer members.
+        """Tell whether a member is as essential as it was in nearly the same set.
 
-        There it was asked for: no set without it, with another effect instead, was anywhere near.
+        There it was asked for: no set without it, with another effect instead, was as likely that
+        it would come near the likeliest one here. To first order it brings as much here, whatever
+        is in place of one effect that was there.
         """
-        whole, far, loss = label_of(weighed.candidates), TRUSTED * WINDOW, weighed.losses
-        if loss[member.label] < far:
+        whole, loss = label_of(weighed.candidates), weighed.losses[member.label]
+        if self._near(weighed.weight - loss / TRUSTED):
             return False
-        for label, varied in self._varied.items():
-            part = self._known.get(label)
-            if part is None or not label < whole or member.label not in varied:
-                continue
-            rivals = [
-                known.weight
-                for other, known in self._known.items()
-                if member.label not in other and len(other - label) <= 1
-            ]
-            behind = part.weight - max(rivals, default=-np.inf)
-            if behind > far and loss[member.label] >= part.losses[member.label] / TRUSTED:
-                return True
-        return False
+        return any(
+            exchanged.member == member.label
+            and len(exchanged.label - whole) <= 1
+            and loss >= exchanged.loss / TRUSTED
+            and not self._near(weighed.weight - exchanged.ahead / TRUSTED)
+            for exchanged in [*self.asked_before, *self.asked]
+        )
+
+    @property
+    def asked(self) -> list[Exchanged]:
+        """What became of the sets of which members were exchanged."""
+        return [
+            Exchanged(label, member, self._ahead(label, member), self._known[label].losses[member])
+            for label, varied in self._varied.items()
+            if label in self._known
+            for member in varied
+        ]
+
+    def _ahead(self, label: frozenset[str], member: str) -> float:
+        """Return how far a set is ahead of all that have at most another effect for a member."""
+        rivals = [
+            known.weight
+            for other, known in self._known.items()
+            if member not in other and len(other - label) <= 1
+        ]
+        return self._known[label].weight - max(rivals, default=-np.inf)
 
     def _exchange(self, weighed: Weighed, member: Candidate) -> None:
         """Fit what a set may have in place of a member: its forms and lines, and other effects."""

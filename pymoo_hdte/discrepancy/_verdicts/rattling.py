@@ -21,7 +21,7 @@ from pymoo_hdte.discrepancy._evidence.order_lines.law_errors import LawErrors
 from pymoo_hdte.discrepancy._selection.candidate import Candidate, Layout
 from pymoo_hdte.discrepancy._selection.decided import verdict_of
 from pymoo_hdte.discrepancy._selection.fitting import Fit, fit
-from pymoo_hdte.discrepancy._selection.growth import MOST_MEMBERS, Growth
+from pymoo_hdte.discrepancy._selection.growth import MOST_MEMBERS, Exchanged, Growth
 from pymoo_hdte.discrepancy._selection.rules import RULES, Rules
 from pymoo_hdte.discrepancy._selection.screening import Screened
 from pymoo_hdte.discrepancy._selection.verdict import Verdict
@@ -79,15 +79,24 @@ def judged(
     if effect_named(leading).rattles:
         return of_loaded
     by_a_clearance = _explains_by_a_clearance(of_loaded.verdict)
-    if by_a_clearance and not _explain(of_loaded.likeliest, data, base, candidates_of):
+    if by_a_clearance and not _explained_without_a_clearance(data, base, of_loaded, candidates_of):
         return of_loaded
     overall = _judged_on(data, base, candidates_of, of_loaded.likeliest)
     lacks = overall.verdict.status in ("unlisted", "partial")
     return of_loaded if by_a_clearance and lacks else overall
 
 
-def _explain(sets: Sequence[Fit], data: Data, base: Fit, candidates_of: Guess) -> bool:
-    """Tell whether one of some sets of effects may explain all of the data."""
+def _explained_without_a_clearance(
+    data: Data, base: Fit, of_loaded: Judged, candidates_of: Guess
+) -> bool:
+    """Tell whether a likely set of the loaded records may explain all, though nothing parts."""
+    sets = [
+        fitted
+        for fitted in of_loaded.likeliest
+        if not clearances() & {member.name for member in fitted.candidates}
+    ]
+    if not sets:
+        return False
     every = data.with_held_out
     known = every.with_noise_of(sets[0]) or every
     of_every, candidates = fit(known, start=base.values), candidates_of(data, base)
@@ -132,15 +141,15 @@ def _grown(
     channel, and one that creeps leaves what fades. Where the likeliest set does so, the sets are
     compared anew: without it, what creeps seemed to be further effects beside a hysteresis.
     """
-    screened = dict[str, Screened]()
+    screened, asked = dict[str, Screened](), list[Exchanged]()
     for renewals in range(MOST_RENEWED + 1):
         guess, renewed = partial(candidates_of, data, base), None
-        growth = Growth(data, base, candidates, LawErrors(data, base), screened, guess)
+        growth = Growth(data, base, candidates, LawErrors(data, base), screened, guess, asked)
         for fitted in growth.steps(likely):
             renewed = data.with_noise_of(fitted) if renewals < MOST_RENEWED else None
             if renewed is not None:
                 break
-        likely, candidates = growth.likeliest, growth.candidates
+        likely, candidates, asked = growth.likeliest, growth.candidates, growth.asked
         if renewed is None:
             break
         screened = {

@@ -171,7 +171,7 @@ def test_records_that_rattle_count_unless_a_clearance_explains_all_others(
         return rattling.Judged(some, of_all if whole else of_loaded, ())
 
     monkeypatch.setattr(rattling, "_judged_on", judged_on)
-    monkeypatch.setattr(rattling, "_explain", lambda *_: True)
+    monkeypatch.setattr(rattling, "_explained_without_a_clearance", lambda *_: True)
     found, verdict, _ = rattling.judged(swept, fit(swept), lambda some, base: library(some))
     assert len(found.features.records) == kept
     assert verdict is (of_all if kept == len(LOADED_OR_NOT) else of_loaded)
@@ -180,7 +180,7 @@ def test_records_that_rattle_count_unless_a_clearance_explains_all_others(
 def test_all_records_are_not_asked_again_where_a_clearance_cannot_explain_them(monkeypatch, swept):
     """A clearance beside an error took six minutes to find in vain what explains rattling."""
     monkeypatch.setattr(rattling, "_judged_on", lambda some, *_: rattling.Judged(some, PLAY, ()))
-    monkeypatch.setattr(rattling, "_explain", lambda *_: False)
+    monkeypatch.setattr(rattling, "_explained_without_a_clearance", lambda *_: False)
     found, _, _ = rattling.judged(swept, fit(swept), lambda some, base: library(some))
     assert len(found.features.records) == 6
 
