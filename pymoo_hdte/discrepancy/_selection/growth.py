@@ -160,8 +160,11 @@ class Invisible(NamedTuple):
 
 
 class Exchanged(NamedTuple):
-    """A set of which a member was exchanged, how far it was ahead then, and would be to first order
-    of itself without this member."""
+    """A set of which a member was exchanged.
+
+    It was ``ahead`` of all with at most another effect for that, and its ``loss`` to first order
+    would be that without the member.
+    """
 
     label: frozenset[str]
     member: str
@@ -257,6 +260,13 @@ class Growth:
         """
         self._weigh_again(likely)
         yield from self._settled()
+        asked = set[frozenset[str]]()
+        while self._lacks_something(best := self.ranked[0]):
+            if (label := label_of(best.candidates)) in asked:
+                break
+            asked.add(label)
+            self._extend(best, every=True)
+            yield from self._settled()
         for _ in range(MOST_FIRSTS):
             further = [weighed for weighed in self.ranked if self._may_be_extended(weighed)]
             if not further or not self._lacks_something(self.ranked[0]):
@@ -473,8 +483,12 @@ class Growth:
             for loss, brought in behind
         )
 
-    def _extend(self, weighed: Weighed) -> None:
-        """Fit a set with each effect that could make it likelier."""
+    def _extend(self, weighed: Weighed, every: bool = False) -> None:
+        """Fit a set with each effect that could make it likelier.
+
+        What could not by what it does beside the base is not asked, unless ``every`` one is: a
+        weight beside a brake's ripple differs from that by the spread of the loads only.
+        """
         self._extended.add(label_of(weighed.candidates))
         self._release(weighed)
         members = weighed.candidates
@@ -493,7 +507,7 @@ class Growth:
         integral = Integral(weighed.linearised)
         integral.score()
         n = len(weighed.linearised.residuals)
-        if self.screened:
+        if self.screened and not every:
             before = [self.screened[c.label] for c in candidates if c.label in self.screened]
             hopeful = self._gains(integral, before, n)
             # A shaft that gives way does nothing until something else moves it.

@@ -719,8 +719,8 @@ def _chance_beyond(cut: float, away: Vector, spread: Vector, m: int, one_sided: 
 
 
 _FLAT = 100.0
-"""Radius of a sphere, in deviations, from which on the chance to be beyond it is that beyond a plane,
-to some hundredths of itself."""
+"""Radius of a sphere, in deviations, from which on the chance to be beyond it is that to be beyond
+a plane, to some hundredths of itself."""
 _SURE = 30.0
 """Deviations beyond which a chance is 0 or 1 to all digits."""
 

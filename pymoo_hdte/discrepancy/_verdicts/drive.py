@@ -104,19 +104,20 @@ def examine_drive(campaign: Campaign, rules: Rules = RULES) -> DriveFinding:
     base = fit(data)
     harmonics, exciting = _beyond(data, base)
 
-    further = sorted([*data.features.orders.tolist(), *harmonics, *exciting])
+    orders = sorted([*data.features.orders.tolist(), *harmonics, *exciting])
 
     def where_only_excite(above: list[float]) -> tuple[Data, Fit]:
-        features = measure(campaign, data.features.records, further, rules, above)
-        of_lines = replace(data, features=features) if above or harmonics else data
+        if orders == data.features.orders.tolist():
+            return data, base
+        features = measure(campaign, data.features.records, orders, rules, above)
+        of_lines = replace(data, features=features)
         return of_lines, fit(of_lines, start=base.values)
 
     judged = rattling.judged(*where_only_excite([*harmonics, *exciting]), _candidates)
+    # What lower orders leave to something outside, the harmonics do as well; and where no fit
+    # follows these, as in a record that then has no steady state, the lower ones are explained.
     if harmonics and judged.verdict.outside <= 0.5:
-        # What the lower orders leave to something outside, all of them do.
         of_all = rattling.judged(*where_only_excite(exciting), _candidates, judged.likeliest)
-        # Where no fit follows the harmonics, as in a record that then has no steady state, the
-        # lower orders are explained all the same.
         if of_all.verdict.outside <= 0.5:
             judged, unexpected = of_all, [*unexpected, *harmonics]
     data, verdict, _ = judged

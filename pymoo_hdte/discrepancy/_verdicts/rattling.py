@@ -54,14 +54,12 @@ class Judged(NamedTuple):
     likeliest: Sequence[Fit]
 
 
-def judged(
-    data: Data, base: Fit, candidates_of: Guess, likely: Sequence[Fit] = ()
-) -> Judged:
+def judged(data: Data, base: Fit, candidates_of: Guess, likely: Sequence[Fit] = ()) -> Judged:
     """Return the verdict on some data, with the data that it is of.
 
     If sweeps speak for a clearance, records in which it would rattle are left out. If they speak
-    for another effect, and the verdict on all records is not sure, the others are judged alone:
-    that verdict is taken if it names a clearance beside another effect.
+    for another effect, the others are judged first: that verdict is taken if it names a clearance
+    beside another effect, and the verdict on all records is not sure.
 
     Parameters
     ----------
@@ -70,6 +68,8 @@ def judged(
         Of these data, without effects.
     candidates_of : callable
         See `Guess`.
+    likely : sequence of Fit
+        Sets that were the likeliest on a part of the data.
     """
     leading = leading_sweep_effect(data, base, candidates_of(data, base))
     loaded = data if leading is None else data.loaded

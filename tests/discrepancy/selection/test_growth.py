@@ -267,6 +267,34 @@ def test_what_does_nothing_alone_is_found_beside_what_moves_it(rng):
     assert {member.name for member in growth.ranked[0].candidates} == {"effect_0", "shaft"}
 
 
+@dataclass(eq=False)
+class TurningData(PassingData):
+    """Data in which an effect does something else beside the first one."""
+
+    def force(self, effects):
+        turned = any(part.number == 0 and part.size for part in effects)
+        return sum(
+            (part.size * self.columns[:, part.number + (turned and part.number == 2)])
+            for part in effects
+        ) + np.zeros(N)
+
+
+def test_what_an_effect_does_beside_others_is_asked_before_something_is_outside(rng):
+    """A weight seemed to be no more than the ripple of a brake that it stood beside."""
+    columns = rng.normal(size=(N, 4))
+    columns[:, 2] = columns[:, 0]
+    measured = 9.0 * columns[:, 0] + 3.0 * columns[:, 3] + rng.normal(size=N)
+    part = Sized("outside", np.eye(N), 1.0, 30.0, np.zeros(N), np.zeros(N, dtype=bool))
+    growth = Growth(
+        data := TurningData(measured, columns, np.ones(N), outside=(part,)),
+        fit(data),
+        [candidate(number) for number in range(3)],
+        data,
+    )
+    growth.grow()
+    assert {member.name for member in growth.ranked[0].candidates} == {"effect_0", "effect_2"}
+
+
 def test_an_effect_is_lost_by_what_its_set_is_likelier_for_it(rng):
     """With noise that is known the ratio of the densities at nothing is that of the integrals."""
     columns = rng.normal(size=(N, 3))
