@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -113,7 +115,8 @@ def examine_drive(campaign: Campaign, rules: Rules = RULES) -> DriveFinding:
         of_lines = replace(data, features=features)
         return of_lines, fit(of_lines, start=base.values)
 
-    judged = rattling.judged(*where_only_excite([*harmonics, *exciting]), _candidates)
+    candidates_of = partial(_candidates, above=harmonics)
+    judged = rattling.judged(*where_only_excite([*harmonics, *exciting]), candidates_of)
     # What lower orders leave to something outside, the harmonics do as well; and where no fit
     # follows these, as in a record that then has no steady state, the lower ones are explained.
     if harmonics and judged.verdict.outside <= 0.5:
@@ -197,10 +200,16 @@ def _check_steady(data: Data) -> None:
         raise InvalidInput("believed.effects", names, allowed)
 
 
-def _candidates(data: Data, base: Fit, further: Fit | None = None) -> list[Candidate]:
-    """Return the effects that the lines suggest which the base, and a further fit, leave."""
+def _candidates(
+    data: Data, base: Fit, further: Fit | None = None, above: Sequence[float] = ()
+) -> list[Candidate]:
+    """Return the effects that the lines suggest which the base, and a further fit, leave.
+
+    Strong lines ``above`` the highest order that only excite belong to them: a motor cogs at all
+    of its orders.
+    """
     features, highest = data.features, highest_order(data.campaign, data.rules)
-    clear, seen = list[float](), list[float]()
+    clear, seen = list(above), list[float]()
     for fitted in (base, further) if further is not None else (base,):
         strong = _strong_lines(features, fitted.residuals, data.rules)
         clear += [order for order in strong if not is_among(clear, order)]

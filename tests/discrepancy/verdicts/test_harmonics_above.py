@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 from places import DOCS
 from planted_features import known_data
-from quick_campaigns import quick_campaign
+from quick_campaigns import campaign_with, quick_campaign
 from virtual_rig_cases import effect
 
 from experiments.studies.virtual_rig.rig import draw_rig, run_campaign
+from pymoo_hdte.discrepancy._evidence.order_lines.evidence import training_data
 from pymoo_hdte.discrepancy._evidence.order_lines.features import measure
 from pymoo_hdte.discrepancy._records.believed import MECHANICAL
 from pymoo_hdte.discrepancy._records.line_basis import nyquist_order
@@ -18,8 +19,10 @@ from pymoo_hdte.discrepancy._report.document import base_parameters, effects_of
 from pymoo_hdte.discrepancy._selection.candidate import Layout
 from pymoo_hdte.discrepancy._selection.fitting import fit
 from pymoo_hdte.discrepancy._selection.rules import RULES
-from pymoo_hdte.discrepancy._verdicts.drive import examine_drive
+from pymoo_hdte.discrepancy._verdicts.drive import _candidates, examine_drive
 from pymoo_hdte.discrepancy._verdicts.stated_sensors import beyond_limits
+from pymoo_hdte.drive import LawAtPort
+from pymoo_hdte.effects.ripple import PeriodicTorque
 
 sys.path.insert(0, str(DOCS / "examples"))
 from virtual_campaign import BELIEVED, RIG, torque_ripple
@@ -68,6 +71,20 @@ def test_a_record_has_the_lines_that_it_shows():
             assert np.all(np.isfinite(both))
         kept = wide.values[~shows][:, wide.places(channel)[:-1]]
         assert np.allclose(kept, narrow.values[~shows][:, narrow.places(channel)], rtol=1e-9)
+
+
+def test_a_motor_is_guessed_by_its_lines_that_only_excite():
+    """One of six poles and nine slots was two ripples, as its third line was not compared yet."""
+    ripples = [
+        LawAtPort("torque_ripple", "input", PeriodicTorque(order, 0.3, 0.02))
+        for order in (6.0, 9.0)
+    ]
+    campaign = campaign_with(*ripples)
+    orders = [1.0, 2.0, 2.02, 6.0, 9.0, 18.0]
+    features = measure(campaign, campaign.train, orders, only_exciting=[18.0])
+    data = training_data(campaign, features)
+    labels = {guessed.label for guessed in _candidates(data, fit(data), above=[18.0])}
+    assert "cogging/6+9+18:input" in labels
 
 
 def test_values_share_the_error_of_a_gain_that_left_what_is_stated():
