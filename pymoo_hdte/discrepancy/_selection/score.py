@@ -713,7 +713,7 @@ def _chance_beyond(cut: float, away: Vector, spread: Vector, m: int, one_sided: 
     distance, centre = np.broadcast_arrays(cut / spread, away / spread)
     # Far out a sphere is flat. There the series of the exact chance overflows, or has no end.
     chance = norm.sf(distance - np.hypot(centre, np.sqrt(m - 1.0)))
-    curved = (centre < _FLAT) & (np.abs(distance - centre) < _SURE)
+    curved = (centre < _FLAT) & (distance > centre - _INSIDE) & (distance < centre + _SURE)
     chance[curved] = ncx2.sf(distance[curved] ** 2, m, np.maximum(centre[curved] ** 2, 1e-12))
     return np.asarray(chance)
 
@@ -721,8 +721,8 @@ def _chance_beyond(cut: float, away: Vector, spread: Vector, m: int, one_sided: 
 _FLAT = 100.0
 """Radius of a sphere, in deviations, from which on the chance to be beyond it is that to be beyond
 a plane, to some hundredths of itself."""
-_SURE = 30.0
-"""Deviations beyond which a chance is 0 or 1 to all digits."""
+_INSIDE, _SURE = 10.0, 30.0
+"""Deviations within a sphere, and beyond it, at which the chance is 1 and 0 to all digits."""
 
 
 def _marginal(precision: Matrix, linear: Vector, rows: NDArray[np.int_]) -> tuple[Matrix, Vector]:

@@ -117,12 +117,13 @@ def examine_drive(campaign: Campaign, rules: Rules = RULES) -> DriveFinding:
 
     candidates_of = partial(_candidates, above=harmonics)
     judged = rattling.judged(*where_only_excite([*harmonics, *exciting]), candidates_of)
-    # What lower orders leave to something outside, the harmonics do as well; and where no fit
-    # follows these, as in a record that then has no steady state, the lower ones are explained.
+    # What lower orders leave to something outside, the harmonics do as well; and where no likely
+    # set follows these, as in a record that then has no steady state, the lower ones are explained.
     if harmonics and judged.verdict.outside <= 0.5:
-        of_all = rattling.judged(*where_only_excite(exciting), _candidates, judged.likeliest)
-        if of_all.verdict.outside <= 0.5:
-            judged, unexpected = of_all, [*unexpected, *harmonics]
+        of_all = where_only_excite(exciting)
+        if rattling.may_explain(judged.likeliest, *of_all, _candidates):
+            judged = rattling.judged(*of_all, _candidates, judged.likeliest)
+            unexpected = [*unexpected, *harmonics]
     data, verdict, _ = judged
     return DriveFinding(campaign, data, verdict, tuple(unexpected), rows)
 

@@ -95,6 +95,11 @@ def _explained_without_a_clearance(
         for fitted in of_loaded.likeliest
         if not clearances() & {member.name for member in fitted.candidates}
     ]
+    return may_explain(sets, data, base, candidates_of)
+
+
+def may_explain(sets: Sequence[Fit], data: Data, base: Fit, candidates_of: Guess) -> bool:
+    """Tell whether one of some sets may leave nothing of the data to something outside."""
     if not sets:
         return False
     every = data.with_held_out
