@@ -105,7 +105,6 @@ def examine_drive(campaign: Campaign, rules: Rules = RULES) -> DriveFinding:
     _check_steady(data)
     base = fit(data)
     harmonics, exciting = _beyond(data, base)
-
     orders = sorted([*data.features.orders.tolist(), *harmonics, *exciting])
 
     def where_only_excite(above: list[float]) -> tuple[Data, Fit]:
@@ -120,10 +119,11 @@ def examine_drive(campaign: Campaign, rules: Rules = RULES) -> DriveFinding:
     # What lower orders leave to something outside, the harmonics do as well; and where no likely
     # set follows these, as in a record that then has no steady state, the lower ones are explained.
     if harmonics and judged.verdict.outside <= 0.5:
-        of_all = where_only_excite(exciting)
-        if rattling.may_explain(judged.likeliest, *of_all, _candidates):
-            judged = rattling.judged(*of_all, _candidates, judged.likeliest)
-            unexpected = [*unexpected, *harmonics]
+        everything = where_only_excite(exciting)
+        if rattling.may_explain(judged.likeliest, *everything, _candidates):
+            of_all = rattling.judged(*everything, _candidates, judged.likeliest)
+            if of_all.verdict.outside <= 0.5:
+                judged, unexpected = of_all, [*unexpected, *harmonics]
     data, verdict, _ = judged
     return DriveFinding(campaign, data, verdict, tuple(unexpected), rows)
 

@@ -108,12 +108,7 @@ def may_explain(sets: Sequence[Fit], data: Data, base: Fit, candidates_of: Guess
     return Growth(known, of_every, candidates, LawErrors(known, of_every)).may_do_with(sets)
 
 
-def _judged_on(
-    data: Data,
-    base: Fit,
-    candidates_of: Guess,
-    likely: Sequence[Fit] = (),
-) -> Judged:
+def _judged_on(data: Data, base: Fit, candidates_of: Guess, likely: Sequence[Fit] = ()) -> Judged:
     """Return the verdict on all these data, with the data on the bench that they show.
 
     The likelihood of all records is that of those that are fitted, times the predictive density of
