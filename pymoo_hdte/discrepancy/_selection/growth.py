@@ -172,6 +172,20 @@ class Exchanged(NamedTuple):
     loss: float
 
 
+class Experience(NamedTuple):
+    """What a growth brings along to another noise, or to more data.
+
+    The ``likeliest`` sets, each of other names, which further sets may come from, and what members
+    of sets were ``asked`` for.
+    """
+
+    likeliest: Sequence[Fit]
+    asked: Sequence[Exchanged]
+
+
+NO_EXPERIENCE = Experience((), ())
+
+
 @dataclass(eq=False)
 class Growth:
     """The sets of effects that may explain some data, grown by their probability.
@@ -189,8 +203,8 @@ class Growth:
     guess : callable, optional
         From what a fit leaves to effects that may be missing, known ones among them: small lines
         are seen beside the large ones only when these are explained.
-    asked_before : sequence of Exchanged
-        What was `asked` with another noise.
+    before : Experience
+        With another noise, or on a part of the data.
     """
 
     data: Evidence
@@ -199,7 +213,7 @@ class Growth:
     errors: Errors
     screened: dict[str, Screened] = field(default_factory=dict)
     guess: Callable[[Fit], Sequence[Candidate]] | None = None
-    asked_before: Sequence[Exchanged] = ()
+    before: Experience = NO_EXPERIENCE
     counts: Counter[str] = field(init=False)
     _known: dict[frozenset[str], Weighed] = field(default_factory=dict)
     _invisible: dict[frozenset[str], Invisible] = field(default_factory=dict)
@@ -238,27 +252,23 @@ class Growth:
         return sorted(self._known.values(), key=lambda weighed: -weighed.weight)
 
     @property
-    def likeliest(self) -> list[Fit]:
-        """Fits of the likeliest sets, each of other names, which further sets may come from."""
+    def experience(self) -> Experience:
+        """What other growths may start with."""
         of_names = dict[frozenset[Name], Fit]()
         for weighed in self.ranked:
             of_names.setdefault(weighed.explanation.names, weighed.fit)
-        return list(of_names.values())[:MOST_FIRSTS]
+        return Experience(list(of_names.values())[:MOST_FIRSTS], self._asked)
 
     def grow(self) -> None:
         """Extend, exchange and prune sets until none could become as likely as the best."""
         for _ in self.steps():
             pass
 
-    def steps(self, likely: Sequence[Fit] = ()) -> Iterator[Fit]:
-        """Grow, and yield the fit of the likeliest set whenever another one is.
-
-        Parameters
-        ----------
-        likely : sequence of Fit
-            Sets that were the `likeliest` with another noise, or of a part of the data.
-        """
-        self._weigh_again(likely)
+    def steps(self) -> Iterator[Fit]:
+        """Grow, and yield the fit of the likeliest set whenever another one is."""
+        self._weigh_known()
+        if not self.screened:
+            self._extend(self._known[frozenset()])
         yield from self._settled()
         asked = set[frozenset[str]]()
         while self._lacks_something(best := self.ranked[0]):
@@ -274,15 +284,16 @@ class Growth:
             self._extend(further[0])
             yield from self._settled()
 
-    def may_do_with(self, sets: Sequence[Fit]) -> bool:
-        """Tell whether one of some sets may leave nothing to something outside of the library."""
-        self._weigh_again(sets)
+    @property
+    def may_do_with_known(self) -> bool:
+        """Whether a set that was likely before may leave nothing to something outside."""
+        self._weigh_known()
         return not self._lacks_something(self.ranked[0])
 
-    def _weigh_again(self, sets: Sequence[Fit]) -> None:
-        """Weigh sets that are known from other data, and none."""
+    def _weigh_known(self) -> None:
+        """Weigh sets that were likely before, and none."""
         self._weigh(self.base)
-        for fitted in sets:
+        for fitted in self.before.likeliest:
             self._fit(fitted.candidates, fitted.values)
 
     def _settled(self) -> Iterator[Fit]:
@@ -421,11 +432,11 @@ class Growth:
             and len(exchanged.label - whole) <= 1
             and loss >= exchanged.loss / TRUSTED
             and not self._near(weighed.weight - exchanged.ahead / TRUSTED)
-            for exchanged in [*self.asked_before, *self.asked]
+            for exchanged in [*self.before.asked, *self._asked]
         )
 
     @property
-    def asked(self) -> list[Exchanged]:
+    def _asked(self) -> list[Exchanged]:
         """What became of the sets of which members were exchanged."""
         return [
             Exchanged(label, member, self._ahead(label, member), self._known[label].losses[member])

@@ -107,25 +107,23 @@ def examine_drive(campaign: Campaign, rules: Rules = RULES) -> DriveFinding:
     harmonics, exciting = _beyond(data, base)
     orders = sorted([*data.features.orders.tolist(), *harmonics, *exciting])
 
-    def where_only_excite(above: list[float]) -> tuple[Data, Fit]:
+    def where_only_excite(above: list[float], some: Data) -> tuple[Data, Fit]:
         if orders == data.features.orders.tolist():
             return data, base
-        features = measure(campaign, data.features.records, orders, rules, above)
+        features = measure(campaign, some.features.records, orders, rules, above)
         of_lines = replace(data, features=features)
         return of_lines, fit(of_lines, start=base.values)
 
     candidates_of = partial(_candidates, above=harmonics)
-    judged = rattling.judged(*where_only_excite([*harmonics, *exciting]), candidates_of)
+    judged = rattling.judged(*where_only_excite([*harmonics, *exciting], data), candidates_of)
     # What lower orders leave to something outside, the harmonics do as well; and where no likely
     # set follows these, as in a record that then has no steady state, the lower ones are explained.
     if harmonics and judged.verdict.outside <= 0.5:
-        everything = where_only_excite(exciting)
-        if rattling.may_explain(judged.likeliest, *everything, _candidates):
-            of_all = rattling.judged(*everything, _candidates, judged.likeliest)
-            if of_all.verdict.outside <= 0.5:
-                judged, unexpected = of_all, [*unexpected, *harmonics]
-    data, verdict, _ = judged
-    return DriveFinding(campaign, data, verdict, tuple(unexpected), rows)
+        everything = where_only_excite(exciting, judged.data)
+        of_all = rattling.judged_if_explained(judged, *everything, _candidates)
+        if of_all is not None and of_all.verdict.outside <= 0.5:
+            judged, unexpected = of_all, [*unexpected, *harmonics]
+    return DriveFinding(campaign, judged.data, judged.verdict, tuple(unexpected), rows)
 
 
 def _beyond(data: Data, base: Fit) -> tuple[list[float], list[float]]:

@@ -21,7 +21,12 @@ from pymoo_hdte.discrepancy._evidence.order_lines.law_errors import LawErrors
 from pymoo_hdte.discrepancy._selection.candidate import Candidate, Layout
 from pymoo_hdte.discrepancy._selection.decided import verdict_of
 from pymoo_hdte.discrepancy._selection.fitting import Fit, fit
-from pymoo_hdte.discrepancy._selection.growth import MOST_MEMBERS, Exchanged, Growth
+from pymoo_hdte.discrepancy._selection.growth import (
+    MOST_MEMBERS,
+    NO_EXPERIENCE,
+    Experience,
+    Growth,
+)
 from pymoo_hdte.discrepancy._selection.rules import RULES, Rules
 from pymoo_hdte.discrepancy._selection.screening import Screened
 from pymoo_hdte.discrepancy._selection.verdict import Verdict
@@ -47,14 +52,14 @@ from what they leave."""
 
 
 class Judged(NamedTuple):
-    """The data on the bench that they show, what they show, and sets that others may come from."""
+    """The data on the bench that they show, what they show, and what more data may start with."""
 
     data: Data
     verdict: Verdict
-    likeliest: Sequence[Fit]
+    experience: Experience
 
 
-def judged(data: Data, base: Fit, candidates_of: Guess, likely: Sequence[Fit] = ()) -> Judged:
+def judged(data: Data, base: Fit, candidates_of: Guess) -> Judged:
     """Return the verdict on some data, with the data that it is of.
 
     If sweeps speak for a clearance, records in which it would rattle are left out. If they speak
@@ -68,95 +73,111 @@ def judged(data: Data, base: Fit, candidates_of: Guess, likely: Sequence[Fit] = 
         Of these data, without effects.
     candidates_of : callable
         See `Guess`.
-    likely : sequence of Fit
-        Sets that were the likeliest on a part of the data.
     """
     leading = leading_sweep_effect(data, base, candidates_of(data, base))
     loaded = data if leading is None else data.loaded
     if loaded is data or leading is None:
-        return _judged_on(data, base, candidates_of, likely)
-    of_loaded = _judged_on(loaded, fit(loaded), candidates_of, likely)
+        return _judged_on(data, base, candidates_of)
+    of_loaded = _judged_on(loaded, fit(loaded), candidates_of)
     if effect_named(leading).rattles:
         return of_loaded
-    by_a_clearance = _explains_by_a_clearance(of_loaded.verdict)
-    if by_a_clearance and not _explained_without_a_clearance(data, base, of_loaded, candidates_of):
+    if not _explains_by_a_clearance(of_loaded.verdict):
+        return _judged_on(data, base, candidates_of, of_loaded.experience)
+    overall = judged_if_explained(of_loaded, data, base, candidates_of, without=clearances())
+    if overall is None or overall.verdict.status in ("unlisted", "partial"):
         return of_loaded
-    overall = _judged_on(data, base, candidates_of, of_loaded.likeliest)
-    lacks = overall.verdict.status in ("unlisted", "partial")
-    return of_loaded if by_a_clearance and lacks else overall
+    return overall
 
 
-def _explained_without_a_clearance(
-    data: Data, base: Fit, of_loaded: Judged, candidates_of: Guess
-) -> bool:
-    """Tell whether a likely set of the loaded records may explain all, though nothing parts."""
-    sets = [
+def judged_if_explained(
+    of_part: Judged, data: Data, base: Fit, candidates_of: Guess, without: Collection[str] = ()
+) -> Judged | None:
+    """Return the verdict on data of which a part was judged, or None.
+
+    None where no set that is likely of the part, ``without`` some effects, may leave nothing of the
+    data to something outside.
+    """
+    likely = [
         fitted
-        for fitted in of_loaded.likeliest
-        if not clearances() & {member.name for member in fitted.candidates}
+        for fitted in of_part.experience.likeliest
+        if not {member.name for member in fitted.candidates} & set(without)
     ]
-    return may_explain(sets, data, base, candidates_of)
+    if not likely:
+        return None
+    before = of_part.experience._replace(likeliest=likely)
+    every, growth = _begun(data, base, candidates_of, before)
+    if not growth.may_do_with_known:
+        return None
+    return _judged_by(growth, every, data, base, candidates_of)
 
 
-def may_explain(sets: Sequence[Fit], data: Data, base: Fit, candidates_of: Guess) -> bool:
-    """Tell whether one of some sets may leave nothing of the data to something outside."""
-    if not sets:
-        return False
-    every = data.with_held_out
-    known = every.with_noise_of(sets[0]) or every
-    of_every, candidates = fit(known, start=base.values), candidates_of(data, base)
-    return Growth(known, of_every, candidates, LawErrors(known, of_every)).may_do_with(sets)
+def _judged_on(
+    data: Data, base: Fit, candidates_of: Guess, before: Experience = NO_EXPERIENCE
+) -> Judged:
+    """Return the verdict on all these data, with the data on the bench that they show."""
+    every, growth = _begun(data, base, candidates_of, before)
+    return _judged_by(growth, every, data, base, candidates_of)
 
 
-def _judged_on(data: Data, base: Fit, candidates_of: Guess, likely: Sequence[Fit] = ()) -> Judged:
-    """Return the verdict on all these data, with the data on the bench that they show.
+def _begun(data: Data, base: Fit, candidates_of: Guess, before: Experience) -> tuple[Data, Growth]:
+    """Return the data of all records, with the noise of the set that was likeliest, and a growth.
 
     The likelihood of all records is that of those that are fitted, times the predictive density of
     those that are kept out of fits, with the same coefficients.
     """
-    every = data.with_held_out
+    candidates, every = candidates_of(data, base), data.with_held_out
+    for fitted in before.likeliest[:1]:
+        every = every.with_noise_of(fitted) or every
     of_every = base if every is data else fit(every, start=base.values)
-    known, growth = _grown(every, of_every, candidates_of(data, base), candidates_of, likely)
+    return every, _growth(every, of_every, candidates, candidates_of, before)
+
+
+def _growth(
+    data: Data,
+    base: Fit,
+    candidates: Sequence[Candidate],
+    candidates_of: Guess,
+    before: Experience,
+    screened: dict[str, Screened] | None = None,
+) -> Growth:
+    guess = partial(candidates_of, data, base)
+    return Growth(data, base, candidates, LawErrors(data, base), screened or {}, guess, before)
+
+
+def _judged_by(growth: Growth, every: Data, data: Data, base: Fit, candidates_of: Guess) -> Judged:
+    """Return the verdict by a growth on ``every`` record of some data."""
+    known, growth = _grown(growth, every, candidates_of)
     decision, sets = growth.decide()
     likeliest, bench = sets[0].fit, data
-    if known is not every:
+    if known.reference is not data.reference:
         bench = replace(data, reference=known.reference, reference_effects=known.reference_effects)
     for nuisance, place in likeliest.places:
         if nuisance.nuisance:
             bench = bench.on_bench(nuisance, likeliest.values[place].tolist())
     verdict = verdict_of(bench, decision, sets, base if bench is data else None)
-    return Judged(bench, verdict, growth.likeliest)
+    return Judged(bench, verdict, growth.experience)
 
 
-def _grown(
-    data: Data,
-    base: Fit,
-    candidates: Sequence[Candidate],
-    candidates_of: Guess,
-    likely: Sequence[Fit],
-) -> tuple[Data, Growth]:
+def _grown(growth: Growth, data: Data, candidates_of: Guess) -> tuple[Data, Growth]:
     """Return the sets of effects grown with the noise of the likeliest one, and the data with it.
 
     An effect that moves a resonance changes what an error that does not repeat brings to each
     channel, and one that creeps leaves what fades. Where the likeliest set does so, the sets are
     compared anew: without it, what creeps seemed to be further effects beside a hysteresis.
     """
-    screened, asked = dict[str, Screened](), list[Exchanged]()
-    for renewals in range(MOST_RENEWED + 1):
-        guess, renewed = partial(candidates_of, data, base), None
-        growth = Growth(data, base, candidates, LawErrors(data, base), screened, guess, asked)
-        for fitted in growth.steps(likely):
-            renewed = data.with_noise_of(fitted) if renewals < MOST_RENEWED else None
-            if renewed is not None:
-                break
-        likely, candidates, asked = growth.likeliest, growth.candidates, growth.asked
+    for _ in range(MOST_RENEWED):
+        renewals = map(data.with_noise_of, growth.steps())
+        renewed = next((renewed for renewed in renewals if renewed is not None), None)
         if renewed is None:
-            break
+            return data, growth
         screened = {
             label: replace(effect, signatures=renewed.rewhitened(effect.signatures, data))
             for label, effect in growth.screened.items()
         }
-        data, base = renewed, fit(renewed, start=base.values)
+        base, before = fit(renewed, start=growth.base.values), growth.experience
+        growth = _growth(renewed, base, growth.candidates, candidates_of, before, screened)
+        data = renewed
+    growth.grow()
     return data, growth
 
 

@@ -1,6 +1,7 @@
 """Steady states of records: those without one, where a clearance rattles, and nearby ones."""
 
 from dataclasses import replace
+from functools import partial
 from types import SimpleNamespace
 
 import numpy as np
@@ -21,6 +22,7 @@ from pymoo_hdte.discrepancy._evidence.order_lines.steady_states import (
 )
 from pymoo_hdte.discrepancy._selection.candidate import Layout
 from pymoo_hdte.discrepancy._selection.fitting import fit
+from pymoo_hdte.discrepancy._selection.growth import NO_EXPERIENCE
 from pymoo_hdte.discrepancy._selection.rules import RULES
 from pymoo_hdte.discrepancy._verdicts import rattling
 from pymoo_hdte.drive._effects import LawAtPort
@@ -168,10 +170,15 @@ def test_records_that_rattle_count_unless_a_clearance_explains_all_others(
 
     def judged_on(some, *_):
         whole = len(some.features.records) == len(LOADED_OR_NOT)
-        return rattling.Judged(some, of_all if whole else of_loaded, ())
+        return rattling.Judged(some, of_all if whole else of_loaded, NO_EXPERIENCE)
 
     monkeypatch.setattr(rattling, "_judged_on", judged_on)
-    monkeypatch.setattr(rattling, "_explained_without_a_clearance", lambda *_: True)
+
+    def if_explained(_, some, *others, without):
+        assert "backlash" in without
+        return judged_on(some, *others)
+
+    monkeypatch.setattr(rattling, "judged_if_explained", if_explained)
     found, verdict, _ = rattling.judged(swept, fit(swept), lambda some, base: library(some))
     assert len(found.features.records) == kept
     assert verdict is (of_all if kept == len(LOADED_OR_NOT) else of_loaded)
@@ -179,8 +186,9 @@ def test_records_that_rattle_count_unless_a_clearance_explains_all_others(
 
 def test_all_records_are_not_asked_again_where_a_clearance_cannot_explain_them(monkeypatch, swept):
     """A clearance beside an error took six minutes to find in vain what explains rattling."""
-    monkeypatch.setattr(rattling, "_judged_on", lambda some, *_: rattling.Judged(some, PLAY, ()))
-    monkeypatch.setattr(rattling, "_explained_without_a_clearance", lambda *_: False)
+    play = partial(rattling.Judged, verdict=PLAY, experience=NO_EXPERIENCE)
+    monkeypatch.setattr(rattling, "_judged_on", lambda some, *_: play(some))
+    monkeypatch.setattr(rattling, "judged_if_explained", lambda *_, **__: None)
     found, _, _ = rattling.judged(swept, fit(swept), lambda some, base: library(some))
     assert len(found.features.records) == 6
 
@@ -191,7 +199,8 @@ def test_records_that_rattle_do_not_count_where_sweeps_speak_for_a_clearance(
 ):
     data = known_data(LOADED_OR_NOT)
     monkeypatch.setattr(rattling, "leading_sweep_effect", lambda *_: name)
-    monkeypatch.setattr(rattling, "_judged_on", lambda some, *_: rattling.Judged(some, SOFT, ()))
+    soft = partial(rattling.Judged, verdict=SOFT, experience=NO_EXPERIENCE)
+    monkeypatch.setattr(rattling, "_judged_on", lambda some, *_: soft(some))
     found, _, _ = rattling.judged(data, fit(data), lambda some, base: [])
     assert len(found.features.records) == kept
 
