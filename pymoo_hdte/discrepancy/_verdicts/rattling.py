@@ -126,7 +126,8 @@ def _begun(data: Data, base: Fit, candidates_of: Guess, before: Experience) -> t
     those that are kept out of fits, with the same coefficients.
     """
     candidates, every = candidates_of(data, base), data.with_held_out
-    for fitted in before.likeliest[:1]:
+    for of_part in before.likeliest[:1]:
+        fitted = fit(every, of_part.candidates, of_part.values)
         every = every.with_noise_of(fitted) or every
     of_every = base if every is data else fit(every, start=base.values)
     return every, _growth(every, of_every, candidates, candidates_of, before)
