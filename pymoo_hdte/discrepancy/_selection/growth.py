@@ -508,13 +508,6 @@ class Growth:
             for candidate in self.candidates
             if not candidate.instead_of and all(candidate.goes_with(member) for member in members)
         ]
-        if self._lacks_evident(members):
-            # To first order what parts now and then does nothing.
-            for candidate in candidates:
-                for start in candidate.starts if candidate.name in self.data.evident else ():
-                    values = np.append(weighed.fit.values, start)
-                    self._fit((*members, candidate), values, again=True)
-            return
         integral = Integral(weighed.linearised)
         integral.score()
         n = len(weighed.linearised.residuals)
@@ -533,6 +526,13 @@ class Growth:
         screened = screen(self.data, weighed.fit, candidates)
         if not members:
             self.screened.update((effect.candidate.label, effect) for effect in screened)
+        if self._lacks_evident(members):
+            # To first order what parts now and then does nothing.
+            for candidate in candidates:
+                for start in candidate.starts if candidate.name in self.data.evident else ():
+                    values = np.append(weighed.fit.values, start)
+                    self._fit((*members, candidate), values, again=True)
+            return
         gains = self._gains(integral, screened, n)
         ranked = np.argsort(-gains, kind="stable")
         taken = Counter[str]()
