@@ -25,8 +25,9 @@ LEAST_ERROR, MOST_ERROR = 1e-3, 0.3
 """Range of the relative error of a law's form. The lower end is the accuracy of the models; beyond
 the upper end it is another law."""
 _LEAST_SHARE = 1e-3
-"""Least of a further line or level of an effect, as a share of its largest: it may be as good as
-absent. Any other size of a law has to be visible: a law without it has another name."""
+"""Least of a further line or level of an effect, as a share of its largest, unless the data tell
+that from nothing: it may be absent. Any other size of a law has to be visible: a law without it has
+another name."""
 _NO_NOISE = 0.03
 """Size at which a change is nothing, in standard deviations of the noise: a hundred of them change
 no logarithm of odds by 0.1."""
@@ -199,10 +200,11 @@ def _size(
 ) -> Sized:
     scale = parameters[0].scale
     most = max(abs(parameters[0].lower), parameters[0].upper) / scale
+    nothing = _NO_NOISE / max(float(np.linalg.norm(columns, axis=0).max()), _NO_NOISE / most)
     return Sized(
         f"{candidate.label} {parameters[0].name}",
         columns,
-        _LEAST_SHARE * most if further else 0.0,
+        min(_LEAST_SHARE * most, nothing) if further else 0.0,
         most,
         values / scale,
         np.array([parameter.lower >= 0.0 for parameter in parameters]),
