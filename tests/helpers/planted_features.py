@@ -18,7 +18,7 @@ from pymoo_hdte.discrepancy._evidence.order_lines.torsion_curve import TorsionPo
 from pymoo_hdte.discrepancy._selection.candidate import Layout
 from pymoo_hdte.discrepancy._selection.fitting import fit
 from pymoo_hdte.discrepancy._selection.hypothesis import Hypothesis
-from pymoo_hdte.discrepancy._verdicts import rattling
+from pymoo_hdte.discrepancy._verdicts import records_judged
 from pymoo_hdte.discrepancy._verdicts.drive_finding import DriveFinding
 from pymoo_hdte.drive import mean_torsion
 from pymoo_hdte.units import ARCSEC, REVOLUTION_PER_MINUTE
@@ -132,4 +132,4 @@ def analysed(data, status="unlisted", candidate=None, start=()):
 
 def judged(data, candidates):
     """Return the verdict on planted data."""
-    return rattling._judged_on(data, fit(data), lambda *_: candidates)[1]
+    return records_judged._judged_on(data, fit(data), lambda *_: candidates)[1]

@@ -35,7 +35,7 @@ from pymoo_hdte.discrepancy._records.records import RunningRecord
 from pymoo_hdte.discrepancy._selection.candidate import Candidate
 from pymoo_hdte.discrepancy._selection.fitting import Fit, fit
 from pymoo_hdte.discrepancy._selection.rules import RULES, Rules
-from pymoo_hdte.discrepancy._verdicts import rattling
+from pymoo_hdte.discrepancy._verdicts import rattling, records_judged
 from pymoo_hdte.discrepancy._verdicts.drive_finding import DriveFinding
 from pymoo_hdte.drive import harmonic_balance
 from pymoo_hdte.drive._solve.free_angle import torus_of
@@ -115,12 +115,12 @@ def examine_drive(campaign: Campaign, rules: Rules = RULES) -> DriveFinding:
         return of_lines, fit(of_lines, start=base.values)
 
     candidates_of = partial(_candidates, above=harmonics)
-    judged = rattling.judged(*where_only_excite([*harmonics, *exciting], data), candidates_of)
+    judged = records_judged.judged(*where_only_excite([*harmonics, *exciting], data), candidates_of)
     # What lower orders leave to something outside, the harmonics do as well; and where no likely
     # set follows these, as in a record that then has no steady state, the lower ones are explained.
     if harmonics and judged.verdict.outside <= 0.5:
         everything = where_only_excite(exciting, judged.data)
-        of_all = rattling.judged_if_explained(judged, *everything, _candidates)
+        of_all = records_judged.judged_if_explained(judged, *everything, _candidates)
         if of_all is not None and of_all.verdict.outside <= 0.5:
             judged, unexpected = of_all, [*unexpected, *harmonics]
     return DriveFinding(campaign, judged.data, judged.verdict, tuple(unexpected), rows)

@@ -24,7 +24,7 @@ from pymoo_hdte.discrepancy._selection.candidate import Layout
 from pymoo_hdte.discrepancy._selection.fitting import fit
 from pymoo_hdte.discrepancy._selection.growth import NO_EXPERIENCE
 from pymoo_hdte.discrepancy._selection.rules import RULES
-from pymoo_hdte.discrepancy._verdicts import rattling
+from pymoo_hdte.discrepancy._verdicts import rattling, records_judged
 from pymoo_hdte.drive._effects import LawAtPort
 from pymoo_hdte.effects.hysteresis import MaxwellSlip
 from pymoo_hdte.effects.stiffness import SoftWindup
@@ -131,7 +131,7 @@ def swept():
     rng = np.random.default_rng(5)
     data, _ = measured((), rng, known_data(LOADED_OR_NOT))
     data = with_sweep(data, listed(data, "soft_windup").build((0.3, 3e-4, 3.0)), rng)
-    assert rattling.leading_sweep_effect(data, rattling.fit(data), library(data)) == "soft_windup"
+    assert rattling.leading_sweep_effect(data, fit(data), library(data)) == "soft_windup"
     return data
 
 
@@ -170,26 +170,26 @@ def test_records_that_rattle_count_unless_a_clearance_explains_all_others(
 
     def judged_on(some, *_):
         whole = len(some.features.records) == len(LOADED_OR_NOT)
-        return rattling.Judged(some, of_all if whole else of_loaded, NO_EXPERIENCE)
+        return records_judged.Judged(some, of_all if whole else of_loaded, NO_EXPERIENCE)
 
-    monkeypatch.setattr(rattling, "_judged_on", judged_on)
+    monkeypatch.setattr(records_judged, "_judged_on", judged_on)
 
     def if_explained(_, some, *others, without):
         assert "backlash" in without
         return judged_on(some, *others)
 
-    monkeypatch.setattr(rattling, "judged_if_explained", if_explained)
-    found, verdict, _ = rattling.judged(swept, fit(swept), lambda some, base: library(some))
+    monkeypatch.setattr(records_judged, "judged_if_explained", if_explained)
+    found, verdict, _ = records_judged.judged(swept, fit(swept), lambda some, base: library(some))
     assert len(found.features.records) == kept
     assert verdict is (of_all if kept == len(LOADED_OR_NOT) else of_loaded)
 
 
 def test_all_records_are_not_asked_again_where_a_clearance_cannot_explain_them(monkeypatch, swept):
     """A clearance beside an error took six minutes to find in vain what explains rattling."""
-    play = partial(rattling.Judged, verdict=PLAY, experience=NO_EXPERIENCE)
-    monkeypatch.setattr(rattling, "_judged_on", lambda some, *_: play(some))
-    monkeypatch.setattr(rattling, "judged_if_explained", lambda *_, **__: None)
-    found, _, _ = rattling.judged(swept, fit(swept), lambda some, base: library(some))
+    play = partial(records_judged.Judged, verdict=PLAY, experience=NO_EXPERIENCE)
+    monkeypatch.setattr(records_judged, "_judged_on", lambda some, *_: play(some))
+    monkeypatch.setattr(records_judged, "judged_if_explained", lambda *_, **__: None)
+    found, _, _ = records_judged.judged(swept, fit(swept), lambda some, base: library(some))
     assert len(found.features.records) == 6
 
 
@@ -198,10 +198,10 @@ def test_records_that_rattle_do_not_count_where_sweeps_speak_for_a_clearance(
     monkeypatch, name, kept
 ):
     data = known_data(LOADED_OR_NOT)
-    monkeypatch.setattr(rattling, "leading_sweep_effect", lambda *_: name)
-    soft = partial(rattling.Judged, verdict=SOFT, experience=NO_EXPERIENCE)
-    monkeypatch.setattr(rattling, "_judged_on", lambda some, *_: soft(some))
-    found, _, _ = rattling.judged(data, fit(data), lambda some, base: [])
+    monkeypatch.setattr(records_judged, "leading_sweep_effect", lambda *_: name)
+    soft = partial(records_judged.Judged, verdict=SOFT, experience=NO_EXPERIENCE)
+    monkeypatch.setattr(records_judged, "_judged_on", lambda some, *_: soft(some))
+    found, _, _ = records_judged.judged(data, fit(data), lambda some, base: [])
     assert len(found.features.records) == kept
 
 

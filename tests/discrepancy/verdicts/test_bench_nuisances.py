@@ -10,7 +10,7 @@ from pymoo_hdte.discrepancy._evidence.order_lines.bench import IDEAL
 from pymoo_hdte.discrepancy._evidence.order_lines.candidates import drive_candidates
 from pymoo_hdte.discrepancy._evidence.order_lines.sizes import port_sizes
 from pymoo_hdte.discrepancy._selection.fitting import fit
-from pymoo_hdte.discrepancy._verdicts import rattling
+from pymoo_hdte.discrepancy._verdicts import records_judged
 from pymoo_hdte.drive import LawAtPort
 from pymoo_hdte.drive._effects import (
     BenchResonance,
@@ -82,7 +82,7 @@ def test_a_weight_at_the_shaft_of_a_load_is_known_exactly():
 
 def verdict_on(effects, seed=6):
     data, _ = measured(effects, np.random.default_rng(seed), DATA)
-    data, verdict, _ = rattling.judged(data, fit(data), candidates_of)
+    data, verdict, _ = records_judged.judged(data, fit(data), candidates_of)
     shown = data.bench.shown(verdict.accepted, verdict.rules)
     return verdict, [nuisance.name for nuisance, _ in shown], data
 
