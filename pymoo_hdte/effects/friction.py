@@ -298,7 +298,10 @@ class PeriodicFriction(Periodic):
 
 
 def _varying(sizes: Sizes) -> list[Guess]:
-    """Guess friction that varies about a mean, which is Coulomb's."""
+    """Guess friction that varies about a mean, which is Coulomb's.
+
+    It has to have one: a friction that is negative for half of a turn is a torque ripple.
+    """
     guesses = []
     for family in sizes.varying:
         mean = unknown("mean", 0.0, sizes.largest, sizes.force, linear=True)

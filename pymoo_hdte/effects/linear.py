@@ -156,7 +156,11 @@ def _spring(sizes: Sizes) -> list[Guess]:
         # Far from zero a weak spring makes a large force there.
         unknowns = (
             unknown("coefficient", 0.0, most, typical, linear=True),
-            unknown("force", -FURTHEST * largest, FURTHEST * largest, sizes.force, linear=True),
+            unknown(
+                *("force", -FURTHEST * largest, FURTHEST * largest, sizes.force),
+                linear=True,
+                may_vanish=True,
+            ),
         )
         guesses.append(
             Guess(

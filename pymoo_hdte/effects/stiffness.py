@@ -329,11 +329,12 @@ def guess_of_clearance(
 
         unknowns = (
             *wave("variation", widest / 2.0, size),
-            unknown("narrowest", 0.0, widest, size, linear=True),
+            unknown("narrowest", 0.0, widest, size, linear=True, may_vanish=True),
         )
         shapes: list[tuple[int, ...]] = [(1, 0, 1), (0, 1, 1), (0, 0, 1)]
         if sizes.swept:
-            unknowns = (*unknowns, unknown("locked", 0.0, 2.0 * widest, size, linear=True))
+            locked = unknown("locked", 0.0, 2.0 * widest, size, linear=True, may_vanish=True)
+            unknowns = (*unknowns, locked)
             shapes = [(1, 0, 1, 1), (0, 1, 1, 1), (0, 0, 1, 1), (0, 0, 1, 2)]
         starts = [[size * factor for factor in shape] for shape in shapes]
         guesses.append(Guess(unknowns, starts, build, Family((order,))))

@@ -25,9 +25,9 @@ LEAST_ERROR, MOST_ERROR = 1e-3, 0.3
 """Range of the relative error of a law's form. The lower end is the accuracy of the models; beyond
 the upper end it is another law."""
 _LEAST_SHARE = 1e-3
-"""Least of a further line or level of an effect, as a share of its largest, unless the data tell
-that from nothing: it may be absent. Any other size of a law has to be visible: a law without it has
-another name."""
+"""Least of a further line of an effect, or of a size that may vanish, as a share of its largest,
+unless the data tell that from nothing: it may be absent. Any other size of a law has to be visible:
+a law without it has another name."""
 _NO_NOISE = 0.03
 """Size at which a change is nothing, in standard deviations of the noise: a hundred of them change
 no logarithm of odds by 0.1."""
@@ -75,7 +75,8 @@ def linearise(
             parameters = [candidate.parameters[row] for row in rows]
             at = [place.start + row for row in rows]
             if _is_size(parameters[0]):
-                further = parameters[0].may_vanish or (rows[0] > 0 and candidate.linear)
+                first = parameters[0]
+                further = first.may_vanish or (first.begins_line and rows[0] > 0)
                 sized.append(
                     _size(candidate, parameters, columns[:, at], fitted.values[at], further)
                 )

@@ -8,14 +8,14 @@ import pytest
 from pymoo_hdte.discrepancy._selection.candidate import Candidate
 from pymoo_hdte.discrepancy._selection.linearised import linearise
 from pymoo_hdte.discrepancy._selection.score import score
-from pymoo_hdte.effects.unknowns import wave
+from pymoo_hdte.effects.unknowns import unknown, wave
 
 N = 40
 
 
-def ripple_known_to(precision, harmonics):
+def ripple_known_to(precision, harmonics=(1,), *further):
     """A fitted ripple of which the data show the first line alone, as a hypothesis."""
-    parameters = wave("amplitude", largest=80.0, typical=1.0, harmonics=harmonics)
+    parameters = (*wave("amplitude", largest=80.0, typical=1.0, harmonics=harmonics), *further)
     candidate = Candidate("ripple", "", parameters, (), lambda values: (), "", exact=True)
     columns = np.linalg.qr(np.random.default_rng(4).normal(size=(N, 4)))[0] / precision
     values = np.array([2.0, -1.0, 0.0, 0.0])[: len(parameters)]
@@ -40,3 +40,11 @@ def test_a_harmonic_that_is_absent_costs_little_however_well_that_is_known(preci
     """
     line, both = (score(ripple_known_to(precision, which)).ln for which in ((1,), (1, 2)))
     assert -3.0 < both - line < 0.0
+
+
+@pytest.mark.parametrize(("may_vanish", "low", "high"), [(True, -2.0, 0.0), (False, -np.inf, -7.0)])
+def test_a_size_that_a_law_cannot_do_without_has_to_be_visible(may_vanish, low, high):
+    """Friction that varies about nothing took the place of a coupling that is out of line."""
+    mean = unknown("mean", 0.0, 80.0, 1.0, linear=True, may_vanish=may_vanish)
+    line, both = (score(ripple_known_to(1e-4, (1,), *which)).ln for which in ((), (mean,)))
+    assert low < both - line < high
