@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,7 +50,7 @@ class Parameter:
         Name of the amplitude of the line whose phase it is; empty for other unknowns.
     may_vanish : bool
         Whether the effect is still itself with zero, and no other effect: a size beside that by
-        which it is named.
+        which it is named, as a further line.
     """
 
     name: str
@@ -116,16 +116,16 @@ def wave(
     for multiple in harmonics:
         size = typical if multiple == 1 else _HARMONIC_SHARE * typical
         start = typical if multiple == 1 else 0.0
-        parameters += _parts(f"{HARMONIC_NAMES[multiple - 1]}{name}", start, largest, size)
+        name_of_line = f"{HARMONIC_NAMES[multiple - 1]}{name}"
+        parameters += [
+            Parameter(
+                *(f"{name_of_line}{part}", begin, -largest, largest, size),
+                linear=True,
+                may_vanish=multiple > 1,
+            )
+            for part, begin in ((_COSINE, start), (_SINE, 0.0))
+        ]
     return tuple(parameters)
-
-
-def _parts(name: str, start: float, largest: float, size: float) -> list[Parameter]:
-    """Return cosine and sine part of one line."""
-    return [
-        Parameter(f"{name}{part}", begin, -largest, largest, size, linear=True)
-        for part, begin in ((_COSINE, start), (_SINE, 0.0))
-    ]
 
 
 def number_of(name: str) -> str:
@@ -191,8 +191,8 @@ class Family:
             multiples = [round(order / self.orders[0]) for order in self.orders]
             return wave(name, largest, typical, multiples)
         return tuple(
-            part
-            for order in self.orders
+            replace(part, may_vanish=place > 0)
+            for place, order in enumerate(self.orders)
             for part in wave(f"order_{order:g}_{name}", largest, typical)
         )
 

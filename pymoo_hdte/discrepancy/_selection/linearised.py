@@ -25,9 +25,8 @@ LEAST_ERROR, MOST_ERROR = 1e-3, 0.3
 """Range of the relative error of a law's form. The lower end is the accuracy of the models; beyond
 the upper end it is another law."""
 _LEAST_SHARE = 1e-3
-"""Least of a further line of an effect, or of a size that may vanish, as a share of its largest,
-unless the data tell that from nothing: it may be absent. Any other size of a law has to be visible:
-a law without it has another name."""
+"""Least of a size that may vanish, as a share of its largest, unless the data tell that from
+nothing. Any other size of a law has to be visible: a law without it has another name."""
 _NO_NOISE = 0.03
 """Size at which a change is nothing, in standard deviations of the noise: a hundred of them change
 no logarithm of odds by 0.1."""
@@ -75,11 +74,7 @@ def linearise(
             parameters = [candidate.parameters[row] for row in rows]
             at = [place.start + row for row in rows]
             if _is_size(parameters[0]):
-                first = parameters[0]
-                further = first.may_vanish or (first.begins_line and rows[0] > 0)
-                sized.append(
-                    _size(candidate, parameters, columns[:, at], fitted.values[at], further)
-                )
+                sized.append(_size(candidate, parameters, columns[:, at], fitted.values[at]))
             elif _is_ratio(parameters[0]):
                 sized.append(_ratio(candidate, parameters[0], columns[:, at], fitted.values[at]))
             else:
@@ -197,19 +192,18 @@ def _size(
     parameters: Sequence[Parameter],
     columns: NDArray[np.float64],
     values: Vector,
-    further: bool,
 ) -> Sized:
-    scale = parameters[0].scale
+    scale, may_vanish = parameters[0].scale, parameters[0].may_vanish
     most = max(abs(parameters[0].lower), parameters[0].upper) / scale
     nothing = _NO_NOISE / max(float(np.linalg.norm(columns, axis=0).max()), _NO_NOISE / most)
     return Sized(
         f"{candidate.label} {parameters[0].name}",
         columns,
-        min(_LEAST_SHARE * most, nothing) if further else 0.0,
+        min(_LEAST_SHARE * most, nothing) if may_vanish else 0.0,
         most,
         values / scale,
         np.array([parameter.lower >= 0.0 for parameter in parameters]),
-        not further,
+        not may_vanish,
         of_effect=True,
     )
 
