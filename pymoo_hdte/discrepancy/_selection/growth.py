@@ -309,7 +309,7 @@ class Growth:
                 continue
             weighed, best = self._open(), self.ranked[0]
             label = label_of(best.candidates)
-            if self.screened and label not in self._equipped:
+            if label not in self._equipped:
                 continue
             first, varied = label not in self._varied, self._varied.setdefault(label, set())
             if first or (weighed is None and varied < label):
@@ -511,7 +511,7 @@ class Growth:
         integral = Integral(weighed.linearised)
         integral.score()
         n = len(weighed.linearised.residuals)
-        if self.screened and not every:
+        if not every:
             before = [self.screened[c.label] for c in candidates if c.label in self.screened]
             hopeful = self._gains(integral, before, n)
             # A shaft that gives way does nothing until something else moves it.
@@ -552,10 +552,9 @@ class Growth:
         """Fit a set with the nuisances that it lacks by far; tell whether that is the likeliest.
 
         A bench may have ten, and one after the other takes ten searches. To first order is enough:
-        what is one too many is left out afterwards. Nothing is known of them before the base is
-        extended.
+        what is one too many is left out afterwards.
         """
-        if (label := label_of(weighed.candidates)) in self._equipped or not self.screened:
+        if (label := label_of(weighed.candidates)) in self._equipped:
             return False
         self._equipped.add(label)
         self._guess_further(weighed.fit)
@@ -676,7 +675,7 @@ class Growth:
         label = label_of(others)
         if label in self._invisible:
             return None
-        if member.releases is not None or not self.screened:
+        if member.releases is not None:
             self._trial(others, values)
             return self._known.get(label)
         linearised = weighed.without(member)

@@ -107,10 +107,10 @@ def examine_drive(campaign: Campaign, rules: Rules = RULES) -> DriveFinding:
     harmonics, exciting = _beyond(data, base)
     orders = sorted([*data.features.orders.tolist(), *harmonics, *exciting])
 
-    def where_only_excite(above: list[float], some: Data) -> tuple[Data, Fit]:
+    def where_only_excite(above: list[float], of: Data) -> tuple[Data, Fit]:
         if orders == data.features.orders.tolist():
             return data, base
-        features = measure(campaign, some.features.records, orders, rules, above)
+        features = measure(campaign, of.features.records, orders, rules, above)
         of_lines = replace(data, features=features)
         return of_lines, fit(of_lines, start=base.values)
 

@@ -353,6 +353,8 @@ def test_a_chance_beyond_a_distance_is_known_however_far_that_is(m):
     sizes = np.logspace(-12.0, 12.0, 481)
     chances = np.array([_chance_beyond(cut, sizes, np.ones(481), m, False) for cut in sizes])
     assert np.all((chances >= 0.0) & (chances <= 1.0))
+    # Between these the series and the plane meet, where chances of 1e-150 become 1e-110.
+    assert np.all(np.diff(chances[::10, ::10], axis=0) <= 0.0)
     assert np.all(np.diff(chances, axis=0) <= 1e-12)
     assert np.all(np.diff(chances, axis=1) >= -1e-12)
     for centre, beyond in ((90.0, 2.0), (110.0, 2.0), (110.0, -2.0), (1.0, 3.0), (0.0, 40.0)):
