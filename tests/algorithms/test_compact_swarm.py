@@ -379,6 +379,7 @@ def test_a_history_holds_each_generation_as_it_was():
     assert model._told[0].X is later._told[0].X
 
 
+@pytest.mark.slow
 def test_a_history_takes_at_most_three_times_the_memory_of_nsga2_s():
     """It has nine times as many generations, which share what does not change."""
     sizes = []

@@ -74,6 +74,7 @@ def test_an_example_is_not_written_over_anything(gear, capsys):
     assert "new or empty" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_the_map_is_the_model_over_speed_load_and_direction(tmp_path):
     out = tmp_path / "map"
     load = ("--load", "-20", "--speed", "1500")
@@ -129,6 +130,7 @@ def test_a_printed_accuracy_changes_as_that_of_the_parts():
     assert both[1].nominal.static_error == pytest.approx(expected)
 
 
+@pytest.mark.slow
 def test_what_has_no_influence_is_said_and_not_chosen(monkeypatch):
     """A lever that does nothing is idle; of the other, the best setting within the limits."""
     nothing = Lever("nothing", 1.0, (0.5, 1.0, 2.0), lambda figures, parts, s: (figures, parts), "")

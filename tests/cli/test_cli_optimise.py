@@ -60,6 +60,7 @@ def front(written):
         return np.array(list(csv.reader(file))[1:], dtype=float)
 
 
+@pytest.mark.slow
 def test_the_front_holds_what_the_drive_model_says_of_its_designs(front, document):
     problem = RobustDTEDirect(box=BOX, nodes=document["settings"]["nodes"])
     rows = [0, len(front) // 2, -1]
@@ -68,6 +69,7 @@ def test_the_front_holds_what_the_drive_model_says_of_its_designs(front, documen
     assert np.all(np.diff(front[:, 1]) < 0.0)
 
 
+@pytest.mark.slow
 def test_each_preference_has_its_design(front, document):
     for word, weights in PREFERENCES.items():
         row = WeightedUtopia(weights).do(front[:, :2])
@@ -78,6 +80,7 @@ def test_each_preference_has_its_design(front, document):
         assert (found["mean_dte_arcsec"], found["std_dte_arcsec"]) == tuple(front[row, :2])
 
 
+@pytest.mark.slow
 def test_the_chosen_drive_reads_back_and_has_the_dte_of_its_design(written, document):
     sheet = load_datasheet(written / "optimum_sheet.toml")
     model = load_model(written / "optimum_model.toml", sheet)
@@ -89,6 +92,7 @@ def test_the_chosen_drive_reads_back_and_has_the_dte_of_its_design(written, docu
     assert model.effects == preset("calibrated").effects
 
 
+@pytest.mark.slow
 def test_limits_to_order_enclose_the_design_by_the_tolerance(document):
     for name, band in document["tolerance_band"].items():
         value = document["designs"]["balanced"][name]["value"]
@@ -102,6 +106,7 @@ def put_cycle(folder):
     return cycle
 
 
+@pytest.mark.slow
 def test_the_command_writes_what_it_prints(tmp_path, capsys):
     out = tmp_path / "out"
     arguments = ("--cycle", put_cycle(tmp_path), "--model", "published", "--out", out, "--json")
@@ -125,6 +130,7 @@ def test_the_command_writes_the_bytes_of_the_study(tmp_path):
         assert (again / name).read_bytes() == (out / name).read_bytes()
 
 
+@pytest.mark.slow
 def test_another_preference_goes_into_the_sheet(study, tmp_path, document):
     optimum_report.write_optimum_report(
         replace(study, preference="robustness_first"), (), tmp_path / "out"
@@ -273,6 +279,7 @@ class TestStudy:
         for name in free:
             assert re.search(rf"\b{name}\b(?! \d)", words)
 
+    @pytest.mark.slow
     def test_the_report_puts_no_number_of_a_free_variable_among_limits(self, written, study):
         page = (written / "report.html").read_text()
         limits = page.split("<h2>Limits to order</h2>")[1].split("</table>")[0]

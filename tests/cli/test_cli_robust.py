@@ -115,6 +115,7 @@ def rows_of(path):
     return header, np.array(rows, dtype=float)
 
 
+@pytest.mark.slow
 def test_the_first_study_runs_as_the_page_prints_it(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     block = next(b for b in re.findall(r"```sh\n(.*?)```", PAGE, re.S) if "pymoo-hdte robust" in b)
@@ -155,6 +156,7 @@ def test_the_first_study_replaces_nothing(folder, capsys):
     assert robust("study.txt", "--example") == cli.MISTAKE
 
 
+@pytest.mark.slow
 def test_a_program_and_a_function_give_the_same_front(folder):
     written(folder)
     written(folder, of_program(), name="program.toml")
@@ -168,6 +170,7 @@ def test_a_program_and_a_function_give_the_same_front(folder):
     assert front[:, 0].min() == pytest.approx(np.sqrt(1.5 - 0.05**2), abs=2e-3)
 
 
+@pytest.mark.slow
 def test_finished_runs_are_not_made_again(folder):
     counting = "    with open('calls', 'a') as file:\n        file.write('x')\n    return"
     (folder / "steps_of_a_test.py").write_text(STAIRCASE.replace("    return", counting))
@@ -181,6 +184,7 @@ def test_finished_runs_are_not_made_again(folder):
     assert robust("study.toml", "--out", "report", "--quiet") == cli.MISTAKE
 
 
+@pytest.mark.slow
 def test_ctrl_c_tells_where_finished_runs_are_and_the_command_goes_on(folder):
     slow = STAIRCASE.replace("    return", "    time.sleep(0.05)\n    return")
     (folder / "steps_of_a_test.py").write_text("import time\n" + slow)
@@ -444,6 +448,7 @@ at_most = 0.1
     assert norm.isf(study.goals["constraints"][0].bound) > 0.0
 
 
+@pytest.mark.slow
 def test_an_inaccurate_surrogate_is_an_error_and_its_runs_remain(folder, capsys):
     rough = STAIRCASE.replace("x * load", "int(1e4 * x * load) % 7")
     (folder / "steps_of_a_test.py").write_text(rough)
@@ -504,6 +509,7 @@ def test_a_simulator_that_always_fails_is_the_mistake(folder, capsys):
     assert "ZeroDivisionError" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_a_program_that_hangs_is_ended_with_its_run_and_leaves_no_folder(folder, monkeypatch):
     temporary = folder / "temporary"
     temporary.mkdir()

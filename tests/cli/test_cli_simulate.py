@@ -38,6 +38,7 @@ def document(written):
     return json.loads((written / "simulation.json").read_text())
 
 
+@pytest.mark.slow
 def test_the_dte_is_that_of_the_model_there(document):
     model = preset("calibrated").at(1500.0 * REVOLUTION_PER_MINUTE, 20.0)
     (expected,) = model.dte_arcsec(model.nominal[None])
@@ -46,6 +47,7 @@ def test_the_dte_is_that_of_the_model_there(document):
     assert document["input_speed_r_min"] == pytest.approx(1500.0)
 
 
+@pytest.mark.slow
 def test_the_turn_has_the_dte_and_the_order_lines(written, document):
     _, turn = table(written / "transmission_error.csv")
     angle, error = turn[:, 1], turn[:, 3]
@@ -61,6 +63,7 @@ def test_the_turn_has_the_dte_and_the_order_lines(written, document):
     assert projected == pytest.approx(amplitude, rel=0.01)
 
 
+@pytest.mark.slow
 def test_the_speeds_hold_this_one_and_the_resonances_their_peaks(written, document):
     _, speeds = table(written / "speeds.csv")
     at = np.abs(speeds[:, 0] - 1500.0).argmin()
@@ -93,6 +96,7 @@ def test_a_resonance_nearby_is_said(tmp_path, capsys):
     assert "DTE" in printed.split("\n")[0]
 
 
+@pytest.mark.slow
 def test_files_of_a_drive_are_taken(written, tmp_path):
     (tmp_path / "sheet.toml").write_text(sheet_toml(hs_20_100()))
     (tmp_path / "model.toml").write_text(model_toml(preset("calibrated")))
@@ -104,6 +108,7 @@ def test_files_of_a_drive_are_taken(written, tmp_path):
         assert (tmp_path / "files" / name).read_bytes() == (written / name).read_bytes()
 
 
+@pytest.mark.slow
 def test_the_ratio_of_a_sheet_that_does_not_say_which_member_is_held_is_said(tmp_path):
     sheet, model = tmp_path / "sheet.toml", tmp_path / "model.toml"
     said = (DOCS / "examples" / "my_drive.toml").read_text(encoding="utf-8")

@@ -298,6 +298,7 @@ def reported(tmp_path_factory):
     return top
 
 
+@pytest.mark.slow
 def test_every_file_is_there(reported):
     # The model that describes is one of mechanisms.
     assert files_of(reported / "one").keys() == {*FOLDER.files} - {"descriptive_model.toml"}
@@ -310,6 +311,7 @@ def test_the_command_writes_the_bytes_of_the_calls_in_python(reported, tmp_path)
     assert files_of(tmp_path / "other") == files_of(reported / "one")
 
 
+@pytest.mark.slow
 def test_the_verdict_holds_what_was_promised(reported):
     verdict = json.loads((reported / "one" / "verdict.json").read_text())
     assert verdict["status"] == "named"
@@ -340,6 +342,7 @@ def test_the_verdict_holds_what_was_promised(reported):
     assert verdict["revised_model"] == {"file": "revised_model.toml"}
 
 
+@pytest.mark.slow
 def test_the_revised_model_is_read_and_simulated(reported):
     out = reported / "one"
     sheet = load_datasheet(out / "revised_model_sheet.toml")

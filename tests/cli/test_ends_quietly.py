@@ -82,6 +82,7 @@ def test_ctrl_c_during_early_imports(module, tmp_path):
     assert done.returncode == INTERRUPTED
 
 
+@pytest.mark.slow
 def test_ctrl_c_after_the_folder_is_held_leaves_nothing(tmp_path):
     arguments = ["discrepancy", "none", "--out", "new/out"]
     module = "pymoo_hdte.discrepancy._records.campaign_keys"

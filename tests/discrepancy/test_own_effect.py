@@ -67,6 +67,7 @@ def report(tmp_path_factory):
     return out
 
 
+@pytest.mark.slow
 def test_drive_overcomes_it():
     calm = preset("published")
     draggy = replace(calm, effects=(LawAtPort("eyring_drag", "input", PLANTED),))
@@ -101,6 +102,7 @@ def test_robust_problem_takes_it(drive):
     assert np.any(difference != 0.0)
 
 
+@pytest.mark.slow
 def test_campaign_names_it(analysis):
     verdict = analysis.verdict
     assert verdict.status == "named"
@@ -128,6 +130,7 @@ def revised(report):
     return load_model(report / "revised_model.toml", sheet)
 
 
+@pytest.mark.slow
 def test_revised_model_has_it(revised, analysis):
     assert revised == analysis.revised_model()
     (drag,) = [one for one in revised.effects if one.name == "eyring_drag"]

@@ -65,6 +65,7 @@ def test_a_machine_without_friction_needs_none():
     assert clean.revised_model().values["damping"] == pytest.approx(DAMPING, rel=0.01)
 
 
+@pytest.mark.slow
 def test_dry_friction_is_named_with_its_level(analysis):
     assert analysis.verdict.status == "named"
     (friction,) = analysis.revised_model().effects
@@ -73,6 +74,7 @@ def test_dry_friction_is_named_with_its_level(analysis):
     assert analysis.revised_model().values["damping"] == pytest.approx(DAMPING, rel=0.02)
 
 
+@pytest.mark.slow
 def test_no_effect_of_a_machine_of_one_s_own_is_a_nuisance_of_a_bench(machine, monkeypatch):
     """Its ports may be called "load": what hangs there was then explained, and nothing was said."""
     model = type(machine.evidence(machine.records))
@@ -85,12 +87,14 @@ def test_no_effect_of_a_machine_of_one_s_own_is_a_nuisance_of_a_bench(machine, m
     assert analyse(machine).verdict.status == "named"
 
 
+@pytest.mark.slow
 def test_held_out_test_is_predicted_to_the_noise(analysis):
     errors = analysis.validate()
     assert errors.overall.before > 5.0
     assert errors.overall.after == pytest.approx(1.0, abs=0.3)
 
 
+@pytest.mark.slow
 def test_report_and_location_say_the_same(analysis, report):
     document = json.loads((report / "verdict.json").read_text())
     assert document["status"] == "named"
@@ -102,12 +106,14 @@ def test_report_and_location_say_the_same(analysis, report):
     assert document["next_experiment"]["description"] in (report / "report.html").read_text()
 
 
+@pytest.mark.slow
 def test_revised_model_is_believed_and_nothing_is_missing_any_more(machine, report):
     revised = read_revised_values(report / "revised_model.toml")
     again = replace(machine, damping=revised.values["damping"], known=revised.effects)
     assert analyse(again).verdict.status == "adequate"
 
 
+@pytest.mark.slow
 def test_records_of_no_use_are_refused(machine):
     held_out = [replace(record, role="held_out") for record in machine.records]
     with pytest.raises(InvalidInput, match="number of train records"):

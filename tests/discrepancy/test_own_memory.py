@@ -80,11 +80,13 @@ def report(analysis, tmp_path_factory):
     return out / "report"
 
 
+@pytest.mark.slow
 def test_verdict_names_it_and_no_loop_of_the_library(analysis):
     assert analysis.verdict.status == "named"
     assert [one.label for one in analysis.verdict.chosen.candidates] == ["gripping_seal:spring"]
 
 
+@pytest.mark.slow
 def test_report_tells_its_values_and_sentence(report):
     (effect,) = json.loads((report / "verdict.json").read_text())["effects"]
     assert effect["sentence"] == GRIPPING_SEAL.sentence.format(port="spring", force="force")
@@ -106,6 +108,7 @@ def test_revised_model_holds_it_as_it_was_fitted(report, measured, analysis):
     assert again.base.chi_square == pytest.approx(analysis.verdict.accepted.chi_square, rel=0.05)
 
 
+@pytest.mark.slow
 def test_held_out_record_is_simulated_far_better_with_it(report):
     document = json.loads((report / "verdict.json").read_text())
     (simulated,) = [one for one in document["held_out"] if one["kind"] == "simulation"]

@@ -42,6 +42,7 @@ def folder(tmp_path_factory):
     return place
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_example_of(name, folder, monkeypatch):
     monkeypatch.chdir(folder)

@@ -14,6 +14,7 @@ def test_the_page_is_what_the_experiments_say():
     assert written == page().splitlines(), "run python -m experiments.paper_page"
 
 
+@pytest.mark.slow
 def test_paper_says_it_in_the_same_sentences():
     words = " ".join((ROOT / "paper.md").read_text(encoding="utf-8").split())
     for sentence in in_short():

@@ -93,6 +93,7 @@ def size_of(effect):
     return effect["parameters"][size]
 
 
+@pytest.mark.slow
 def test_a_folder_with_files_is_left_alone(joint):
     before = {path: path.stat().st_mtime_ns for path in joint[0].rglob("*")}
     with pytest.raises(SystemExit, match="is not empty"):
@@ -100,12 +101,14 @@ def test_a_folder_with_files_is_left_alone(joint):
     assert before == {path: path.stat().st_mtime_ns for path in joint[0].rglob("*")}
 
 
+@pytest.mark.slow
 def test_page_shows_what_its_commands_print(joint):
     outputs = [text for text in joint[1] if text]
     for block, output in zip(blocks("text"), outputs, strict=True):
         assert_shows(block, output)
 
 
+@pytest.mark.slow
 def test_raw_log_of_a_joint_shows_gravity_friction_and_ripple(joint, truth):
     folder, _, verdict = joint
     stamps = np.loadtxt(folder / "log.csv", delimiter=",")[:, 0]
@@ -118,6 +121,7 @@ def test_raw_log_of_a_joint_shows_gravity_friction_and_ripple(joint, truth):
         assert lower <= true <= upper, effect
 
 
+@pytest.mark.slow
 def test_corrected_joint_predicts_what_was_held_out(joint):
     (balance,) = (error for error in joint[2]["held_out"] if error["kind"] == "balance")
     assert balance["before"] > 10.0 * balance["noise_floor"]

@@ -29,6 +29,7 @@ def output_of(snippet: str) -> str:
     return text.getvalue().strip()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", sorted(SHOWN))
 def test_an_example_prints_what_the_readme_says(name):
     printed, _ = example(name)

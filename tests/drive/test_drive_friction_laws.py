@@ -92,6 +92,7 @@ POWERS = [(3.0, 0.02, "faster"), (0.5, 0.03, "slower")]
 """Exponent, torque at the fastest record in N.m, and how the drag grows in words."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("exponent", "torque", "word"), POWERS[:1])
 def test_a_planted_power_comes_back_with_its_exponent(exponent, torque, word):
     """Without records, and beside the drag that grows otherwise only."""
@@ -109,6 +110,7 @@ FORMS = [
 """Effects whose further forms are sought in the place of others only, with values of these."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "form", "values"), FORMS)
 def test_a_form_that_stands_for_another_alone_is_named_with_its_values(name, form, values):
     speeds = (30.0, 100.0, 300.0, 600.0, 1000.0, 1400.0, 2000.0)

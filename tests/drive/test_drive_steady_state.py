@@ -242,6 +242,7 @@ def test_the_load_acts_even_if_the_error_has_odd_orders_only():
     assert amplitudes[2.0][0] == pytest.approx(quasi_static, rel=0.02)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("depth", "speed"),
     [

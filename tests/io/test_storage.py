@@ -476,6 +476,7 @@ json_values = st.recursive(
 )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", AT_NIGHT)
 @fuzz
 @given(data=st.data())

@@ -47,6 +47,7 @@ print(result.F.tobytes().hex())
 """
 
 
+@pytest.mark.slow
 def test_without_numba_swarms_and_problems_give_the_same():
     command = [sys.executable, "-c", WITHOUT]
     done = subprocess.run(command, timeout=120, capture_output=True, text=True, check=False)

@@ -92,6 +92,7 @@ def rooms(root: Path, order: tuple[str, ...]) -> list[tuple[str, list[Path]]]:
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("package", "root", "order"),
     [

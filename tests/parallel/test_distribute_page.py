@@ -30,6 +30,7 @@ def assert_gone_on(first, second):
     assert counts[1] == (0, 100)
 
 
+@pytest.mark.slow
 def test_the_snippet_runs_as_printed_and_goes_on_from_its_file(tmp_path):
     assert_gone_on(*said("-c", TWICE, folder=tmp_path).splitlines())
 

@@ -119,6 +119,7 @@ def test_statistics_are_those_of_the_simulator(name):
             assert one.side * (value - one.bound) == pytest.approx(g, rel=3e-3, abs=3e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "name", others_at_night(["exponential_noise", "portfolio"], "exponential_noise")
 )

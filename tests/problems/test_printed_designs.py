@@ -31,6 +31,7 @@ def test_the_paper_s_optima_are_evaluated_as_printed(problem):
     assert np.array_equal(dF, slopes)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "make",
     [

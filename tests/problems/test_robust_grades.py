@@ -24,6 +24,7 @@ def designs(problem, n, seed=1):
     return np.random.default_rng(seed).uniform(problem.xl, problem.xu, (n, problem.n_var))
 
 
+@pytest.mark.slow
 def test_drives_of_grade_one_are_those_of_the_data_sheet(problem):
     parameters = problem.model.nominal * np.random.default_rng(2).uniform(0.9, 1.1, (20, 5))
     points = np.column_stack([parameters, np.ones((20, 3))])
@@ -32,6 +33,7 @@ def test_drives_of_grade_one_are_those_of_the_data_sheet(problem):
     )
 
 
+@pytest.mark.slow
 def test_a_linear_drive_errs_in_proportion_to_its_grades(problem):
     """Constant stiffness: theta_s alone moves the drive, and each line adds its own part."""
     linear = RobustDTEGrades.__new__(RobustDTEGrades)
@@ -44,6 +46,7 @@ def test_a_linear_drive_errs_in_proportion_to_its_grades(problem):
     assert smaller < mixed < whole
 
 
+@pytest.mark.slow
 def test_the_surrogate_predicts_the_drive_model(problem):
     box = problem.surrogate.box
     points = np.random.default_rng(3).uniform(box.lower, box.upper, (300, len(box)))
@@ -52,6 +55,7 @@ def test_the_surrogate_predicts_the_drive_model(problem):
     assert 1.0 - np.mean(error**2) / np.var(actual) > 0.997
 
 
+@pytest.mark.slow
 def test_grades_stand_for_the_error_sources_of_the_data_sheet(problem):
     assert problem.var_names == ("K", "J_in", "B_in", "B_fc", "grade_w", "grade_mp", "grade_g")
     # Five sources turn with the wave generator, four stand still or are of the pitch, two turn
@@ -59,6 +63,7 @@ def test_grades_stand_for_the_error_sources_of_the_data_sheet(problem):
     assert problem.cost_shares * 11 == pytest.approx([5.0, 4.0, 2.0])
 
 
+@pytest.mark.slow
 def test_the_cost_of_the_data_sheets_drive_is_the_limit(problem):
     U = np.tile(np.r_[problem.nominal, np.ones(3)], (2, 1))
     U[1, 4:] = 0.8
@@ -66,11 +71,13 @@ def test_the_cost_of_the_data_sheets_drive_is_the_limit(problem):
     assert cost == pytest.approx([1.0, 1.25], rel=1e-14)
 
 
+@pytest.mark.slow
 def test_the_resonance_is_that_of_the_drive_model(problem):
     frequency, _ = problem.resonance(np.r_[problem.nominal, np.ones(3)][None])
     assert frequency[0] / (2.0 * np.pi) == pytest.approx(torsional_mode(problem.model).frequency)
 
 
+@pytest.mark.slow
 def test_a_resonance_is_allowed_from_the_margin_on_either_side(problem):
     excitation = 2.0 * problem.process_speed
     U = np.tile(np.r_[problem.nominal, np.ones(3)], (5, 1))
@@ -81,6 +88,7 @@ def test_a_resonance_is_allowed_from_the_margin_on_either_side(problem):
     assert (limit > 0.0).tolist() == [False, True, True, True, False]
 
 
+@pytest.mark.slow
 def test_slopes_equal_finite_differences(problem):
     centre = (problem.xl + problem.xu) / 2.0
     U = designs(problem, 4) * 0.98 + centre * 0.02
@@ -95,6 +103,7 @@ def test_slopes_equal_finite_differences(problem):
         assert found == pytest.approx(expected, rel=1e-3, abs=1e-10 / step[variable])
 
 
+@pytest.mark.slow
 def test_the_stored_front_is_allowed_on_the_problem_and_undominated(problem):
     front, chosen = problem.pareto_front(), problem.pareto_set()
     F, G = problem.evaluate(chosen)
@@ -104,6 +113,7 @@ def test_the_stored_front_is_allowed_on_the_problem_and_undominated(problem):
     assert len(NonDominatedSorting().do(front, only_non_dominated_front=True)) == len(front)
 
 
+@pytest.mark.slow
 def test_nothing_undercuts_the_stored_front(problem):
     front = problem.pareto_front()
     evolved = minimize(problem, NSGA2(pop_size=100), ("n_gen", 40), seed=2).F
@@ -113,6 +123,7 @@ def test_nothing_undercuts_the_stored_front(problem):
     assert gain.max() < 1e-6
 
 
+@pytest.mark.slow
 def test_the_stored_front_satisfies_the_first_order_conditions(problem):
     """Karush, Kuhn, Tucker: weighted slopes vanish but for what pushes on bounds and limits."""
     front, chosen = problem.pareto_front()[5:-5:4], problem.pareto_set()[5:-5:4]

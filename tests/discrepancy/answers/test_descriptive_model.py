@@ -69,6 +69,7 @@ def balance_of(model, record):
     return float(np.sqrt(np.sum((left * balance.kept) ** 2) / balance.moving.count))
 
 
+@pytest.mark.slow
 def test_six_terms_are_recovered():
     described = arm(six_terms).descriptive_model()
     numbers = {
@@ -92,6 +93,7 @@ def test_six_terms_are_recovered():
     assert held_out.descriptive <= 1.05 * held_out.six_terms < 0.1 * held_out.base
 
 
+@pytest.mark.slow
 def test_a_friction_of_no_library_is_predicted_as_well_as_by_six_terms(tmp_path):
     analysis = arm(unlisted_friction)
     described = analysis.descriptive_model()

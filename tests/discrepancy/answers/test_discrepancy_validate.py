@@ -38,6 +38,7 @@ def at_start(*chosen):
     return Fit(chosen, parameters, values, np.zeros(1), np.zeros((1, len(values))))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("candidate", LISTED, ids=lambda one: one.label)
 def test_model_has_the_coefficients_of_the_fit(candidate, clean):
     fitted = at_start(candidate)
@@ -59,6 +60,7 @@ def test_model_has_the_coefficients_of_the_fit(candidate, clean):
     assert (found.input_speed, found.load_torque) == (pytest.approx(209.44, rel=1e-4), 40.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("candidate", LISTED, ids=lambda one: one.label)
 def test_model_is_read_back_exactly(candidate, clean, tmp_path):
     model = drive_model(clean.campaign, at_start(candidate), "revised", 'a "model" \\ of µm')
@@ -89,6 +91,7 @@ def test_revised_model_predicts_the_fit_s_transmission_error(ripple):
             assert amplitudes[order][0] == pytest.approx(np.hypot(real, imaginary), abs=1e-12)
 
 
+@pytest.mark.slow
 def test_model_without_a_name_has_no_effect_and_says_so(ripple, clean):
     unlisted = replace(ripple, verdict=with_status(ripple.verdict, "unlisted"))
     for analysis, words in ((unlisted, "outside the library"), (clean, "nothing is missing")):
@@ -98,6 +101,7 @@ def test_model_without_a_name_has_no_effect_and_says_so(ripple, clean):
     assert "torque_ripple:input@6" in revised_model(ripple).description
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("ratio", "teeth"), [(101.0, (200, 202)), (100.5, (199, 201))])
 def test_teeth_give_the_ratio(ratio, teeth, clean):
     sheet = drive_model(_of_ratio(clean.campaign, ratio), at_start(), "revised", "a model").sheet
@@ -105,6 +109,7 @@ def test_teeth_give_the_ratio(ratio, teeth, clean):
     assert sheet.ratio == ratio
 
 
+@pytest.mark.slow
 def test_ratio_of_no_gear_is_refused(clean):
     with pytest.raises(InvalidInput, match=r"ratio is 101\.00003"):
         drive_model(_of_ratio(clean.campaign, 101.00003), at_start(), "revised", "a model")
@@ -130,6 +135,7 @@ def test_error_shrinks_to_the_noise_where_the_effect_is_named(ripple):
     assert validation.records == tuple(record.name for record in ripple.campaign.held_out)
 
 
+@pytest.mark.slow
 def test_nothing_changes_where_nothing_is_named(clean):
     validation = validate_drive(clean)
     for error in (
@@ -240,6 +246,7 @@ class _With:
         self.held_out = data
 
 
+@pytest.mark.slow
 def test_without_held_out_records_there_is_no_validation(clean):
     campaign = replace(clean.campaign, running=clean.campaign.train)
     assert validate_drive(replace(clean, data=replace(clean.data, campaign=campaign))) is None
@@ -262,6 +269,7 @@ def test_shrinkage_counts_from_the_floor():
     assert PredictionError(1.05, 1.0, 1.0, "arcsec").shrinkage is None
 
 
+@pytest.mark.slow
 def test_peak_to_peak_is_that_of_the_measured_signal(clean):
     validation = validate_drive(clean)
     for record, measured in zip(clean.campaign.held_out, validation.dte[0], strict=True):

@@ -225,6 +225,7 @@ def led_unevenly():
     return training_data(campaign, measure(campaign, campaign.train, orders))
 
 
+@pytest.mark.slow
 def test_the_input_s_own_harmonics_excite_and_are_not_judged(led_unevenly):
     """They show at one speed only, where an effect of their order would show at all."""
     data = led_unevenly
@@ -241,6 +242,7 @@ def test_the_input_s_own_harmonics_excite_and_are_not_judged(led_unevenly):
     assert not wider.values[~wider.judged].any()
 
 
+@pytest.mark.slow
 def test_changes_whitened_by_one_noise_are_whitened_by_another(led_unevenly):
     data = led_unevenly
     rippling = LawAtPort("torque_ripple", "input", PeriodicTorque(7.0, 0.9, 0.015))

@@ -93,6 +93,7 @@ def test_a_revised_model_without_its_effects_misses_them(again):
     assert analyse(replace(again.campaign, believed=believed)).verdict.status == "named"
 
 
+@pytest.mark.slow
 def test_believed_effects_stay_in_model_and_report(analysis, again, tmp_path):
     first, second = analysis.revised_model(), again.revised_model()
     assert [place_of(one) for one in second.effects] == [place_of(one) for one in first.effects]
@@ -107,6 +108,7 @@ def test_believed_effects_stay_in_model_and_report(analysis, again, tmp_path):
     assert "torque ripple (input): order 3, " in (tmp_path / "report" / "report.html").read_text()
 
 
+@pytest.mark.slow
 def test_values_tolerances_and_effects_come_from_the_model(analysis, again):
     believed, model = again.campaign.believed, analysis.revised_model()
     values = dict(
@@ -140,6 +142,7 @@ def test_an_ordinary_drive_model_can_be_believed():
     assert [one.name for one in believed.effects] == ["mesh_stiffness_variation"]
 
 
+@pytest.mark.slow
 def test_a_believed_effect_predicts_as_an_added_one(campaign):
     effects = (FRICTION, RIPPLE, LINE)
     plain = campaign.believed
@@ -166,6 +169,7 @@ def test_no_candidate_stands_where_an_effect_is_believed():
     assert {("coulomb_friction", "output"), ("stribeck_friction", "input")} <= names
 
 
+@pytest.mark.slow
 def test_believed_effects_survive_the_files_of_a_campaign(campaign, tmp_path):
     limits = {"stiffness": 0.05, "load_inertia": 0.4}
     believed = replace(campaign.believed, effects=(FRICTION, LINE), tolerances=limits)
@@ -176,6 +180,7 @@ def test_believed_effects_survive_the_files_of_a_campaign(campaign, tmp_path):
     assert read.stiffness == pytest.approx(believed.stiffness, rel=1e-11)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("file", "old", "new", "words"),
     [
@@ -215,6 +220,7 @@ def test_what_is_no_effect_of_its_own_is_not_believed():
         replace(BELIEVED, tolerances={"ratio": 0.1})
 
 
+@pytest.mark.slow
 def test_effects_without_a_steady_motion_are_refused(campaign):
     stuck = LawAtPort("coulomb_friction", "output", CoulombFriction(1e6))
     with pytest.raises(InvalidInput, match="steady motion in every record; not in run_"):
@@ -285,6 +291,7 @@ def test_a_wholly_known_mechanism_has_no_scale_in_question():
     assert analyse(MeasuredMechanism(known, [plain])).verdict.status == "adequate"
 
 
+@pytest.mark.slow
 def test_the_command_questions_a_model_of_a_drive(believing, tmp_path, monkeypatch, capsys):
     """What the campaign believes gives way to the model that is asked about."""
     asked = []

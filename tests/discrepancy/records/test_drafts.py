@@ -63,6 +63,7 @@ TITLES = {
 UNITS = {"deg": "deg", "mNm": "mN.m", "ms": "ms"}
 
 
+@pytest.mark.slow
 @settings(max_examples=15)
 @given(data=st.data())
 def test_columns_are_recognised_in_any_order_notation_and_unit(data, tmp_path_factory):

@@ -57,6 +57,7 @@ def test_where_the_sensor_sits_decides_between_adequate_and_unlisted(tmp_path):
     assert "output_torque_at = &#34;brake&#34;" in page
 
 
+@pytest.mark.slow
 def test_the_load_inertia_is_fitted_at_the_brake_as_well():
     """A lighter load has a higher resonance, by which a fit sees it in front of the sensor."""
     true = 0.75 * BELIEVED.load_inertia

@@ -63,6 +63,7 @@ def not_tried(*_):
     return OptimumShift((), "not tried")
 
 
+@pytest.mark.slow
 def test_page_stands_alone_and_answers(written):
     page = (written / "report.html").read_text()
     assert not re.findall(r"<script|https?://|<link|@import|url\(", page)
@@ -80,6 +81,7 @@ def test_page_stands_alone_and_answers(written):
     assert "torque_ripple" not in page
 
 
+@pytest.mark.slow
 def test_verdict_and_model_are_read_back(written, ripple):
     names = {path.name for path in written.iterdir()}
     # This campaign has no torsion sweep, and the model that describes is one of mechanisms.
@@ -118,6 +120,7 @@ def test_earlier_report_is_replaced_and_nothing_else(written, ripple, location, 
     assert (out / "thesis.txt").read_text() == "years of work"
 
 
+@pytest.mark.slow
 def test_a_wrong_folder_is_refused_before_the_work(ripple, location, tmp_path):
     def too_late(*_):
         raise AssertionError("the work began")
@@ -140,6 +143,7 @@ def test_what_is_no_report_is_not_written(document, texts, error, words, tmp_pat
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.slow
 def test_failure_leaves_the_earlier_report(ripple, location, tmp_path, monkeypatch):
     arguments = (ripple, location, None, PROPOSAL, not_tried, tmp_path / "out")
     write_report(*arguments)
@@ -155,6 +159,7 @@ def test_failure_leaves_the_earlier_report(ripple, location, tmp_path, monkeypat
     assert {path.name: path.read_bytes() for path in (tmp_path / "out").iterdir()} == before
 
 
+@pytest.mark.slow
 def test_words_do_not_promise_what_is_not_there(ripple):
     validation = validate_drive(ripple)
     assert "the correction removes" in validation_sentence(ripple, validation)
@@ -164,6 +169,7 @@ def test_words_do_not_promise_what_is_not_there(ripple):
     assert "explains 100 % of the misfit" in how_sure(ripple)
 
 
+@pytest.mark.slow
 def test_a_next_best_that_explains_the_same_share_is_told_apart_by_its_bic(ripple):
     chosen, verdict = ripple.verdict.chosen, ripple.verdict
     fit = replace(chosen.fit, candidates=(replace(chosen.candidates[0], name="another"),))
@@ -175,6 +181,7 @@ def test_a_next_best_that_explains_the_same_share_is_told_apart_by_its_bic(rippl
     assert "its BIC is 9 above" in said
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("gap", "told"), [(9.0, True), (-9.0, False)])
 def test_a_set_with_more_that_the_evidence_prefers_is_told(ripple, gap, told):
     chosen, verdict = ripple.verdict.chosen, ripple.verdict
@@ -186,6 +193,7 @@ def test_a_set_with_more_that_the_evidence_prefers_is_told(ripple, gap, told):
     assert (percent(0.9876) in said) == (f"BIC is {number(abs(gap))} below" in said) == told
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("deviations", "told"), [(2.9, False), (3.1, True)])
 def test_a_sensor_far_from_what_is_stated_of_it_is_told(ripple, deviations, told):
     """Both gains ended four limits away, all values were 2 % off, and the page did not say it."""
@@ -198,6 +206,7 @@ def test_a_sensor_far_from_what_is_stated_of_it_is_told(ripple, deviations, told
     assert any(limit.code == SENSOR_OFF for limit in limits) == told
 
 
+@pytest.mark.slow
 def test_parameters_are_told_in_the_reader_s_units(ripple):
     rows = {row.name: row for row in parameter_rows(ripple)}
     fitted = ripple.verdict.accepted
@@ -267,6 +276,7 @@ def test_old_optimum_is_judged_by_the_new_model():
         assert not np.allclose(choice.delivered, choice.promised, rtol=1e-3)
 
 
+@pytest.mark.slow
 def test_revised_model_with_a_law_goes_through_surrogate_and_swarm(ripple):
     plain = revised_with(ripple)
     soft = revised_with(ripple, LawAtPort("soft_windup", "mesh", SoftWindup(0.3, 2e-3)))
@@ -323,6 +333,7 @@ def test_ends_are_printed_within_a_twentieth_of_the_width(middle, relative):
         assert abs(printed - end) <= 0.051 * (upper - lower)
 
 
+@pytest.mark.slow
 def test_words_of_a_user_s_effect_are_no_lines_of_the_static_error(ripple, location, tmp_path):
     """A sentence with "error phase 5" ended the report in IndexError; names of numbers did too."""
     told, chosen = "Commutation error phase 5 of the motor at the input.", ripple.verdict.chosen

@@ -153,6 +153,7 @@ def test_fits_leave_the_same_however_many_rows_are_solved_at_once(campaign, monk
     assert all(each == names[0] for each in names)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("inertia", "stiffness"), [pytest.param(0.08, 0.92, marks=pytest.mark.nightly), (0.3, 1.0)]
 )

@@ -173,6 +173,7 @@ def repeated(request):
     return found
 
 
+@pytest.mark.slow
 def test_a_planted_base_comes_back_with_the_scatter_that_the_fit_states(repeated):
     layout = Layout(repeated[0][1].parameters)
     reach = (layout.array("upper") - layout.array("lower")) / 2.0
@@ -191,6 +192,7 @@ def test_a_planted_base_comes_back_with_the_scatter_that_the_fit_states(repeated
     assert np.mean(np.abs(known) < 1.96) == pytest.approx(0.95, abs=0.03)
 
 
+@pytest.mark.slow
 def test_chi_square_of_the_truth_is_its_degrees_of_freedom(repeated):
     _, first = repeated[0]
     # A parameter that ended at a bound was as good as known.

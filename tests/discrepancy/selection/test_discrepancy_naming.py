@@ -89,6 +89,7 @@ def test_adequacy_in_closed_form():
         )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "seed", [1, *(pytest.param(seed, marks=pytest.mark.nightly) for seed in (2, 3))]
 )
@@ -102,6 +103,7 @@ def test_a_clean_drive_within_its_tolerances_misses_nothing(seed):
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("label", "values", "rivals"),
     [
@@ -127,6 +129,7 @@ def test_a_planted_effect_is_named_with_its_values(label, values, rivals):
     assert fitted.chi_square < adequate(degrees_of_freedom, RULES) * degrees_of_freedom
 
 
+@pytest.mark.slow
 def test_no_interval_is_narrower_than_the_error_of_the_model_itself(ripple):
     """Amplitudes of a ripple were stated to 5e-5 and were off by 3e-4 on a bench written apart."""
     _, verdict = ripple
@@ -155,6 +158,7 @@ def test_the_same_data_give_the_same_verdict_to_the_last_bit(ripple):
     assert [one.label for one in again.alternatives] == [one.label for one in verdict.alternatives]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("label", "values"),
     [
@@ -171,6 +175,7 @@ def test_a_part_that_an_effect_does_not_have_speaks_not_against_it(label, values
     assert (verdict.status, verdict.reasons) == ("named", ())
 
 
+@pytest.mark.slow
 def test_two_effects_are_both_named():
     data = planted({RIPPLE: (0.003, 0.0), LINE: (1.0 * ARCSEC, 0.0)})
     verdict = verdict_on(data, FEW)
@@ -226,6 +231,7 @@ def test_a_stiffness_out_of_tolerance_is_a_parameter_and_no_effect():
     assert verdict.chosen.fit.values[place] == pytest.approx(wanted, abs=4.0 * deviation)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("label", "values"),
     [
@@ -262,6 +268,7 @@ def test_an_effect_has_no_rival_in_the_base_parameter_that_it_changes(label, val
     assert verdict.probability > 0.95
 
 
+@pytest.mark.slow
 def test_an_eccentric_encoder_comes_with_the_line_that_nothing_tells_it_from():
     label = "eccentricity:sensor@0.009901"
     seen = [1.0 / 101.0]

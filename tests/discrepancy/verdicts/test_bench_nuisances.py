@@ -101,6 +101,7 @@ DAILY = ("coupling_ripple",)
 """Others run at night; gravity is told of by day beside friction."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "name",
     [name if name in DAILY else pytest.param(name, marks=pytest.mark.nightly) for name in ALONE],
@@ -111,6 +112,7 @@ def test_a_nuisance_alone_is_told_of_the_bench_and_the_drive_is_adequate(name):
     assert told == [name]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "name",
     [
@@ -126,6 +128,7 @@ def test_a_nuisance_takes_no_name_from_an_effect(name):
     assert verdict.chosen.fit.values[place] == pytest.approx([0.02], rel=0.02)
 
 
+@pytest.mark.slow
 def test_without_a_nuisance_the_bench_is_ideal():
     for effects in ([], [COULOMB]):
         verdict, _, data = verdict_on(effects)

@@ -42,6 +42,7 @@ def campaign_in_two_series(stated):
     return replace(changed, running=tuple(running)), planted
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("stated", [True, pytest.param(False, marks=pytest.mark.nightly)])
 def test_a_hidden_change_is_named_with_its_lines(stated):
     campaign, planted = campaign_in_two_series(stated)

@@ -87,6 +87,7 @@ def test_a_drive_that_is_believed_to_have_it_misses_it_no_more():
     assert base_of(cold[0])[1].chi_square == pytest.approx(base_of(cold[1])[1].chi_square)
 
 
+@pytest.mark.slow
 def test_it_is_sought_only_where_all_records_have_temperatures_that_spread():
     campaign = warm_campaign()
     label = f"{NAME}:input"

@@ -22,6 +22,7 @@ def clean(seed):
     return quick_campaign(seed)
 
 
+@pytest.mark.slow
 def test_a_clean_drive_is_adequate(seed):
     """Fails when either safeguard is taken out of the code."""
     assert quick_analysis(seed).verdict.status == "adequate"

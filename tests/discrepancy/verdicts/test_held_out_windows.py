@@ -55,6 +55,7 @@ def found_on_joint(wander):
     return examine_mechanism(JOINT, records)
 
 
+@pytest.mark.slow
 def test_a_name_that_the_held_out_record_contradicts_is_not_given():
     # The friction of the fitted record is gone from the other one.
     held_out = rig.record_of(nothing, "held_out", seed=3, duration=rig.HELD_OUT)

@@ -96,6 +96,7 @@ def test_a_disturbance_in_a_loop_is_no_delay(seed):
     assert not found.evident
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("stated", [3.4 * STEP, None])
 def test_a_delay_is_taken_out_where_it_is_allowed(stated):
     records = [record_of(3.4 * STEP), record_of(3.4 * STEP, seed=1, role="held_out")]

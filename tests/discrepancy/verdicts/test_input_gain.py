@@ -82,6 +82,7 @@ def test_a_delay_beside_it_is_taken_out_first():
     assert math.sqrt(found.lower * found.upper) == pytest.approx(2.0, rel=0.02)
 
 
+@pytest.mark.slow
 def test_it_is_told_and_corrected_where_the_rig_allows():
     records = [scaled(0.5, weight=0.0), scaled(0.5, weight=0.0, seed=1, role="held_out")]
     told = limits(examine_mechanism(joint(BelievedValue(INERTIA, 0.1)), records, CUTOFF))

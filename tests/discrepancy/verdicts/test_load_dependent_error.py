@@ -25,6 +25,7 @@ def analysis_and_report():
     return reported(analyse(campaign_with(PLANTED)))
 
 
+@pytest.mark.slow
 def test_a_hidden_one_is_named_with_its_size_and_validated(tmp_path):
     analysis, files = analysis_and_report()
     put_files(files, tmp_path)

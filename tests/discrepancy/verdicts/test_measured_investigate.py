@@ -45,6 +45,7 @@ def finding_on(hidden, seed=1):
     return examine_mechanism(OSCILLATOR, [rig.record_of(hidden, seed=seed)])
 
 
+@pytest.mark.slow
 def test_a_user_finds_the_cubic_spring_of_a_duffing_oscillator():
     analysis, _ = cubic_analysis()
     finding, errors = analysis.finding, analysis.validate()
@@ -195,6 +196,7 @@ def test_a_quantity_out_of_tolerance_is_a_parameter():
     assert values["stiffness of spring"] == pytest.approx(4000.0, rel=0.01)
 
 
+@pytest.mark.slow
 def test_an_effect_that_is_known_is_not_found_again():
     records = [rig.record_of(dry, seed=4)]
     assert [one["name"] for one in effects(finding_on(dry, 4))] == ["coulomb_friction"]
@@ -354,6 +356,7 @@ def test_an_interval_that_is_printed_with_zero_in_it_leaves_no_plain_name(monkey
     assert verdict.has_reason(ZERO_IN_INTERVAL)
 
 
+@pytest.mark.slow
 def test_an_effect_that_removes_less_than_the_rule_asks_for_is_not_named():
     finding = finding_on(dry)
     assert finding.verdict.status == "named"

@@ -58,6 +58,7 @@ def slipping_and_hardening(seed, disturbance=0.0):
     return believed, record_of(time, motion, force, (1e-6, 0.1), generator)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.nightly)])
 def test_springs_that_slip_and_a_spring_that_hardens_are_found_together(seed):
     """Each alone bends the believed stiffness so far that the other explains nothing beside it."""

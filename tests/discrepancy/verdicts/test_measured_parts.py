@@ -81,6 +81,7 @@ def test_phasors_at_many_orders_are_the_sums_that_define_them(n, rng):
     np.testing.assert_allclose(phasors(position, signal, orders), expected, atol=1e-9)
 
 
+@pytest.mark.slow
 def test_a_ripple_is_one_effect_with_its_orders():
     def rippled(q, v):
         return 0.05 * np.cos(17.0 * q + 0.5) + 0.03 * np.cos(34.0 * q + 1.0)

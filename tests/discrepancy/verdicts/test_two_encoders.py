@@ -189,6 +189,7 @@ def joint_analysis(tmp_path_factory):
     return analyse(read_rig(folder))
 
 
+@pytest.mark.slow
 def test_one_document_tells_what_torques_and_torsion_lack(joint_analysis, tmp_path):
     analysis = joint_analysis
     assert isinstance(analysis, JointAnalysis)
@@ -213,6 +214,7 @@ def test_one_document_tells_what_torques_and_torsion_lack(joint_analysis, tmp_pa
     assert "Torsion between the encoders" in (tmp_path / "report" / "report.html").read_text()
 
 
+@pytest.mark.slow
 def test_the_revised_joint_explains_the_records(joint_analysis, tmp_path):
     model = joint_analysis.revised_model()
     (tmp_path / "model.toml").write_text(model_text(model))

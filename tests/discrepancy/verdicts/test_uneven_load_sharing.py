@@ -20,6 +20,7 @@ def verdict(half_width, variation):
     return analyse(replace(changed, torsion=())).verdict
 
 
+@pytest.mark.slow
 def test_one_that_varies_is_named_with_its_size():
     found = verdict(3.0, 2.0)
     assert found.status == "named"

@@ -44,6 +44,7 @@ def lever(inertia):
     return analyse(MeasuredMechanism(mechanism, records, 8.0))
 
 
+@pytest.mark.slow
 def test_a_mass_below_the_residual_is_judged_by_its_balance():
     light, heavy = lever(1e-4), lever(0.1)
     assert light.finding.judged_by_balance == {"q"}

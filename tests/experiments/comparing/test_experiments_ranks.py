@@ -86,6 +86,7 @@ class TestDemsarsExample:
         assert difference == pytest.approx(printed, abs=5e-3)
         assert cliques(average_ranks(DEMSAR, smaller_is_better=False), difference) == groups
 
+    @pytest.mark.slow
     def test_counts_against_a_control(self):
         """C4.5+m beats C4.5 on ten data sets and loses on two; on two both are equal."""
         tests = holm_against("C4.5+m", DEMSAR_NAMES, DEMSAR, smaller_is_better=False)

@@ -104,6 +104,7 @@ def few(monkeypatch):
     return prototypes()
 
 
+@pytest.mark.slow
 def test_statistics_are_those_of_the_signal(few):
     found = sample_statistics(few)
     angle = np.linspace(0.0, 2 * np.pi * 101, 101 * 8000)

@@ -81,6 +81,7 @@ def test_a_gauss_rule_of_few_nodes_is_exact_for_its_measure():
     assert gauss_rule(wide, 7)[0] == pytest.approx(hermegauss(7)[0], abs=1e-8)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("bands", [NARROW, WIDE])
 def test_moments_are_those_of_the_calibration(bands):
     rung, parameters = Rung(Candidate(EFFECTS, "semi_amplitude", bands)), KNOWN[5]

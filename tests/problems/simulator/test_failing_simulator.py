@@ -70,6 +70,7 @@ def truth(x):
     ]
 
 
+@pytest.mark.slow
 def test_statistics_are_those_of_the_runs_that_succeed_within_a_band_that_grows(problem):
     """Extrapolated, the mean at 0.3 was 0.53 +- 0.004, and the quantile of a root negative."""
     F, band = problem.evaluate(X, return_values_of=["F", "F_band"])
@@ -80,6 +81,7 @@ def test_statistics_are_those_of_the_runs_that_succeed_within_a_band_that_grows(
     assert np.all(band[:, 0] < 0.15)
 
 
+@pytest.mark.slow
 def test_copies_and_files_know_of_failures(problem, tmp_path):
     problem.save(tmp_path / "failing.npz")
     keys = ["F", "F_band"]
@@ -89,11 +91,13 @@ def test_copies_and_files_know_of_failures(problem, tmp_path):
             assert ours == pytest.approx(theirs, rel=1e-12)
 
 
+@pytest.mark.slow
 def test_a_gradient_that_would_miss_the_share_of_failures_is_refused(problem):
     with pytest.raises(InvalidInput, match="no gradient: runs fail"):
         problem.evaluate(X, return_values_of=["dF"])
 
 
+@pytest.mark.slow
 def test_exceptions_of_a_vectorised_simulator_fail_run_by_run():
     """The same runs fail as by NaN, and give the same."""
 
@@ -109,6 +113,7 @@ def test_exceptions_of_a_vectorised_simulator_fail_run_by_run():
     assert np.array_equal(ours.evaluate(X), expected.evaluate(X))
 
 
+@pytest.mark.slow
 def test_a_simulator_that_mostly_fails_is_refused_unless_its_failures_are_limited():
     def narrow(x, load, leak):
         return np.where(x < 0.7, np.nan, x + load + leak)
@@ -122,6 +127,7 @@ def test_a_simulator_that_mostly_fails_is_refused_unless_its_failures_are_limite
     assert G[1, 0] < 0.0
 
 
+@pytest.mark.slow
 def test_failures_by_chance_change_no_mean():
     rng = np.random.default_rng(4)
 
@@ -137,6 +143,7 @@ def test_failures_by_chance_change_no_mean():
     assert abs(F[:, 1].mean() - share) <= band[:, 1].mean()
 
 
+@pytest.mark.slow
 def test_worst_case_and_rare_quantiles_of_a_failing_simulator():
     problem = built(objectives=[WorstCase("smallest")], accept="best", budget=38)
     smallest = problem.evaluate(X)[:, 0]

@@ -73,6 +73,7 @@ def killed_at(folder, count, target=study):
 
 
 # From Python 3.12 on a fork warns where there are threads, as progress bars have.
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:.*fork:DeprecationWarning")
 @pytest.mark.parametrize(
     "seed", [1, *(pytest.param(k, marks=pytest.mark.nightly) for k in range(2, 12))]
@@ -114,6 +115,7 @@ def test_any_part_of_the_file_that_a_kill_leaves_is_gone_on_from(tmp_path, whole
         same(folder, whole)
 
 
+@pytest.mark.slow
 def test_the_first_run_is_made_again_where_the_simulator_may_be_another(tmp_path, whole):
     before = (whole / RUNS).read_bytes()
     unfinished = before[: before.rindex(b"\n", 0, -1) + 1]
@@ -307,6 +309,7 @@ def damaged(whole, kind):
     return b"\n".join([*lines[:5], DAMAGED[kind], *lines[6:]])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", DAMAGED)
 def test_a_damaged_line_is_told_and_left_out(tmp_path, whole, kind):
     (tmp_path / RUNS).write_bytes(damaged(whole, kind))
@@ -320,6 +323,7 @@ def test_a_damaged_line_is_told_and_left_out(tmp_path, whole, kind):
     assert [*runs.items()] == [*undamaged.items()]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", others_at_night(DAMAGED, "cut"))
 def test_the_run_of_a_damaged_line_is_made_again(tmp_path, whole, kind):
     (tmp_path / RUNS).write_bytes(damaged(whole, kind))
@@ -331,6 +335,7 @@ def test_the_run_of_a_damaged_line_is_made_again(tmp_path, whole, kind):
     assert (tmp_path / PROBLEM).read_bytes() == (whole / PROBLEM).read_bytes()
 
 
+@pytest.mark.slow
 def test_a_file_whose_names_of_responses_are_damaged_keeps_its_runs(tmp_path, whole):
     lines = (whole / RUNS).read_bytes().split(b"\n")
     (tmp_path / RUNS).write_bytes(b"\n".join([lines[0], b'{"responses": nul', *lines[2:-2], b""]))

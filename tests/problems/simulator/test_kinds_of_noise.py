@@ -176,6 +176,7 @@ def test_the_worst_of_two_intervals_may_lie_inside_them():
     np.testing.assert_allclose(problem.evaluate(X), np.column_stack([-np.array(least), X**0]), 1e-6)
 
 
+@pytest.mark.slow
 def test_the_worst_of_a_response_that_no_polynomial_is_lies_within_the_band():
     noise = {"a": Interval(-0.5, 1.5), "load": norm(0.0, 0.1)}
     problem = made(lambda x, a, load: np.exp(-2.0 * (a - x) ** 2) * (1.0 + load), noise)

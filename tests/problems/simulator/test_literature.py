@@ -77,6 +77,7 @@ def borehole(rw, r, Tu, Hu, Tl, Hl, L, Kw):
     return 2.0 * np.pi * Tu * (Hu - Hl) / across
 
 
+@pytest.mark.slow
 def test_borehole_in_eight_inputs_at_random_designs():
     designs = {"rw": Design(0.06, 0.14, tolerance=0.05), "Kw": Design(9900.0, 12000.0, 0.05)}
     settings = {"vectorised": True, "positive": True, "progress": False}

@@ -69,6 +69,7 @@ def test_a_refusal_holds_all_runs_and_the_flagged_problem(refused):
     assert np.array_equal(copied.problem.evaluate(designs), refusal.problem.evaluate(designs))
 
 
+@pytest.mark.slow
 def test_the_band_of_what_is_accepted_as_the_best_covers_its_errors(refused, tmp_path):
     with pytest.warns(RuntimeWarning, match="best there is"):
         problem = robust_problem(series_system, *SYSTEM, **STRICT, accept="best")
@@ -84,6 +85,7 @@ def test_the_band_of_what_is_accepted_as_the_best_covers_its_errors(refused, tmp
     assert np.array_equal(loaded.runs.Y, problem.runs.Y)
 
 
+@pytest.mark.slow
 def test_runs_of_a_refusal_are_not_made_again(refused):
     simulator = Counted(series_system)
     with pytest.raises(UntrustedSurrogate) as caught:
@@ -152,6 +154,7 @@ def test_data_that_do_not_fit_are_refused_by_name(simulator, data, words):
         robust_problem(simulator, WIDTHS, data=data, progress=False)
 
 
+@pytest.mark.slow
 def test_a_coarser_accuracy_takes_fewer_runs_and_is_met():
     """Growth went on to 2 % of the scatter, whatever was asked for."""
 

@@ -41,6 +41,7 @@ def problem():
     )
 
 
+@pytest.mark.slow
 def test_its_own_scatter_is_part_of_deviation_and_quantile(problem):
     F, band = problem.evaluate(X, return_values_of=["F", "F_band"])
     assert np.all(np.abs(F - exact()) <= band)
@@ -50,6 +51,7 @@ def test_its_own_scatter_is_part_of_deviation_and_quantile(problem):
     assert np.all(band[:, :2] < 0.25 * F[:, 1:2])
 
 
+@pytest.mark.slow
 def test_gradients_know_of_its_own_scatter(problem):
     other = SimulatorProblem(
         problem._inputs, problem._fit, problem.responses, [Mean(), Std()], [], problem.n_runs
@@ -60,6 +62,7 @@ def test_gradients_know_of_its_own_scatter(problem):
     assert dF[:, :, 0] == pytest.approx(difference, rel=1e-5, abs=1e-7)
 
 
+@pytest.mark.slow
 def test_files_and_data_hold_its_own_scatter(problem, tmp_path):
     problem.save(tmp_path / "random.npz")
     loaded = SimulatorProblem.load(tmp_path / "random.npz")
@@ -77,6 +80,7 @@ def test_files_and_data_hold_its_own_scatter(problem, tmp_path):
         robust_problem(None, *INPUTS, data=single, replicates=2, progress=False)
 
 
+@pytest.mark.slow
 def test_seeds_differ_from_run_to_run_and_a_study_is_repeatable(tmp_path):
     seeds = []
 
@@ -99,6 +103,7 @@ def test_seeds_differ_from_run_to_run_and_a_study_is_repeatable(tmp_path):
     assert all(type(seed) is int for seed in seeds)
 
 
+@pytest.mark.slow
 def test_one_that_takes_no_seed_is_repeated_if_told_so():
     rng = np.random.default_rng(5)
 

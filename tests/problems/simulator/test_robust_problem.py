@@ -70,6 +70,7 @@ def designs_of(problem, n=200):
     return np.random.default_rng(3).uniform(problem.xl, problem.xu, (n, problem.n_var))
 
 
+@pytest.mark.slow
 def test_the_cantilever_is_as_accurate_as_asked_for_and_the_band_covers_it(beam):
     X = designs_of(beam)
     truth = true_moments(X)
@@ -81,6 +82,7 @@ def test_the_cantilever_is_as_accurate_as_asked_for_and_the_band_covers_it(beam)
     assert beam.obj_names == ("mean", "std")
 
 
+@pytest.mark.slow
 def test_gradients_equal_differences(beam):
     X = designs_of(beam, 5) * 0.9 + 0.1 * 0.035
     F, dF, band = beam.evaluate(X, return_values_of=["F", "dF", "F_band"])
@@ -92,6 +94,7 @@ def test_gradients_equal_differences(beam):
     assert F.shape == (5, 2)
 
 
+@pytest.mark.slow
 def test_it_is_an_ordinary_problem_of_pymoo(beam):
     again = pickle.loads(pickle.dumps(copy.deepcopy(beam)))
     assert np.array_equal(again.evaluate(designs_of(beam)), beam.evaluate(designs_of(beam)))
@@ -124,11 +127,13 @@ def test_copies_and_pickles_hold_no_samples():
     assert np.array_equal(copies[1].evaluate(X), expected)
 
 
+@pytest.mark.slow
 def test_prediction_is_near_the_simulator(beam):
     row = [[0.03, 0.04, 520.0, 2.0e11]]
     assert beam.predict(row)[0, 0] == pytest.approx(cantilever(*row[0]), rel=1e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("simulator", "options", "words"),
     [
@@ -270,6 +275,7 @@ def test_simulators_that_tell_nothing_of_their_arguments_are_called_as_before():
         assert problem.evaluate(np.array([0.03]))[0] == pytest.approx(0.06, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_a_heavy_tail_goes_through_its_normal_coordinate():
     """A log-normal factor of deviation 1: its moments are closed form, its polynomials huge."""
     noise = {"a": chaospy.LogNormal(0.0, 1.0)}

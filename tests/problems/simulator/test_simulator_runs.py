@@ -51,6 +51,7 @@ def steady():
     return quiet(calm, *PLAIN, **PRECISE).evaluate(np.array([[0.7]])), len(calm.calls)
 
 
+@pytest.mark.slow
 def test_a_run_that_fails_once_is_made_again(steady):
     met = set()
 
@@ -65,6 +66,7 @@ def test_a_run_that_fails_once_is_made_again(steady):
     assert len(flaky.calls) == calls + (len(met) + 4) // 7
 
 
+@pytest.mark.slow
 def test_runs_that_always_fail_are_told():
     with pytest.warns(RuntimeWarning, match=r"\d+ of \d+ runs failed: x = 0\.4"):
         problem = quiet(Flaky(lambda call, x: x < 0.48), *PLAIN, accuracy=0.05)
@@ -81,6 +83,7 @@ def test_a_simulator_that_never_runs_says_why():
     assert "no convergence" in str(failure.value.__cause__)
 
 
+@pytest.mark.slow
 def test_a_simulator_that_fails_in_half_of_the_box_is_refused_with_its_region():
     with pytest.raises(UntrustedSurrogate, match=r"probability of failing .* so where x is 0\.5"):
         quiet(Flaky(lambda call, x: x < 0.72), *PLAIN, accuracy=0.9, budget=60)
@@ -156,6 +159,7 @@ def fails_once_everywhere(x, a):
     return np.exp(x * a)
 
 
+@pytest.mark.slow
 def test_workers_give_the_same_and_make_failed_runs_again(workers, steady):
     FAILED_ONCE.clear()
     problem = quiet(fails_once_everywhere, *PLAIN, **PRECISE, executor=workers)

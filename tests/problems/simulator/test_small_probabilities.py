@@ -215,6 +215,7 @@ def on_a_grid(design, std=0.3, count=3000):
     return shares @ fails @ shares
 
 
+@pytest.mark.slow
 def test_the_published_optimum_of_youn_and_choi_fails_as_probably_as_it_does():
     design = (3.4391, 3.2866)
     result = failure_probability(
@@ -233,6 +234,7 @@ def test_the_published_optimum_of_youn_and_choi_fails_as_probably_as_it_does():
     assert result.form_beta == pytest.approx(3.0, abs=0.01)
 
 
+@pytest.mark.slow
 def test_one_surrogate_serves_all_designs_of_youn_and_choi():
     problem = robust_problem(
         youn_choi,

@@ -81,6 +81,7 @@ def test_statistics_of_a_normal_response_are_closed_forms(problem):
     assert np.isnan(band[:, 5:7]).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("statistic", "reach"),
     [

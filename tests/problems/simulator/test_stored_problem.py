@@ -54,6 +54,7 @@ def designs_of(problem, n=30):
     return np.random.default_rng(1).uniform(problem.xl, problem.xu, (n, problem.n_var))
 
 
+@pytest.mark.slow
 def test_a_round_trip_returns_the_same_bytes(problem, tmp_path):
     problem.save(tmp_path / "one.npz")
     again = SimulatorProblem.load(tmp_path / "one.npz")
@@ -70,6 +71,7 @@ def test_a_round_trip_returns_the_same_bytes(problem, tmp_path):
     assert ours.total.tobytes() == theirs.total.tobytes()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("simulator", "tails"),
     [(lambda x, a: x * a, True), (lambda x, a: 1.0 / (3.0 + (a - x) ** 2), False)],

@@ -41,6 +41,7 @@ def true_moments(function, designs, scatter):
 NORMAL = scipy.stats.norm()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("function", "design", "name", "scatter", "options"),
     [
@@ -85,6 +86,7 @@ def test_a_polynomial_keeps_the_moments_of_the_whole_scatter():
     assert problem.evaluate(np.array([1.5])) == pytest.approx([0.0, 1.5], rel=1e-9, abs=1e-9)
 
 
+@pytest.mark.slow
 def test_rare_values_that_carry_the_scatter_are_in_it_or_refused():
     """The factor exp(1.5 a): 6 % of its deviation lie beyond the quantiles of 1e-5."""
     made_with = lambda x, a: x * np.exp(1.5 * a), Design(1.0, 2.0), "a", NORMAL
@@ -121,6 +123,7 @@ def test_a_response_that_lives_beyond_all_runs_is_refused(function, scatter):
         made(function, Design(1.0, 2.0), "a", scatter, budget=150)
 
 
+@pytest.mark.slow
 def test_an_error_stated_from_few_runs_holds():
     """At 10 % the deviation was 15 % off where 4.5 % was stated, after 38 runs."""
     joint = {name: chaospy.Normal(0.0, 1.0) for name in "abc"}

@@ -1,6 +1,7 @@
 """Fields as few components: moments within their bands, and no more regressions than patterns."""
 
 import numpy as np
+import pytest
 from numpy.polynomial.legendre import leggauss
 from scipy.stats import norm
 
@@ -26,6 +27,7 @@ def true_moments(x):
     return mean, np.sqrt(square - mean**2)
 
 
+@pytest.mark.slow
 def test_every_value_of_a_field_has_its_own_moments_and_band(monkeypatch):
     fitted, calls = module.fitted, []
 

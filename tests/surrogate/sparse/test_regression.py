@@ -121,6 +121,7 @@ def test_a_polynomial_of_few_terms_is_found_to_rounding():
     assert fit.polynomial(cube) == pytest.approx(function(cube), rel=1e-9, abs=1e-9)
 
 
+@pytest.mark.slow
 def test_growth_fits_on_one_thread_and_leaves_the_function_its_own(monkeypatch):
     # With two threads that wait for each other growth took five times as long.
     threads = {"function": set(), "fit": set()}

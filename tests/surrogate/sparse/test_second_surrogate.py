@@ -30,6 +30,7 @@ def moments_of_product(x):
     return np.column_stack([mean, np.sqrt(square - mean**2)])
 
 
+@pytest.mark.slow
 def test_a_product_over_decades_takes_few_runs_by_its_logarithm():
     """A polynomial of the product itself took 400 runs."""
     problem = robust_problem(

@@ -35,6 +35,7 @@ def campaign_on(nuisances, *elements):
     return about.machine, campaign_of(hiding, session)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("bench", others_at_night(BENCHES, "both"))
 def test_nothing_is_missing_and_the_values_are_the_true_ones(bench):
     machine, campaign = campaign_on(BENCHES[bench])
@@ -54,6 +55,7 @@ def test_nothing_is_missing_and_the_values_are_the_true_ones(bench):
     assert max(map(abs, off.values())) < 4.0, off
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("bench", others_at_night(["wanders", "both"], "wanders"))
 def test_friction_keeps_its_name(bench):
     friction = element(el.DRY, 0.03, 0.1, 0.0, 0.0, 0.0, 0.0, INPUT)

@@ -132,6 +132,7 @@ def rows(case, twin=False):
     return rows_of(hidden, hidden.twin if twin else hidden.session)[0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("stress", [pytest.param(None, marks=pytest.mark.nightly), "outliers"])
 def test_a_case_gives_the_same_bytes_twice_and_another_root_others(short, stress):
     case = case_of("stressed", stress=stress) if stress else ECCENTRIC
@@ -446,6 +447,7 @@ def made_up_score(case, tools):
     return scores, (1.0, 2.0, 3.0, 4.0)
 
 
+@pytest.mark.slow
 def test_a_campaign_outlives_a_defect_resumes_and_leaves_what_the_report_reads(
     tmp_path, monkeypatch, capsys
 ):

@@ -15,6 +15,7 @@ def names_in(rig, records):
     return {candidate.name for candidate in finding.accepted.candidates}
 
 
+@pytest.mark.slow
 def test_a_quarter_of_a_record_shows_the_friction_of_a_real_rig():
     if not (MEASURED / "emps").is_dir():
         pytest.skip(f"the measurements are not at {MEASURED}")
