@@ -15,7 +15,7 @@ import stat
 import struct
 import zipfile
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -55,15 +55,12 @@ class FileFormat:
     fields, arrays : tuple of str
         Names in the header, beside ``format`` and ``version``, and of the float64 arrays. A file
         has all of them and no others.
-    later : dict of str to tuple
-        Those that older files lack: the version with which they came, and what stands for them.
     """
 
     name: str
     version: int
     fields: tuple[str, ...]
     arrays: tuple[str, ...] = ()
-    later: Mapping[str, tuple[int, Any]] = field(default_factory=dict)
 
     def write(
         self,
@@ -110,7 +107,7 @@ class FileFormat:
             members = _members(contents)
             header = _header(members.pop("header"))
             self._check(header)
-            if set(members) != set(self._of_version(header["version"], self.arrays)):
+            if set(members) != set(self.arrays):
                 raise ValueError(f"its arrays are {sorted(members)}")
             arrays = {name: _array(member) for name, member in members.items()}
         except InvalidInput:
@@ -120,15 +117,7 @@ class FileFormat:
             reason = str(error) or type(error).__name__
             allowed = f"an undamaged file of format {self.name!r} ({reason})"
             raise InvalidInput("path", path, allowed) from error
-        older = {name: value for name, (_, value) in self.later.items()}
-        fields, arrays = older | header, older | arrays
-        return {name: fields[name] for name in self.fields}, {
-            name: arrays[name] for name in self.arrays
-        }
-
-    def _of_version(self, version: int, names: tuple[str, ...]) -> list[str]:
-        """Return those of some names that files of a version have."""
-        return [name for name in names if self.later.get(name, (1,))[0] <= version]
+        return {name: header[name] for name in self.fields}, arrays
 
     def _check(self, header: Any) -> None:
         stated_format = header.get("format") if isinstance(header, dict) else header
@@ -138,7 +127,7 @@ class FileFormat:
         allowed = "version 1" if self.version == 1 else f"versions 1 to {self.version}"
         if type(version) is not int or not 1 <= version <= self.version:
             raise InvalidInput("version of the file", version, allowed)
-        wanted = {"format", "version", *self._of_version(version, self.fields)}
+        wanted = {"format", "version", *self.fields}
         if set(header) != wanted:
             raise InvalidInput("header of the file", sorted(header), f"just {sorted(wanted)}")
 

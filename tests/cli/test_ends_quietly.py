@@ -38,6 +38,9 @@ ARGUMENTS = {
     "export": ["model.toml", "--to", "urdf"],
     "init": ["logs"],
     "robust": ["study.toml", "--out", "new/out"],
+    "example": ["new/example"],
+    "decide": ["gear.toml", "--out", "new/out"],
+    "table7": ["--out", "new/out"],
 }
 HELD = """
 import sys, time

@@ -40,7 +40,8 @@ def output_of(guide):
 
 def numbers_of(guide, pattern):
     """Return the numbers in the place of each # of a line, a list for each such line."""
-    expression = re.escape(pattern).replace(r"\#", NUMBER)
+    # Columns are as wide as their widest number.
+    expression = re.escape(pattern).replace(r"\#", NUMBER).replace(r"\ ", " +")
     found = re.findall(expression, output_of(guide))
     assert found, f"{guide} prints no line like {pattern!r}"
     return [[float(one) for one in ([line] if isinstance(line, str) else line)] for line in found]

@@ -50,7 +50,7 @@ _OF_POINTS = ("failed", "held_out_points", "points")
 
 FORMAT = FileFormat(
     "pymoo_hdte robust problem",
-    version=2,
+    version=1,
     fields=(
         *("designs", "noise", "responses", "objectives", "constraints", "n_runs", "tails"),
         "refusal",
@@ -59,7 +59,6 @@ FORMAT = FileFormat(
         *("indices", "coefficients", *_OF_RESPONSES, *_OF_POINTS, "held_out_error", "truth"),
         *(*_OF_SUCCESS, *_OF_OWN),
     ),
-    later=dict.fromkeys(("refusal", "points", "truth", *_OF_SUCCESS, *_OF_OWN), (2, None)),
 )
 
 
@@ -83,7 +82,7 @@ def _read_terms(
 ) -> list[Any] | None:
     """Return terms, (p, d), and coefficients of so many rows, (r, p); None where there are none."""
     indices = arrays[names[0]]
-    if indices is None or not len(indices):
+    if not len(indices):
         return None
     shapes = (len(indices), inputs), *((count, len(indices)) for count in rows)
     for name, shape in zip(names, shapes, strict=True):
@@ -187,9 +186,6 @@ def read_problem(
         refusal = header["refusal"]
         if not isinstance(refusal, str | None):
             raise InvalidInput("refusal", refusal, "a text or nothing")
-        for name, columns in (("points", len(inputs.axes)), ("truth", len(responses))):
-            if arrays[name] is None:
-                arrays[name] = np.empty((0, columns))
         fit = _read_fit(inputs, len(responses), n_runs, header["tails"], arrays)
     except InvalidInput:
         raise
@@ -256,10 +252,8 @@ def _read_statistic(table: Mapping[str, Any]) -> Statistic:
     kind = given.pop("kind", None)
     if kind not in STATISTICS:
         raise InvalidInput("statistic of the file", kind, f"one of {', '.join(STATISTICS)}")
-    if kind == FailureProbability.__name__:
-        # Files of the first version have no joint events.
-        event = given.setdefault("event", None)
-        given["event"] = event if event is None else event_from(event)
+    if given.get("event") is not None:
+        given["event"] = event_from(given["event"])
     _check_fields(kind, given, STATISTICS[kind])
     _check_sign("sign of a statistic", given["sign"])
     return STATISTICS[kind](**given)

@@ -251,7 +251,7 @@ def test_a_worker_with_another_source_or_none_is_refused(tmp_path):
         campaign = Campaign(tmp_path / "out", executor)
         for source, reason in (
             (other, "source or versions"),
-            (none, "experiments.runner"),
+            (none, "does not find what a job needs"),
         ):
             worker = dask.worker("--no-nanny", source=source)
             with pytest.raises(WrongWorker, match=reason):
