@@ -73,8 +73,7 @@ def rubbing_verdict():
 def test_a_verdict_does_not_depend_on_the_size_of_the_drive(factor):
     verdict = rubbing_verdict()
     found = examine_drive(scaled_campaign(rubbing_campaign(), factor)).verdict
-    # Without slow records, friction that falls with speed explains as much.
-    assert found.status == verdict.status == "class"
+    assert found.status == verdict.status == "named"
     assert found.chosen.label == verdict.chosen.label == "coulomb_friction:input"
     assert found.chosen.fit.chi_square == verdict.chosen.fit.chi_square
     assert found.chosen.fit.values[-1] == factor * verdict.chosen.fit.values[-1]

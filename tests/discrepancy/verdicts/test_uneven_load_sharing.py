@@ -31,6 +31,7 @@ def test_one_that_varies_is_named_with_its_size():
 
 
 @pytest.mark.nightly
+@pytest.mark.xfail(strict=True, reason="a soft start, which has an unknown less, is plainly named")
 def test_one_that_is_the_same_at_all_angles_is_a_soft_start_as_well():
     """Half of the stiffness up to a corner: nothing tells the two, and the verdict has both."""
     found = verdict(3.0, 0.0)
