@@ -54,28 +54,22 @@ def differences(data, fitted, others):
     return np.array([one.chi_square for one in again]) - fitted.chi_square
 
 
-def compared(verdict, rules):
-    """Return the fits that decide a verdict: of the named set and of sets that come near it."""
-    chosen = verdict.chosen
-    if chosen is None:
+def compared(verdict):
+    """Return the fits that decide a verdict: of the named set and of those it is not told from."""
+    if verdict.chosen is None:
         return [verdict.base]
-    misfit = max(chosen.fit.chi_square / verdict.degrees_of_freedom, 1.0)
-    near = rules.refit_margin * rules.evidence_distance * misfit
-    return [chosen.fit] + [
-        one.fit
-        for one in verdict.alternatives
-        if len(one.candidates) == len(chosen.candidates) and one.bic - chosen.bic < near
-    ]
+    return [verdict.chosen.fit, *(other.fit for other in verdict.equivalent)]
 
 
 def friction():
     """Fits of a drive with dry friction at its input: that friction, and a law that contains it."""
     rig = true_rig(effect("input", coulomb=0.05, rounding_speed=0.2))
-    clean = analysed(run_campaign(rig, BELIEVED, RIG, np.random.default_rng(7), CONDITIONS))
+    campaign = run_campaign(rig, BELIEVED, RIG, np.random.default_rng(7), CONDITIONS)
+    clean = analysed(campaign, status="adequate")
     labels = ("coulomb_friction:input", "stribeck_friction:input")
     laws = [one for one in LISTED if one.label in labels]
     verdict = judged(clean.data, laws)
-    return clean.data, compared(verdict, clean.data.rules)
+    return clean.data, compared(verdict)
 
 
 def ripple():
@@ -87,7 +81,7 @@ def ripple():
 def nothing():
     """The fit of a drive that is as believed."""
     found = quick_analysis(1)
-    return found.finding.data, compared(found.verdict, found.finding.data.rules)
+    return found.finding.data, compared(found.verdict)
 
 
 @pytest.mark.nightly
@@ -104,7 +98,7 @@ def test_no_start_ends_below_the_fits_that_decide_a_case(name):
     else:
         analysis = analyse(case_campaign(name))
     data = analysis.finding.data
-    hold(data, compared(analysis.verdict, data.rules), 0.2)
+    hold(data, compared(analysis.verdict), 0.2)
 
 
 def hold(data, found, share):
@@ -144,8 +138,8 @@ def test_fits_leave_the_same_however_many_rows_are_solved_at_once(campaign, monk
     for rows in (48, 64, 96, 256):
         monkeypatch.setattr(free_angle, "_ROWS_AT_ONCE", rows)
         analysis = analyse(there)
-        verdict, rules = analysis.verdict, analysis.finding.data.rules
-        left.append({label_of(one.candidates): one.chi_square for one in compared(verdict, rules)})
+        verdict = analysis.verdict
+        left.append({label_of(one.candidates): one.chi_square for one in compared(verdict)})
         names.append([one.label for one in (verdict.chosen, *verdict.equivalent)])
     assert all(each.keys() == left[0].keys() for each in left)
     for label in left[0]:
