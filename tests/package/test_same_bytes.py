@@ -5,7 +5,7 @@ import json
 from importlib.machinery import SourceFileLoader
 
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 from places import ROOT
 
@@ -68,6 +68,7 @@ def test_the_largest_change_of_a_number_is_told():
 
 
 @given(st.floats(allow_infinity=False), st.floats(allow_infinity=False))
+@example(0.0, -0.0)
 def test_numbers_are_the_same_if_they_are_written_alike(one, other):
     said = same_bytes.compared(folder({"a": one, "b": ""}), folder({"a": other, "b": "x"}))
     assert said.startswith("same numbers") == (repr(one) == repr(other))
