@@ -55,7 +55,10 @@ def differences(data, fitted, others):
 
 
 def compared(verdict):
-    """Return the fits that decide a verdict: of the named set and of those it is not told from."""
+    """Return the fits that decide a verdict: of the named set and of those it is not told from.
+
+    Other alternatives stay where their sets were, and are not fitted to the records of the verdict.
+    """
     if verdict.chosen is None:
         return [verdict.base]
     return [verdict.chosen.fit, *(other.fit for other in verdict.equivalent)]
@@ -69,7 +72,7 @@ def friction():
     labels = ("coulomb_friction:input", "stribeck_friction:input")
     laws = [one for one in LISTED if one.label in labels]
     verdict = judged(clean.data, laws)
-    return clean.data, compared(verdict)
+    return clean.data, [verdict.chosen.fit, *(other.fit for other in verdict.alternatives)]
 
 
 def ripple():

