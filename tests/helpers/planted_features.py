@@ -43,7 +43,9 @@ def known_data(conditions=CONDITIONS, orders=ORDERS):
     no_bends = np.zeros((len(speed), 3, 1 + m), dtype=complex)
     names = [f"run_{k}" for k in range(len(speed))]
     records = tuple(
-        SimpleNamespace(name=name, input_speed=s * REVOLUTION_PER_MINUTE, load_torque=t)
+        SimpleNamespace(
+            name=name, input_speed=s * REVOLUTION_PER_MINUTE, load_torque=t, reading_errors=()
+        )
         for name, (s, t) in zip(names, conditions, strict=True)
     )
     features = Features(

@@ -189,12 +189,13 @@ def order_lines(
         covariance[channel, 0, 0] += (jump.size / (ratio if share else 1.0)) ** 2
     for error in record.reading_errors:
         channel, share = _READ[error.channel]
-        uncertain = np.arange(covariance.shape[1] if error.of_lines else 1)
-        covariance[channel, uncertain, uncertain] += (error.size / (ratio if share else 1.0)) ** 2
+        covariance[channel, 0, 0] += (error.size / (ratio if share else 1.0)) ** 2
         for power, bend in enumerate(courses[:3], 2):
             shape = math.factorial(power) * bend / float(np.ptp(record.time)) ** power
             part = error.bent * np.r_[shape.real, shape.imag[1:]]
             covariance[channel] += np.outer(part, part)
+    lines = np.arange(1, covariance.shape[1])
+    covariance[:, lines, lines] += step_variances(record, ratio)[:, None]
     return OrderLines(
         orders=checked,
         mean=coefficients[0],
@@ -317,3 +318,13 @@ def row_covariance(rig: Rig, ratio: float, samples_averaged: int) -> NDArray[np.
     )
     covariance[0, 3] = covariance[3, 0] = ratio * encoder
     return covariance / samples_averaged
+
+
+def step_variances(record: RunningRecord, ratio: float) -> NDArray[np.float64]:
+    """Return the variance of each part of a line by coarse steps, by channel, shape (4,)."""
+    variances = np.zeros(len(CHANNELS))
+    for error in record.reading_errors:
+        if error.of_lines:
+            channel, share = _READ[error.channel]
+            variances[channel] += (error.size / (ratio if share else 1.0)) ** 2
+    return variances

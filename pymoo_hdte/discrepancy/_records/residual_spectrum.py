@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pymoo_hdte.discrepancy._records.believed import Rig
 from pymoo_hdte.discrepancy._records.line_basis import LineFit, nyquist_order
-from pymoo_hdte.discrepancy._records.line_fit import row_covariance
+from pymoo_hdte.discrepancy._records.line_fit import row_covariance, step_variances
 from pymoo_hdte.discrepancy._records.records import RunningRecord
 from pymoo_hdte.discrepancy._records.uneven_sums import sums_at_lines, sums_at_whole_lines
 from pymoo_hdte.discrepancy._selection.rules import RULES
@@ -71,13 +71,18 @@ def residual_spectrum(
     multiples = max(int(np.ceil(highest * ratio - 1e-9)) - 1, 0)
     whole = ratio * np.arange(1.0, np.ceil(highest - 1e-9))
     whole = whole[np.abs(whole - whole.round()) > 1e-9]
-    sigma = np.sqrt(np.diag(row_covariance(rig, ratio, record.samples_averaged)))
+    variances = np.diag(row_covariance(rig, ratio, record.samples_averaged))
+    sigma = np.sqrt(variances)
     sums = []
     for part in fit.parts:
         basis = fit.basis(part)
         rows = np.hstack([basis, fit.residual(part, basis) / sigma]).T
         sums.append(_Sums.of(rows, record.input_angle[part] / ratio, multiples, whole))
-    separate, amplitudes = reduce(_Sums.plus, sums).amplitudes(len(record.time))
+    n = len(record.time)
+    separate, amplitudes = reduce(_Sums.plus, sums).amplitudes(n)
+    of_steps = step_variances(record, ratio)
+    # A part of a line has the variance 2 sigma^2 / n by the noise of n rows.
+    amplitudes /= np.sqrt(1.0 + of_steps * n / (2.0 * variances))[:, None]
     searched = np.concatenate([np.arange(1, multiples + 1), whole])[separate] / ratio
     rising = np.argsort(searched)
     return searched[rising], amplitudes[:, rising]

@@ -50,11 +50,13 @@ def of_label(data, label):
 
 
 @pytest.mark.parametrize("label", others_at_night(PLANTED, *NOW))
-def test_the_planted_effect_comes_first(label):
+def test_nothing_removes_more_to_first_order_than_the_planted_effect(label):
+    """But for rounding of a hundredth: an inertia behind a stiff shaft is an inertia."""
     effects = of_label(known_data(), label).build(PLANTED[label])
     data, _ = measured(effects, np.random.default_rng(1), known_data(SPEEDS))
-    first, *_ = screen(data, fit(data), library(data, SEEN))
-    assert first.candidate.label == label
+    screened = screen(data, fit(data), library(data, SEEN))
+    (own,) = (effect for effect in screened if effect.candidate.label == label)
+    assert own.reduction > 0.99 * screened[0].reduction
 
 
 def test_reduction_by_a_line_is_that_of_linear_least_squares():

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from pymoo_hdte.discrepancy._evidence.order_lines.corrections import Correction, LoadRate
 from pymoo_hdte.discrepancy._evidence.order_lines.evidence import Data
 from pymoo_hdte.discrepancy._evidence.order_lines.features import MEANS
-from pymoo_hdte.discrepancy._records.line_fit import CHANNELS
+from pymoo_hdte.discrepancy._records.line_fit import CHANNELS, step_variances
 from pymoo_hdte.discrepancy._selection.candidate import Candidate
 from pymoo_hdte.discrepancy._selection.fitting import Fit, Response
 from pymoo_hdte.discrepancy._selection.linearised import linearise, modulated
@@ -179,13 +179,20 @@ class LawErrors:
         """Values that each residual counts for: nearly none of a line that is not shown.
 
         Nor of one of the input where the motor does most of it beside its loop: how much that is in
-        a record, is estimated from a few lines beside it, and says nothing about the drive.
+        a record, is estimated from a few lines beside it, and says nothing about the drive. Nor of
+        one that is lost in the steps of a torque: rounding makes a few lines large and most small.
         """
         features = self.data.features
         shares = np.where(features.judged, 1.0, _NOTHING)
         if (by_motor := features.conditions.lead_share) is not None:
             of_lead = features.places(CHANNELS.index("input_angle"))
             shares[:, of_lead] *= np.maximum(1.0 - by_motor, _NOTHING)[..., None]
+        ratio = self.data.campaign.believed.ratio
+        for row, record in enumerate(features.records):
+            for channel, by_steps in enumerate(step_variances(record, ratio)):
+                places = features.places(channel).ravel()
+                whole = np.diag(features.covariance[row])[places]
+                shares[row, places] *= np.maximum(1.0 - by_steps / whole, _NOTHING)
         return np.append(shares.ravel(), np.ones(self.data.n_sweep_residuals))
 
     @cached_property
