@@ -547,6 +547,25 @@ class Growth:
                 break
             taken[effect.candidate.name] += 1
             self._fit((*members, effect.candidate), np.append(weighed.fit.values, effect.start))
+        if not members:
+            self._screen_at_fitted_values()
+
+    def _screen_at_fitted_values(self) -> None:
+        """Screen the laws that were fitted alone with the values of these fits as a start, too.
+
+        Of a curve the starts may be far off: to first order what they leave keeps the curve from
+        bringing anything beside another effect.
+        """
+        base, fitted = self._known[frozenset()].fit, list[Candidate]()
+        for label in self.screened:
+            alone = self._known.get(frozenset([label]))
+            if alone is not None and not alone.candidates[0].linear:
+                (candidate,) = alone.candidates
+                start = tuple(alone.fit.values[alone.fit.n_base :].tolist())
+                if candidate.releases is None and start[0] != 0.0:
+                    fitted.append(replace(candidate, starts=(*candidate.starts, start)))
+        screened = screen(self.data, base, fitted) if fitted else []
+        self.screened.update((effect.candidate.label, effect) for effect in screened)
 
     def _fit_evident_nuisances(self, weighed: Weighed) -> bool:
         """Fit a set with the nuisances that it lacks by far; tell whether that is the likeliest.

@@ -19,6 +19,7 @@ through the mode of all of them, and each factor by Laplace's method. Nothing he
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import NamedTuple
@@ -560,8 +561,26 @@ class Integral:
         """Return by how much each further quantity alone would raise the logarithm, (n_places,).
 
         To first order; minus infinity for one that would be invisible at its largest scale. The
-        noise stays, or is ``renewed`` as it would be beside the most probable sizes.
+        noise stays, or is ``renewed`` as it would be beside the most probable sizes; and then each
+        error of records or laws may be at its least, which may stand for what the quantity does.
         """
+        gains = self._gains_at(places, renewed)
+        for number, part in enumerate(self.hypothesis.sized if renewed else ()):
+            if not part.of_effect and self.scales[number] > 2.0 * self.least[number]:
+                quiet = self._with_least(number)
+                gains = np.maximum(gains, quiet._gains_at(places, renewed) + quiet._ln() - self._ln())
+        return gains
+
+    def _with_least(self, number: int) -> Integral:
+        """Return it with one scale at its least."""
+        quiet = copy(self)
+        quiet.scales = self.scales.copy()
+        quiet.scales[number] = self.least[number]
+        quiet._integrate_bounds()
+        return quiet
+
+    def _gains_at(self, places: Sequence[Sized], renewed: bool) -> Vector:
+        """Return `gains` at the present scales."""
         _, covariance, by_row, scaled, left = self._at_mode()
         gains = np.full(len(places), -np.inf)
         every = np.column_stack([part.columns for part in places]) / by_row[:, None]

@@ -212,10 +212,6 @@ def test_an_inertia_is_as_certain_as_the_interval_that_is_told_of_it():
 
 
 @pytest.mark.nightly
-@pytest.mark.xfail(
-    strict=True,
-    reason="a curve of the torsion without a sweep: that records scatter stands for it",
-)
 def test_a_second_effect_shows_where_no_single_part_contradicts_the_first():
     """The whole does, by little, and friction of the load takes nearly all of it."""
     friction = "load_dependent_friction:input"
