@@ -551,21 +551,21 @@ class Growth:
             self._screen_at_fitted_values()
 
     def _screen_at_fitted_values(self) -> None:
-        """Screen the laws that were fitted alone with the values of these fits as a start, too.
+        """Screen laws that were fitted alone with the values of these fits as a start, too.
 
-        Of a curve the starts may be far off: to first order what they leave keeps the curve from
-        bringing anything beside another effect.
+        The starts of a curve may be far off: what they leave to first order, errors of the records
+        take up, so that the curve seems to bring nothing beside another effect.
         """
-        base, fitted = self._known[frozenset()].fit, list[Candidate]()
-        for label in self.screened:
-            alone = self._known.get(frozenset([label]))
-            if alone is not None and not alone.candidates[0].linear:
-                (candidate,) = alone.candidates
-                start = tuple(alone.fit.values[alone.fit.n_base :].tolist())
-                if candidate.releases is None and start[0] != 0.0:
-                    fitted.append(replace(candidate, starts=(*candidate.starts, start)))
-        screened = screen(self.data, base, fitted) if fitted else []
-        self.screened.update((effect.candidate.label, effect) for effect in screened)
+        curves = list[Candidate]()
+        for weighed in self._known.values():
+            if len(weighed.candidates) == 1 and weighed.candidates[0].label in self.screened:
+                (candidate,) = weighed.candidates
+                values = tuple(weighed.fit.values[weighed.fit.n_base :].tolist())
+                if not candidate.linear and candidate.releases is None and values[0] != 0.0:
+                    curves.append(replace(candidate, starts=(*candidate.starts, values)))
+        if curves:
+            screened = screen(self.data, self.base, curves)
+            self.screened.update((effect.candidate.label, effect) for effect in screened)
 
     def _fit_evident_nuisances(self, weighed: Weighed) -> bool:
         """Fit a set with the nuisances that it lacks by far; tell whether that is the likeliest.

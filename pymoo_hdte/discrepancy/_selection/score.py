@@ -568,7 +568,9 @@ class Integral:
         for number, part in enumerate(self.hypothesis.sized if renewed else ()):
             if not part.of_effect and self.scales[number] > 2.0 * self.least[number]:
                 quiet = self._with_least(number)
-                gains = np.maximum(gains, quiet._gains_at(places, renewed) + quiet._ln() - self._ln())
+                gains = np.maximum(
+                    gains, quiet._gains_at(places, renewed) + quiet._ln() - self._ln()
+                )
         return gains
 
     def _with_least(self, number: int) -> Integral:

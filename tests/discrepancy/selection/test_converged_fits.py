@@ -65,14 +65,16 @@ def compared(verdict):
 
 
 def friction():
-    """Fits of a drive with dry friction at its input: that friction, and a law that contains it."""
+    """Fits of a drive with dry friction at its input, beside a law that contains it."""
     rig = true_rig(effect("input", coulomb=0.05, rounding_speed=0.2))
     campaign = run_campaign(rig, BELIEVED, RIG, np.random.default_rng(7), CONDITIONS)
     clean = analysed(campaign, status="adequate")
     labels = ("coulomb_friction:input", "stribeck_friction:input")
     laws = [one for one in LISTED if one.label in labels]
     verdict = judged(clean.data, laws)
-    return clean.data, [verdict.chosen.fit, *(other.fit for other in verdict.alternatives)]
+    # The noise is that of the drive with friction.
+    data = clean.data.with_noise_of(verdict.chosen.fit) or clean.data
+    return data, compared(verdict)
 
 
 def ripple():

@@ -211,7 +211,7 @@ def test_an_inertia_is_as_certain_as_the_interval_that_is_told_of_it():
     assert (verdict.status, verdict.reasons) == ("named", ())
 
 
-@pytest.mark.nightly
+@pytest.mark.slow
 def test_a_second_effect_shows_where_no_single_part_contradicts_the_first():
     """The whole does, by little, and friction of the load takes nearly all of it."""
     friction = "load_dependent_friction:input"

@@ -381,6 +381,22 @@ def test_gains_are_those_of_the_whole_integral(rng, cut, size):
     assert gain == pytest.approx(wanted, abs=0.1)
 
 
+def test_a_gain_counts_the_errors_of_records_that_are_left(rng):
+    """Each record may err by its own: that takes what an effect explains, and returns it."""
+    count, records = 40, 10
+    of_records = np.eye(count)[:, :records]
+    column = of_records @ rng.normal(size=(records, 1))
+    residuals = rng.normal(size=count) - 25.0 * column[:, 0]
+    unknowns = free(np.ones((count, 1)), mean=0.0, deviation=1.0)
+    errors, further = sized(of_records, 0.03, 30.0), sized(column, 0.1, 100.0)
+    integral = Integral(hypothesis(residuals, unknowns, errors))
+    before = integral.score().ln
+    wanted = score(hypothesis(residuals, unknowns, errors, further)).ln - before
+    assert wanted > 10.0
+    assert integral.gains([further])[0] < 0.5 * wanted
+    assert integral.gains([further], renewed=True)[0] == pytest.approx(wanted, rel=0.1)
+
+
 def test_a_gain_counts_the_noise_that_is_left(rng):
     """Unknown noise takes what an effect explains, and returns it."""
     count = 100

@@ -117,7 +117,8 @@ def test_a_nuisance_alone_is_told_of_the_bench_and_the_drive_is_adequate(name):
     "name",
     [
         "gravity",
-        *(pytest.param(n, marks=pytest.mark.nightly) for n in ("coupling_ripple", "warming")),
+        "warming",
+        pytest.param("coupling_ripple", marks=pytest.mark.nightly),
     ],
 )
 def test_a_nuisance_takes_no_name_from_an_effect(name):

@@ -60,7 +60,12 @@ def test_a_mass_below_the_residual_is_judged_by_its_balance():
     ("name", "effect"),
     [
         ("vote_kills_gravity", "gravity"),
-        ("kinova5_missing_is_certain", "coulomb_friction"),
+        pytest.param(
+            *("kinova5_missing_is_certain", "coulomb_friction"),
+            marks=pytest.mark.xfail(
+                strict=True, reason="it is unlisted: friction removes a quarter of the misfit"
+            ),
+        ),
         ("damper_vote", "hysteresis"),
     ],
 )
