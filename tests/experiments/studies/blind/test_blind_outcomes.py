@@ -52,24 +52,25 @@ def test_a_dozen_ends_as_it_is_stored(outcomes):
 
 
 @pytest.mark.nightly
-def test_no_plain_name_against_the_evidence_of_its_own_comparison():
+def test_no_plain_name_leaves_more_than_another_that_was_compared():
     # Half of the records, play in another form: a pair that left 1.9 times the noise was named
-    # plainly, although one that left nothing had been compared, and was not earned.
+    # plainly, although one that left nothing had been compared.
     case = next(one for one in all_cases() if (one.kind, one.number) == ("stressed", 45))
     hidden = hiding(case)
     verdict = examine_drive(campaign_of(hidden, hidden.session)).verdict
-    assert verdict.status not in ("named", "parameter")
-    assert ("clearance_variation", "mesh") in {
-        name for one in verdict.equivalent for name in one.names
-    }
+    answers = verdict.chosen, *verdict.equivalent
+    assert ("clearance_variation", "mesh") in {name for one in answers for name in one.names}
+    left = max(one.fit.chi_square for one in answers)
+    assert left < 1.2 * verdict.degrees_of_freedom
+    assert left < 1.2 * min(one.fit.chi_square for one in verdict.alternatives)
 
 
 @pytest.mark.nightly
 @pytest.mark.parametrize("number", [101, 103])
 def test_harmonics_of_a_narrow_crest_are_no_effects_of_their_own(number):
-    # Orders and readings leave open whether the mesh errs or the encoder: a class of two.
+    # Orders and readings may leave open whether the mesh errs or the encoder.
     hidden = hiding(Case("single", number))
     verdict = examine_drive(campaign_of(hidden, hidden.session)).verdict
     answers = verdict.chosen, *verdict.equivalent
     assert Case("single", number).names[0] in {name for one in answers for name, _ in one.names}
-    assert [len(one.candidates) for one in answers] == [1, 1]
+    assert {len(one.candidates) for one in answers} == {1}
