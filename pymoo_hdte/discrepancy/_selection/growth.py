@@ -135,8 +135,8 @@ class Weighed:
 
     def without(self, member: Candidate) -> Linearised:
         """Return its hypothesis without one of its effects, to first order."""
-        effects = [effect for effect, _ in self.fit.places]
-        return self.linearised.without(effects.index(member))
+        labels = [effect.label for effect, _ in self.fit.places]
+        return self.linearised.without(labels.index(member.label))
 
     @property
     def explanation(self) -> Explanation:
@@ -621,7 +621,8 @@ class Growth:
         """Return the fit of a set and what it is likeliest without, of what was added to it."""
         own = [effect.candidate for effect in reversed(added) if effect.candidate.label in label]
         if (unseen := self._invisible.get(label)) is not None:
-            hidden = [candidate for candidate in own if candidate in unseen.effects]
+            unseen_labels = {candidate.label for candidate in unseen.effects}
+            hidden = [candidate for candidate in own if candidate.label in unseen_labels]
             return (unseen.fit, hidden[0]) if hidden else None
         if not own or (weighed := self._known.get(label)) is None:
             return None
@@ -804,8 +805,9 @@ class Growth:
 def _others(fitted: Fit, member: Candidate) -> tuple[tuple[Candidate, ...], Vector]:
     """Return the effects of a fit without a member, and the values of base and these."""
     values = [fitted.values[: fitted.n_base]]
-    values += [fitted.values[place] for other, place in fitted.places if other is not member]
-    others = tuple(candidate for candidate in fitted.candidates if candidate is not member)
+    kept = [(other, place) for other, place in fitted.places if other.label != member.label]
+    values += [fitted.values[place] for _, place in kept]
+    others = tuple(other for other, _ in kept)
     return others, np.concatenate(values)
 
 
