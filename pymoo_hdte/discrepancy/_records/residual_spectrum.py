@@ -16,6 +16,8 @@ from pymoo_hdte.discrepancy._records.records import RunningRecord
 from pymoo_hdte.discrepancy._records.uneven_sums import sums_at_lines, sums_at_whole_lines
 from pymoo_hdte.discrepancy._selection.rules import RULES
 
+N_CHANNELS = 5
+"""Those of the order lines, and the output angle."""
 # Numerical limits of a linear fit; the verdict does not depend on them.
 LEAST_SEPARATION = 0.1
 """Least share of a line's power that is independent of the fitted lines."""
@@ -48,10 +50,10 @@ def residual_spectrum(
     -------
     orders : ndarray, shape (k,)
         Cycles per input turn, up to ``highest_order`` or the Nyquist order.
-    amplitudes : ndarray, shape (4, k)
-        Dimensionless, by channel as in `OrderLines`: divided by their root mean square under noise
-        alone. The square is then exponential with mean 1: a line exceeds x by chance with
-        probability exp(-x**2).
+    amplitudes : ndarray, shape (5, k)
+        Dimensionless, by channel as in `OrderLines`, and of the output angle: divided by their root
+        mean square under noise alone. The square is then exponential with mean 1: a line exceeds x
+        by chance with probability exp(-x**2).
 
     Raises
     ------
@@ -71,16 +73,19 @@ def residual_spectrum(
     multiples = max(int(np.ceil(highest * ratio - 1e-9)) - 1, 0)
     whole = ratio * np.arange(1.0, np.ceil(highest - 1e-9))
     whole = whole[np.abs(whole - whole.round()) > 1e-9]
-    variances = np.diag(row_covariance(rig, ratio, record.samples_averaged))
+    # The output angle is that of the input, divided by the ratio, less the transmission error.
+    channels = np.vstack([np.eye(N_CHANNELS - 1), [-1.0, 0.0, 0.0, 1.0 / ratio]])
+    covariance = row_covariance(rig, ratio, record.samples_averaged)
+    variances = np.diag(channels @ covariance @ channels.T)
     sigma = np.sqrt(variances)
     sums = []
     for part in fit.parts:
         basis = fit.basis(part)
-        rows = np.hstack([basis, fit.residual(part, basis) / sigma]).T
+        rows = np.hstack([basis, fit.residual(part, basis) @ channels.T / sigma]).T
         sums.append(_Sums.of(rows, record.input_angle[part] / ratio, multiples, whole))
     n = len(record.time)
     separate, amplitudes = reduce(_Sums.plus, sums).amplitudes(n)
-    of_steps = step_variances(record, ratio)
+    of_steps = np.append(step_variances(record, ratio), 0.0)
     # A part of a line has the variance 2 sigma^2 / n by the noise of n rows.
     amplitudes /= np.sqrt(1.0 + of_steps * n / (2.0 * variances))[:, None]
     searched = np.concatenate([np.arange(1, multiples + 1), whole])[separate] / ratio
@@ -92,7 +97,7 @@ def residual_spectrum(
 class _Sums:
     """Sums over rows for k waves: of waves times each row of products, and of waves squared.
 
-    ``products`` has shape (p + 4, k): with the basis, then with the residuals.
+    ``products`` has shape (p + 5, k): with the basis, then with the residuals.
     """
 
     products: NDArray[np.complex128]
@@ -127,9 +132,9 @@ class _Sums:
     def amplitudes(self, n: int) -> tuple[NDArray[np.bool_], NDArray[np.float64]]:
         """Fit cosine and sine of each wave, orthogonal to the basis, to residuals of variance 1.
 
-        Returns which lines are separate enough, and their amplitudes (4, k), for n rows.
+        Returns which lines are separate enough, and their amplitudes (5, k), for n rows.
         """
-        shared, products = self.products[:-4], self.products[-4:]
+        shared, products = self.products[:-N_CHANNELS], self.products[-N_CHANNELS:]
         power = n - np.sum(np.abs(shared) ** 2, axis=0)
         square = self.squares - np.sum(shared**2, axis=0)
         separate = power - np.abs(square) > LEAST_SEPARATION * n

@@ -28,8 +28,10 @@ from pymoo_hdte.discrepancy._evidence.order_lines.sizes import (
     scales_of,
 )
 from pymoo_hdte.discrepancy._evidence.order_lines.steady_states import PREDICTION, Lead
+from pymoo_hdte.discrepancy._records.believed import Rig
 from pymoo_hdte.discrepancy._records.campaign import Campaign
 from pymoo_hdte.discrepancy._records.cleaning.cleaning import cleaned_rows
+from pymoo_hdte.discrepancy._records.cleaning.findings import NoiseFinding
 from pymoo_hdte.discrepancy._records.line_fit import CHANNELS
 from pymoo_hdte.discrepancy._records.records import RunningRecord
 from pymoo_hdte.discrepancy._selection.candidate import Candidate
@@ -86,11 +88,13 @@ def examine_drive(campaign: Campaign, rules: Rules = RULES) -> DriveFinding:
     expected = expected_orders(campaign, rules)
     campaign, rows = cleaned_rows(campaign, expected, rules)
     features = measure(campaign, campaign.train, expected, rules)
-    lines = unexpected_lines(features, ratio, campaign.rig, rules)
+    coarse = _scales_are_coarse(campaign.rig, rows.noise)
+    lines = unexpected_lines(features, ratio, campaign.rig, rules, coarse)
     held = flanks_held(features, campaign.torque_scale, rules)
     enough = held.sum() >= rules.fewest_records
     known = campaign.believed.error_orders
-    rattles = enough and rattling.is_heard(lines, held, known, ratio, rules)
+    powers = [{order: line.power for order, line in of_record.items()} for of_record in lines]
+    rattles = enough and rattling.is_heard(powers, held, known, ratio, rules)
     # Lines of a motion that does not repeat are no orders.
     repeating = np.flatnonzero(held) if rattles else range(len(lines))
     unexpected = unexpected_orders([lines[row] for row in repeating], ratio, rules)
@@ -266,6 +270,15 @@ def _error_lines(campaign: Campaign, rules: Rules) -> list[float]:
 
 def _travel(record: RunningRecord) -> float:
     return abs(float(record.input_angle[-1] - record.input_angle[0]))
+
+
+def _scales_are_coarse(rig: Rig, noise: Sequence[NoiseFinding]) -> bool:
+    """Tell whether the angles show twice the power of the noise that is stated of their encoders.
+
+    Steps of a scale do so, whether they are stated or not.
+    """
+    (stated,) = (finding.stated for finding in noise if finding.name == "angle_noise")
+    return rig.angle_noise**2 + rig.angle_quantisation**2 / 12.0 > 2.0 * stated**2
 
 
 def _apart(

@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 from night import others_at_night
 from places import SHARED
-from quick_campaigns import quick_campaign
+from quick_campaigns import CONDITIONS, quick_campaign
 from virtual_rig_cases import BELIEVED, RIG, effect
 
+from experiments.studies.virtual_rig.own_effects import with_effects
 from experiments.studies.virtual_rig.rig import draw_rig, run_campaign
 from experiments.studies.virtual_rig.runs import Condition
 from pymoo_hdte.discrepancy import analyse, order_lines, read_campaign
@@ -17,6 +18,7 @@ from pymoo_hdte.discrepancy._records.cleaning.cleaning import cleaned_rows
 from pymoo_hdte.discrepancy._report.tables import rows_sentence
 from pymoo_hdte.discrepancy._selection.rules import RULES
 from pymoo_hdte.discrepancy._verdicts.drive import expected_orders
+from pymoo_hdte.drive._effects.static_error import KinematicErrorLine
 from pymoo_hdte.units import ARCSEC
 
 NOISES = ("angle_noise", "input_torque_noise", "output_torque_noise", "torsion_angle_noise")
@@ -489,3 +491,28 @@ def test_lines_of_a_coarse_torque_scatter_as_their_covariance_says(clean, step):
 def test_a_clean_drive_with_a_coarse_torque_is_adequate(clean, step):
     rows = reading(clean, "input_torque", lambda one: coarse(one.input_torque, step))
     assert analyse(rows).verdict.status == "adequate"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("stated", others_at_night([True, False], True))
+@pytest.mark.parametrize("bits", others_at_night([17, 18, 19], 18))
+def test_scales_with_coarse_steps_make_tones_that_are_nothing_of_the_drive(bits, stated):
+    """A clean drive was unlisted: tones of steps beyond the noise were lines of unknown origin."""
+    rig = replace(RIG, angle_quantisation=2.0 * np.pi / 2**bits)
+    rng = np.random.default_rng(1)
+    campaign = run_campaign(draw_rig(BELIEVED, (), rng), BELIEVED, rig, rng, CONDITIONS)
+    verdict = analyse(campaign if stated else replace(campaign, rig=RIG)).verdict
+    assert verdict.status == "adequate"
+
+
+@pytest.mark.nightly
+def test_an_error_that_nobody_expected_shows_beside_coarse_steps():
+    rig = replace(RIG, angle_quantisation=2.0 * np.pi / 2**18)
+    rng = np.random.default_rng(1)
+    drawn = draw_rig(BELIEVED, (), rng)
+    campaign = run_campaign(drawn, BELIEVED, rig, rng, CONDITIONS)
+    order = 17.0 / BELIEVED.ratio
+    campaign = with_effects(campaign, drawn, (KinematicErrorLine(order, 2.0 * ARCSEC, 0.3),))
+    (chosen,) = analyse(campaign).verdict.chosen.candidates
+    # So slow an order does not tell the mesh from the encoder.
+    assert chosen.label in ("kinematic_error:mesh@0.1683", "encoder_line:sensor@0.1683")

@@ -198,7 +198,7 @@ def stray_lines(data: Data, unexpected: Sequence[float]) -> StrayLines:
     for record, speed in zip(features.records, speeds, strict=True):
         shown = [order for order in known if order <= shown_order(record, rules)]
         orders, amplitudes = residual_spectrum(record, rig, ratio, shown, rules.highest_order)
-        power = amplitudes**2
+        power = amplitudes[: len(CHANNELS)] ** 2
         power[power < np.log(power.size * len(speeds) / rules.unexpected_line_chance)] = 0.0
         widths.append(_lines_in_effect(power))
         if power.any():

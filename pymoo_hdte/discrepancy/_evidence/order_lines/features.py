@@ -13,6 +13,7 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,6 +39,14 @@ from pymoo_hdte.discrepancy._records.records import RunningRecord
 from pymoo_hdte.discrepancy._records.residual_spectrum import residual_spectrum
 from pymoo_hdte.discrepancy._selection.rules import RULES, Rules
 
+_OTHER_SPEED = 0.02
+"""Difference of the logarithms of speeds beyond which a tone of a scale is at another order."""
+_TELLING = 3.0
+"""Power above which a line shows beside noise, which exceeds it in 5 % of all places."""
+_SIMILAR = 0.4
+"""Least power of a line at another speed, as a share of what as long a record at that of the
+largest line would show: below six tenths of the resonance of the load, a static error moves the
+output by up to 1.6 times itself. What is raised more is shown by a torque."""
 _GUARD = 2
 """Neighbours on either side that a line may leak into."""
 MEANS = (0, 1)
@@ -267,29 +276,71 @@ def _load_variance(record: RunningRecord) -> float:
     return sum(error.size**2 for error in errors if error.channel == "output_torque")
 
 
+class Line(NamedTuple):
+    """A line of a record that exceeds the noise: its power, and whether it is one of the drive."""
+
+    power: float
+    of_drive: bool
+
+
+class _Spectrum(NamedTuple):
+    """Orders and powers (5, k) of what lines leave of a record, its raw samples, and rad/s."""
+
+    orders: NDArray[np.float64]
+    power: NDArray[np.float64]
+    samples: int
+    speed: float
+
+
 def unexpected_lines(
-    features: Features, ratio: float, rig: Rig, rules: Rules = RULES
-) -> list[dict[float, float]]:
+    features: Features, ratio: float, rig: Rig, rules: Rules = RULES, coarse: bool = False
+) -> list[dict[float, Line]]:
     """Return the lines outside the features' orders at which each record exceeds the noise.
 
-    Each record has a mapping of orders, in cycles per input turn, to powers summed over channels.
-    The input moves as it likes, so that what it alone does counts only as what a motor may do: in
-    whole cycles of its turn, and beyond what it does beside them.
+    Each record has a mapping of orders, in cycles per input turn, to lines, whose powers are summed
+    over channels. The input moves as it likes, so that what it alone does counts only as what a
+    motor may do: in whole cycles of its turn, and beyond what it does beside them. Elsewhere a line
+    is one of the output or a torque. A ``coarse`` scale shows tones of its own, which are at other
+    orders at other speeds: what no torque shows is then of the drive where it is at all speeds.
     """
-    lines = []
+    spectra = []
     for record in features.records:
         orders, amplitudes = residual_spectrum(
             record, rig, ratio, features.orders, rules.highest_order
         )
-        power = amplitudes**2
-        threshold = np.log(power.size * len(features.records) / rules.unexpected_line_chance)
-        seen = (power[:3] > threshold).any(axis=0)
+        samples = len(record.time) * record.samples_averaged
+        spectra.append(_Spectrum(orders.round(9), amplitudes**2, samples, abs(record.input_speed)))
+    lines = []
+    for orders, power, *_ in spectra:
+        threshold = np.log(4 * len(orders) * len(spectra) / rules.unexpected_line_chance)
+        certain = (power[1:3] > threshold).any(axis=0)
         for place in np.flatnonzero(np.abs(orders - orders.round()) < WHOLE).tolist():
-            seen[place] |= power[3, place] > _threshold_at(place, power[3], threshold)
-        beyond = np.flatnonzero(seen)
-        sizes = power[:, beyond].sum(axis=0)
-        lines.append(dict(zip(orders[beyond].round(9).tolist(), sizes.tolist(), strict=True)))
+            certain[place] |= power[0, place] > threshold
+            certain[place] |= power[3, place] > _threshold_at(place, power[3], threshold)
+        of_record = dict[float, Line]()
+        for place in np.flatnonzero(certain | (power[4] > threshold)).tolist():
+            order = float(orders[place])
+            of_drive = bool(certain[place]) or not coarse or _at_all_speeds(spectra, order)
+            of_record[order] = Line(float(power[:4, place].sum()), of_drive)
+        lines.append(of_record)
     return lines
+
+
+def _at_all_speeds(spectra: Sequence[_Spectrum], order: float) -> bool:
+    """Tell whether the output has a line at all other speeds than where it is largest.
+
+    At those where it would show beside noise.
+    """
+    reaching = [
+        (float(spectrum.power[4, places[0]]), spectrum.samples, spectrum.speed)
+        for spectrum in spectra
+        if (places := np.flatnonzero(spectrum.orders == order)).size
+    ]
+    power, samples, speed = np.array(reaching).T
+    largest = int(np.argmax(power / samples))
+    expected = _SIMILAR * power[largest] * samples / samples[largest]
+    told = (np.abs(np.log(speed / speed[largest])) > _OTHER_SPEED) & (expected > _TELLING)
+    return bool(np.all(power[told] > expected[told]))
 
 
 def _threshold_at(place: int, power: NDArray[np.float64], threshold: float) -> float:
@@ -307,16 +358,16 @@ def _threshold_at(place: int, power: NDArray[np.float64], threshold: float) -> f
 
 
 def unexpected_orders(
-    lines: Sequence[dict[float, float]], ratio: float, rules: Rules = RULES
+    lines: Sequence[dict[float, Line]], ratio: float, rules: Rules = RULES
 ) -> list[float]:
-    """Return the orders of unexpected lines of several records, the strongest first.
+    """Return the orders of unexpected lines of the drive in several records, the strongest first.
 
     The total power counts. Fixed frequencies, whose order differs between records, do not add up
     and come last.
     """
     total: Counter[float] = Counter()
-    for powers in lines:
-        total.update(powers)
+    for of_record in lines:
+        total.update({order: line.power for order, line in of_record.items() if line.of_drive})
     strongest: list[float] = []
     for order in sorted(total, key=lambda order: -total[order]):
         if all(abs(order - stronger) > 2.5 / ratio for stronger in strongest):
