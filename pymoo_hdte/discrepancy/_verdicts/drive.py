@@ -277,8 +277,9 @@ def _scales_are_coarse(rig: Rig, noise: Sequence[NoiseFinding]) -> bool:
 
     Steps of a scale do so, whether they are stated or not.
     """
-    (stated,) = (finding.stated for finding in noise if finding.name == "angle_noise")
-    return rig.angle_noise**2 + rig.angle_quantisation**2 / 12.0 > 2.0 * stated**2
+    shown = rig.angle_noise**2 + rig.angle_quantisation**2 / 12.0
+    stated = [finding.stated for finding in noise if finding.name == "angle_noise"]
+    return bool(stated) and shown > 2.0 * stated[0] ** 2
 
 
 def _apart(
