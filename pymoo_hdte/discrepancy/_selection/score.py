@@ -93,6 +93,8 @@ class Sized:
         Whether it is a size of an effect, beyond which those that are ``cut`` have to be visible.
     of_form : bool
         Whether it is by how much the form of a law errs: beyond ``most`` it is another law.
+    of_records : bool
+        Whether it is an error of the records, which may stand for an effect that is missing.
     """
 
     name: str
@@ -104,6 +106,7 @@ class Sized:
     cut: bool = False
     of_effect: bool = False
     of_form: bool = False
+    of_records: bool = False
 
 
 OTHER_LAW = 10.0
@@ -561,12 +564,13 @@ class Integral:
         """Return by how much each further quantity alone would raise the logarithm, (n_places,).
 
         To first order; minus infinity for one that would be invisible at its largest scale. The
-        noise stays, or is ``renewed`` as it would be beside the most probable sizes; and then each
-        error of records or laws may be at its least, which may stand for what the quantity does.
+        noise stays, or is ``renewed`` as it would be beside the most probable sizes. An error of
+        the records may stand for what the quantity does: it is then at its least where that is
+        better.
         """
         gains = self._gains_at(places, renewed)
         for number, part in enumerate(self.hypothesis.sized if renewed else ()):
-            if not part.of_effect and self.scales[number] > 2.0 * self.least[number]:
+            if part.of_records and self.scales[number] > self.least[number]:
                 quiet = self._with_least(number)
                 gains = np.maximum(
                     gains, quiet._gains_at(places, renewed) + quiet._ln() - self._ln()

@@ -388,7 +388,8 @@ def test_a_gain_counts_the_errors_of_records_that_are_left(rng):
     column = of_records @ rng.normal(size=(records, 1))
     residuals = rng.normal(size=count) - 25.0 * column[:, 0]
     unknowns = free(np.ones((count, 1)), mean=0.0, deviation=1.0)
-    errors, further = sized(of_records, 0.03, 30.0), sized(column, 0.1, 100.0)
+    errors = replace(sized(of_records, 0.03, 30.0), of_records=True)
+    further = sized(column, 0.1, 100.0)
     integral = Integral(hypothesis(residuals, unknowns, errors))
     before = integral.score().ln
     wanted = score(hypothesis(residuals, unknowns, errors, further)).ln - before

@@ -205,10 +205,7 @@ class LawErrors:
             records = np.arange(shape[0])
             values[records, records, row] = self._noise[row]
             columns = self._whole(self.data.whiten(values).T)
-            none = np.zeros(shape[0])
-            sized.append(
-                Sized(f"repeatability of {CHANNELS[channel]}", columns, *REPEATABLE, none, none > 0)
-            )
+            sized.append(_of_records(f"repeatability of {CHANNELS[channel]}", columns, REPEATABLE))
         return (*sized, self._of_error)
 
     @property
@@ -219,8 +216,7 @@ class LawErrors:
         of_one = np.zeros((*changes.shape[:2], *shape))
         of_one[records, :, records] = changes
         whole = self._whole(self.data.whiten(of_one.reshape(-1, *shape)).T)
-        none = np.zeros(whole.shape[1])
-        return Sized("repeatability of the static error", whole, *STATED, none, none > 0)
+        return _of_records("repeatability of the static error", whole, STATED)
 
     @cached_property
     def _noise(self) -> Matrix:
@@ -385,3 +381,9 @@ class LawErrors:
         least, most = np.sqrt(n_rows / size), np.sqrt(self._measured / size)
         none = np.zeros(m)
         return Sized(f"outside: {name}", whole, float(least), float(most), none, none > 0.0)
+
+
+def _of_records(name: str, columns: Matrix, scales: tuple[float, float]) -> Sized:
+    """Return an error of the records whose scale lies in a range."""
+    none = np.zeros(columns.shape[1])
+    return Sized(name, columns, *scales, none, none > 0.0, of_records=True)
