@@ -146,6 +146,12 @@ def steady(folder: Path) -> dict[str, bytes]:
 
 def whole(path: Path) -> bool:
     """Whether a file is complete, by what ends a file of its type."""
+    if path.suffix == ".npy":
+        try:
+            np.load(path, allow_pickle=False)
+        except (ValueError, EOFError):
+            return False
+        return True
     text = path.read_bytes()
     try:
         if path.suffix == ".json":

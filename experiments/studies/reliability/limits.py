@@ -121,13 +121,13 @@ def read_only() -> Iterator[bool]:
 
 
 def two_at_once() -> Iterator[bool]:
-    """Run the same experiment twice at once into one folder."""
+    """Run the same experiment twice at once into one folder: one of them may be refused."""
     for _ in range(3):
         with tempfile.TemporaryDirectory(prefix="twice-") as top:
             command = _experiment(*EXPERIMENT, "--workers", "1", "--out", top)
             processes = [_started(command) for _ in range(2)]
-            codes = [process.wait(PATIENCE) for process in processes]
-            yield codes == [0, 0] and steady(Path(top)) == reference().files
+            codes = sorted(process.wait(PATIENCE) for process in processes)
+            yield codes in ([0, 0], [0, 2]) and steady(Path(top)) == reference().files
 
 
 def two_reports_at_once() -> Iterator[bool]:
