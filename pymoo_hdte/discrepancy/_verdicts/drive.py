@@ -93,8 +93,7 @@ def examine_drive(campaign: Campaign, rules: Rules = RULES) -> DriveFinding:
     held = flanks_held(features, campaign.torque_scale, rules)
     enough = held.sum() >= rules.fewest_records
     known = campaign.believed.error_orders
-    powers = [{order: line.power for order, line in of_record.items()} for of_record in lines]
-    rattles = enough and rattling.is_heard(powers, held, known, ratio, rules)
+    rattles = enough and rattling.is_heard(lines, held, known, ratio, rules)
     # Lines of a motion that does not repeat are no orders.
     repeating = np.flatnonzero(held) if rattles else range(len(lines))
     unexpected = unexpected_orders([lines[row] for row in repeating], ratio, rules)

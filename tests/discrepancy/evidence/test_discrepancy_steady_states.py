@@ -232,8 +232,7 @@ def test_a_clearance_is_heard_without_load_and_a_soft_windup_is_not(hidden, hear
     rig = true_rig(*([effect("mesh", **hidden)] if hidden else []))
     campaign = run_campaign(rig, BELIEVED, RIG, np.random.default_rng(4), CONDITIONS)
     features = measure(campaign, campaign.train, ORDERS)
-    found = unexpected_lines(features, BELIEVED.ratio, campaign.rig)
-    lines = [{order: line.power for order, line in of_record.items()} for of_record in found]
+    lines = unexpected_lines(features, BELIEVED.ratio, campaign.rig)
     held = flanks_held(features, campaign.torque_scale, RULES)
     assert held.tolist() == [False, True, False, True]
     assert rattling.is_heard(lines, held, BELIEVED.error_orders, BELIEVED.ratio) == heard

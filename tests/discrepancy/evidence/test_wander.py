@@ -7,7 +7,7 @@ import pytest
 from virtual_rig_cases import BELIEVED, RIG
 
 from pymoo_hdte.discrepancy import RunningRecord
-from pymoo_hdte.discrepancy._evidence.order_lines.features import measure
+from pymoo_hdte.discrepancy._evidence.order_lines.features import measure, unexpected_lines
 from pymoo_hdte.units import REVOLUTION_PER_MINUTE
 
 RATIO = BELIEVED.ratio
@@ -49,3 +49,11 @@ def test_a_tone_within_a_line_is_known_from_records_at_other_speeds(rng, size):
 def test_what_does_not_wander_does_so_in_no_line(rng):
     features = measure(CAMPAIGN, [wandering(rng, rpm, 0.0) for rpm in RATES], ORDERS)
     assert not features.wander.any()
+
+
+@pytest.mark.parametrize("coarse", [False, True])
+@pytest.mark.parametrize("size", [1e-5, 4e-4])
+def test_a_speed_that_wanders_shows_no_line_of_the_drive(rng, size, coarse):
+    """The output follows the input, so that an angle of either shows what is none."""
+    features = measure(CAMPAIGN, [wandering(rng, rpm, size) for rpm in RATES], ORDERS)
+    assert unexpected_lines(features, RATIO, RIG, coarse=coarse) == [{}] * len(RATES)

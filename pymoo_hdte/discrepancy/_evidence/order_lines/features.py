@@ -276,13 +276,6 @@ def _load_variance(record: RunningRecord) -> float:
     return sum(error.size**2 for error in errors if error.channel == "output_torque")
 
 
-class Line(NamedTuple):
-    """A line of a record that exceeds the noise: its power, and whether it is one of the drive."""
-
-    power: float
-    of_drive: bool
-
-
 class _Spectrum(NamedTuple):
     """Orders and powers (5, k) of what lines leave of a record, its raw samples, and rad/s."""
 
@@ -291,17 +284,22 @@ class _Spectrum(NamedTuple):
     samples: int
     speed: float
 
+    @property
+    def of_output(self) -> NDArray[np.float64]:
+        """Power of what the output does and the input does not, shape (k,)."""
+        return np.minimum(self.power[CHANNELS.index("transmission_error")], self.power[-1])
+
 
 def unexpected_lines(
     features: Features, ratio: float, rig: Rig, rules: Rules = RULES, coarse: bool = False
-) -> list[dict[float, Line]]:
+) -> list[dict[float, float]]:
     """Return the lines outside the features' orders at which each record exceeds the noise.
 
-    Each record has a mapping of orders, in cycles per input turn, to lines, whose powers are summed
-    over channels. The input moves as it likes, so that what it alone does counts only as what a
-    motor may do: in whole cycles of its turn, and beyond what it does beside them. Elsewhere a line
-    is one of the output or a torque. A ``coarse`` scale shows tones of its own, which are at other
-    orders at other speeds: what no torque shows is then of the drive where it is at all speeds.
+    Each record has a mapping of orders, in cycles per input turn, to powers summed over channels.
+    The input moves as it likes, so that what it alone does counts only as what a motor may do: in
+    whole cycles of its turn, and beyond what it does beside them. A ``coarse`` scale shows tones of
+    its own, which are at other orders at other speeds: elsewhere, what no torque shows is then a
+    line only where the output has it at all speeds.
     """
     spectra = []
     for record in features.records:
@@ -311,18 +309,21 @@ def unexpected_lines(
         samples = len(record.time) * record.samples_averaged
         spectra.append(_Spectrum(orders.round(9), amplitudes**2, samples, abs(record.input_speed)))
     lines = []
-    for orders, power, *_ in spectra:
-        threshold = np.log(4 * len(orders) * len(spectra) / rules.unexpected_line_chance)
-        certain = (power[1:3] > threshold).any(axis=0)
-        for place in np.flatnonzero(np.abs(orders - orders.round()) < WHOLE).tolist():
-            certain[place] |= power[0, place] > threshold
-            certain[place] |= power[3, place] > _threshold_at(place, power[3], threshold)
-        of_record = dict[float, Line]()
-        for place in np.flatnonzero(certain | (power[4] > threshold)).tolist():
-            order = float(orders[place])
-            of_drive = bool(certain[place]) or not coarse or _at_all_speeds(spectra, order)
-            of_record[order] = Line(float(power[:4, place].sum()), of_drive)
-        lines.append(of_record)
+    for spectrum in spectra:
+        orders, power = spectrum.orders, spectrum.power[: len(CHANNELS)]
+        threshold = np.log(power.size * len(spectra) / rules.unexpected_line_chance)
+        seen = (power[:3] > threshold).any(axis=0)
+        whole = np.abs(orders - orders.round()) < WHOLE
+        if coarse:
+            by_torque = (power[1:3] > threshold).any(axis=0)
+            for place in np.flatnonzero(seen & ~whole & ~by_torque).tolist():
+                shown = spectrum.of_output[place] > threshold
+                seen[place] = shown and _at_all_speeds(spectra, orders[place])
+        for place in np.flatnonzero(whole).tolist():
+            seen[place] |= power[3, place] > _threshold_at(place, power[3], threshold)
+        beyond = np.flatnonzero(seen)
+        sizes = power[:, beyond].sum(axis=0)
+        lines.append(dict(zip(orders[beyond].tolist(), sizes.tolist(), strict=True)))
     return lines
 
 
@@ -332,7 +333,7 @@ def _at_all_speeds(spectra: Sequence[_Spectrum], order: float) -> bool:
     At those where it would show beside noise.
     """
     reaching = [
-        (float(spectrum.power[4, places[0]]), spectrum.samples, spectrum.speed)
+        (spectrum.of_output[places[0]], spectrum.samples, spectrum.speed)
         for spectrum in spectra
         if (places := np.flatnonzero(spectrum.orders == order)).size
     ]
@@ -358,16 +359,16 @@ def _threshold_at(place: int, power: NDArray[np.float64], threshold: float) -> f
 
 
 def unexpected_orders(
-    lines: Sequence[dict[float, Line]], ratio: float, rules: Rules = RULES
+    lines: Sequence[dict[float, float]], ratio: float, rules: Rules = RULES
 ) -> list[float]:
-    """Return the orders of unexpected lines of the drive in several records, the strongest first.
+    """Return the orders of unexpected lines of several records, the strongest first.
 
     The total power counts. Fixed frequencies, whose order differs between records, do not add up
     and come last.
     """
     total: Counter[float] = Counter()
-    for of_record in lines:
-        total.update({order: line.power for order, line in of_record.items() if line.of_drive})
+    for powers in lines:
+        total.update(powers)
     strongest: list[float] = []
     for order in sorted(total, key=lambda order: -total[order]):
         if all(abs(order - stronger) > 2.5 / ratio for stronger in strongest):
