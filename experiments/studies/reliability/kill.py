@@ -146,19 +146,16 @@ def steady(folder: Path) -> dict[str, bytes]:
 
 def whole(path: Path) -> bool:
     """Whether a file is complete, by what ends a file of its type."""
-    if path.suffix == ".npy":
-        try:
-            np.load(path, allow_pickle=False)
-        except (ValueError, EOFError):
-            return False
-        return True
     text = path.read_bytes()
     try:
         if path.suffix == ".json":
             json.loads(text)
         if path.suffix == ".txt":
             [float(line) for line in text.decode().split()]
-    except ValueError:
+        if path.suffix == ".npy":
+            np.load(path, allow_pickle=False)
+            return True
+    except (ValueError, EOFError):
         return False
     ends = {".png": b"IEND\xaeB`\x82", ".html": b"</html>"}
     return text.endswith(ends.get(path.suffix, b"\n"))

@@ -29,7 +29,7 @@ from pymoo_hdte.discrepancy._records.line_basis import (
     mean_speed,
     nyquist_order,
 )
-from pymoo_hdte.discrepancy._records.records import RunningRecord
+from pymoo_hdte.discrepancy._records.records import Jump, ReadingError, RunningRecord
 
 CHANNELS = ("transmission_error", "input_torque", "output_torque", "input_angle")
 
@@ -185,11 +185,11 @@ def order_lines(
         parts_of_folded[np.isin(folded, beyond)] = of_waves.swapaxes(0, 1)
     covariance = np.diag(noise)[:, None, None] * unit
     for jump in record.jumps:
-        channel, share = _READ[jump.channel]
-        covariance[channel, 0, 0] += (jump.size / (ratio if share else 1.0)) ** 2
+        channel, variance = _variance_in_channel(jump, ratio)
+        covariance[channel, 0, 0] += variance
     for error in record.reading_errors:
-        channel, share = _READ[error.channel]
-        covariance[channel, 0, 0] += (error.size / (ratio if share else 1.0)) ** 2
+        channel, variance = _variance_in_channel(error, ratio)
+        covariance[channel, 0, 0] += variance
         for power, bend in enumerate(courses[:3], 2):
             shape = math.factorial(power) * bend / float(np.ptp(record.time)) ** power
             part = error.bent * np.r_[shape.real, shape.imag[1:]]
@@ -325,6 +325,12 @@ def step_variances(record: RunningRecord, ratio: float) -> NDArray[np.float64]:
     variances = np.zeros(len(CHANNELS))
     for error in record.reading_errors:
         if error.of_lines:
-            channel, share = _READ[error.channel]
-            variances[channel] += (error.size / (ratio if share else 1.0)) ** 2
+            channel, variance = _variance_in_channel(error, ratio)
+            variances[channel] += variance
     return variances
+
+
+def _variance_in_channel(error: Jump | ReadingError, ratio: float) -> tuple[int, float]:
+    """Return the place in `CHANNELS` of what a sensor shows, and the square of its error there."""
+    channel, share = _READ[error.channel]
+    return channel, (error.size / (ratio if share else 1.0)) ** 2

@@ -16,7 +16,7 @@ from pymoo_hdte.discrepancy._records.records import RunningRecord
 from pymoo_hdte.discrepancy._records.uneven_sums import sums_at_lines, sums_at_whole_lines
 from pymoo_hdte.discrepancy._selection.rules import RULES
 
-N_CHANNELS = 5
+_N_CHANNELS = 5
 """Those of the order lines, and the output angle."""
 # Numerical limits of a linear fit; the verdict does not depend on them.
 LEAST_SEPARATION = 0.1
@@ -74,7 +74,7 @@ def residual_spectrum(
     whole = ratio * np.arange(1.0, np.ceil(highest - 1e-9))
     whole = whole[np.abs(whole - whole.round()) > 1e-9]
     # The output angle is that of the input, divided by the ratio, less the transmission error.
-    channels = np.vstack([np.eye(N_CHANNELS - 1), [-1.0, 0.0, 0.0, 1.0 / ratio]])
+    channels = np.vstack([np.eye(_N_CHANNELS - 1), [-1.0, 0.0, 0.0, 1.0 / ratio]])
     covariance = row_covariance(rig, ratio, record.samples_averaged)
     variances = np.diag(channels @ covariance @ channels.T)
     sigma = np.sqrt(variances)
@@ -134,7 +134,7 @@ class _Sums:
 
         Returns which lines are separate enough, and their amplitudes (5, k), for n rows.
         """
-        shared, products = self.products[:-N_CHANNELS], self.products[-N_CHANNELS:]
+        shared, products = self.products[:-_N_CHANNELS], self.products[-_N_CHANNELS:]
         power = n - np.sum(np.abs(shared) ** 2, axis=0)
         square = self.squares - np.sum(shared**2, axis=0)
         separate = power - np.abs(square) > LEAST_SEPARATION * n

@@ -557,12 +557,12 @@ class Growth:
         take up, so that the curve seems to bring nothing beside another effect.
         """
         curves = list[Candidate]()
-        for weighed in self._known.values():
-            if len(weighed.candidates) == 1 and weighed.candidates[0].label in self.screened:
-                (candidate,) = weighed.candidates
-                values = tuple(weighed.fit.values[weighed.fit.n_base :].tolist())
-                if not candidate.linear and candidate.releases is None and values[0] != 0.0:
-                    curves.append(replace(candidate, starts=(*candidate.starts, values)))
+        alone = [known.fit for known in self._known.values() if len(known.candidates) == 1]
+        for fitted in alone:
+            (candidate,), values = fitted.candidates, tuple(fitted.values[fitted.n_base :].tolist())
+            is_curve = candidate.releases is None and not candidate.linear and values[0] != 0.0
+            if is_curve and candidate.label in self.screened and values not in candidate.starts:
+                curves.append(replace(candidate, starts=(*candidate.starts, values)))
         if curves:
             screened = screen(self.data, self.base, curves)
             self.screened.update((effect.candidate.label, effect) for effect in screened)

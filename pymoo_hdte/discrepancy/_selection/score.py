@@ -564,17 +564,17 @@ class Integral:
         """Return by how much each further quantity alone would raise the logarithm, (n_places,).
 
         To first order; minus infinity for one that would be invisible at its largest scale. The
-        noise stays, or is ``renewed`` as it would be beside the most probable sizes. An error of
-        the records may stand for what the quantity does: it is then at its least where that is
-        better.
+        noise stays, or is ``renewed`` as it would be beside the most probable sizes. Then each
+        error of the records, which may stand for what the quantity does, may be at its least, too.
         """
         gains = self._gains_at(places, renewed)
-        for number, part in enumerate(self.hypothesis.sized if renewed else ()):
-            if part.of_records and self.scales[number] > self.least[number]:
-                quiet = self._with_least(number)
-                gains = np.maximum(
-                    gains, quiet._gains_at(places, renewed) + quiet._ln() - self._ln()
-                )
+        if renewed:
+            ln = self._ln()
+            for number, part in enumerate(self.hypothesis.sized):
+                if part.of_records and self.scales[number] > self.least[number]:
+                    quiet = self._with_least(number)
+                    others = quiet._gains_at(places, renewed) + quiet._ln() - ln
+                    gains = np.maximum(gains, others)
         return gains
 
     def _with_least(self, number: int) -> Integral:

@@ -118,7 +118,7 @@ def errors_of_the_model(data):
 @pytest.mark.nightly
 def test_the_accuracy_of_the_drive_model_is_that_of_its_harmonics():
     exact, others = errors_of_the_model(EMPTY)
-    assert exact < RULES.exact_model_accuracy / 10.0
+    assert exact < 2e-5 < RULES.exact_model_accuracy
     # The rule is no smaller than the model's error, and not so large that it would hide others'.
     assert RULES.model_accuracy / 5.0 < others < RULES.model_accuracy
 

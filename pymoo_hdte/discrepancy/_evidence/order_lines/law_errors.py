@@ -174,7 +174,7 @@ class LawErrors:
         hypothesis = linearise(fitted, self.channels, errors, shares=self._shares)
         return hypothesis.beside(*self.of_records)
 
-    @property
+    @cached_property
     def _shares(self) -> Matrix:
         """Values that each residual counts for: nearly none of a line that is not shown.
 
@@ -188,11 +188,13 @@ class LawErrors:
             of_lead = features.places(CHANNELS.index("input_angle"))
             shares[:, of_lead] *= np.maximum(1.0 - by_motor, _NOTHING)[..., None]
         ratio = self.data.campaign.believed.ratio
+        variances = np.diagonal(features.covariance, axis1=1, axis2=2)
         for row, record in enumerate(features.records):
-            for channel, by_steps in enumerate(step_variances(record, ratio)):
-                places = features.places(channel).ravel()
-                whole = np.diag(features.covariance[row])[places]
-                shares[row, places] *= np.maximum(1.0 - by_steps / whole, _NOTHING)
+            by_steps = step_variances(record, ratio)
+            for channel in np.flatnonzero(by_steps).tolist():
+                places = features.places(channel)
+                of_rows = 1.0 - by_steps[channel] / variances[row, places]
+                shares[row, places] *= np.maximum(of_rows, _NOTHING)
         return np.append(shares.ravel(), np.ones(self.data.n_sweep_residuals))
 
     @cached_property
@@ -205,7 +207,9 @@ class LawErrors:
             records = np.arange(shape[0])
             values[records, records, row] = self._noise[row]
             columns = self._whole(self.data.whiten(values).T)
-            sized.append(_of_records(f"repeatability of {CHANNELS[channel]}", columns, REPEATABLE))
+            sized.append(
+                _error_of_records(f"repeatability of {CHANNELS[channel]}", columns, REPEATABLE)
+            )
         return (*sized, self._of_error)
 
     @property
@@ -216,7 +220,7 @@ class LawErrors:
         of_one = np.zeros((*changes.shape[:2], *shape))
         of_one[records, :, records] = changes
         whole = self._whole(self.data.whiten(of_one.reshape(-1, *shape)).T)
-        return _of_records("repeatability of the static error", whole, STATED)
+        return _error_of_records("repeatability of the static error", whole, STATED)
 
     @cached_property
     def _noise(self) -> Matrix:
@@ -383,7 +387,7 @@ class LawErrors:
         return Sized(f"outside: {name}", whole, float(least), float(most), none, none > 0.0)
 
 
-def _of_records(name: str, columns: Matrix, scales: tuple[float, float]) -> Sized:
+def _error_of_records(name: str, columns: Matrix, scales: tuple[float, float]) -> Sized:
     """Return an error of the records whose scale lies in a range."""
     none = np.zeros(columns.shape[1])
     return Sized(name, columns, *scales, none, none > 0.0, of_records=True)
