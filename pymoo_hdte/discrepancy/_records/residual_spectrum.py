@@ -68,6 +68,18 @@ def residual_spectrum(
     >>> orders.shape[0] == sizes.shape[-1]
     True
     """
+    searched, phasors = residual_phasors(record, rig, ratio, orders, highest_order)
+    return searched, np.abs(phasors)
+
+
+def residual_phasors(
+    record: RunningRecord,
+    rig: Rig,
+    ratio: float,
+    orders: ArrayLike | Sequence[float],
+    highest_order: float = RULES.highest_order,
+) -> tuple[NDArray[np.float64], NDArray[np.complex128]]:
+    """Return the lines of `residual_spectrum` with their phases at the zero of the input angle."""
     fit = LineFit.of(record, ratio, orders)
     highest = min(highest_order, nyquist_order(record))
     multiples = max(int(np.ceil(highest * ratio - 1e-9)) - 1, 0)
@@ -84,13 +96,13 @@ def residual_spectrum(
         rows = np.hstack([basis, fit.residual(part, basis) @ channels.T / sigma]).T
         sums.append(_Sums.of(rows, record.input_angle[part] / ratio, multiples, whole))
     n = len(record.time)
-    separate, amplitudes = reduce(_Sums.plus, sums).amplitudes(n)
+    separate, phasors = reduce(_Sums.plus, sums).phasors(n)
     of_steps = np.append(step_variances(record, ratio), 0.0)
     # A part of a line has the variance 2 sigma^2 / n by the noise of n rows.
-    amplitudes /= np.sqrt(1.0 + of_steps * n / (2.0 * variances))[:, None]
+    phasors /= np.sqrt(1.0 + of_steps * n / (2.0 * variances))[:, None]
     searched = np.concatenate([np.arange(1, multiples + 1), whole])[separate] / ratio
     rising = np.argsort(searched)
-    return searched[rising], amplitudes[:, rising]
+    return searched[rising], phasors[:, rising]
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,7 +141,7 @@ class _Sums:
         """Return the sums over the rows of both."""
         return _Sums(self.products + addend.products, self.squares + addend.squares)
 
-    def amplitudes(self, n: int) -> tuple[NDArray[np.bool_], NDArray[np.float64]]:
+    def phasors(self, n: int) -> tuple[NDArray[np.bool_], NDArray[np.complex128]]:
         """Fit cosine and sine of each wave, orthogonal to the basis, to residuals of variance 1.
 
         Returns which lines are separate enough, and their amplitudes (5, k), for n rows.
@@ -141,9 +153,10 @@ class _Sums:
         power, square, products = power[separate], square[separate], products[:, separate]
         # Normal equations of the two columns: c'c = (power + Re square)/2, s's = (power - Re
         # square)/2, c's = Im square / 2; their chi-square of two degrees of freedom has mean 2.
-        chi_square = 2.0 * (np.abs(products) ** 2 * power - np.real(products**2 * square.conj()))
-        chi_square /= power**2 - np.abs(square) ** 2
-        return separate, np.sqrt(chi_square / 2.0)
+        waves = 2.0 * (products * power - products.conj() * square)
+        waves /= power**2 - np.abs(square) ** 2
+        chi_square = np.real(products.conj() * waves)
+        return separate, np.sqrt(chi_square / 2.0) * np.exp(1j * np.angle(waves))
 
 
 def _whole_sums(

@@ -274,7 +274,9 @@ def _travel(record: RunningRecord) -> float:
 def _scales_are_coarse(rig: Rig, noise: Sequence[NoiseFinding]) -> bool:
     """Tell whether the angles show twice the power of the noise that is stated of their encoders.
 
-    Steps of a scale do so, whether they are stated or not.
+    Steps of a scale do so, whether they are stated or not. Noise averages out four fifths of their
+    first tone at that power, and less beyond: exp(-pi^2 / 6 / (times - 1)) of it remains, as in
+    `coarse_readings`.
     """
     shown = rig.angle_noise**2 + rig.angle_quantisation**2 / 12.0
     stated = [finding.stated for finding in noise if finding.name == "angle_noise"]

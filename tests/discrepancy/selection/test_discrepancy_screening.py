@@ -6,16 +6,8 @@ import numpy as np
 import pytest
 from night import others_at_night
 from planted_features import CONDITIONS, known_data, library, listed, measured, with_sweep
-from virtual_rig_cases import BELIEVED, RIG
 
 from pymoo_hdte.discrepancy._evidence.order_lines.candidates import out_of_tolerance
-from pymoo_hdte.discrepancy._evidence.order_lines.features import (
-    Features,
-    unexpected_lines,
-    unexpected_orders,
-)
-from pymoo_hdte.discrepancy._evidence.order_lines.prediction import Conditions
-from pymoo_hdte.discrepancy._records.records import RunningRecord
 from pymoo_hdte.discrepancy._selection.fitting import fit
 from pymoo_hdte.discrepancy._selection.screening import screen
 from pymoo_hdte.discrepancy._verdicts.rattling import leading_sweep_effect
@@ -166,60 +158,6 @@ def test_a_clean_sweep_and_none_speak_for_nothing():
     assert leading_sweep_effect(data, base, library(data)) is None
     swept = with_sweep(data, (), rng, stiffness=1.04, locked_stiffness=0.95)
     assert leading_sweep_effect(swept, fit(swept), library(data)) is None
-
-
-def record(rng, error):
-    """Two output turns at 600 rpm and nothing but the noise of the sensors and an error."""
-    speed = 20.0 * np.pi
-    time = np.arange(int(2.0 * 101.0 * 2.0 * np.pi / speed * 200.0)) / 200.0
-    angle = 40.0 + speed * time
-    noise = rng.standard_normal((4, len(time)))
-    return RunningRecord(
-        name="run",
-        role="train",
-        input_speed=speed,
-        load_torque=20.0,
-        sample_rate=200.0,
-        samples_averaged=1,
-        elapsed=0.0,
-        time=time,
-        input_angle=angle + BELIEVED.ratio * RIG.angle_noise * noise[0],
-        output_angle=angle / BELIEVED.ratio - error(angle) + RIG.angle_noise * noise[1],
-        input_torque=0.2 + RIG.input_torque_noise * noise[2],
-        output_torque=20.0 + RIG.output_torque_noise * noise[3],
-    )
-
-
-@pytest.mark.parametrize("lines", [(), (46.0 / 101.0,), (7.0, 46.0 / 101.0)])
-def test_lines_that_no_one_expected_are_found_the_strongest_first(lines):
-    def error(angle):
-        return sum((1.0 * ARCSEC / (1 + k) * np.sin(o * angle) for k, o in enumerate(lines)), 0.0)
-
-    rng = np.random.default_rng(7)
-    records = tuple(record(rng, error) for _ in range(3))
-    orders = np.array([1.0, 2.0, 2.02])
-    conditions = Conditions(*np.ones((3, 3)), np.zeros((3, 3, 4), dtype=complex))
-    features = Features(records, conditions, orders, np.zeros((3, 26)), np.zeros((3, 26, 26)))
-    found = unexpected_orders(unexpected_lines(features, BELIEVED.ratio, RIG), BELIEVED.ratio)
-    assert found == pytest.approx(lines, abs=0.5 / BELIEVED.ratio)
-
-
-def test_a_line_of_the_input_is_found_at_its_order_where_the_ratio_is_no_whole_number():
-    def error(angle):
-        return 0.5 * ARCSEC * np.sin(7.0 * angle)
-
-    rng = np.random.default_rng(8)
-    records = tuple(record(rng, error) for _ in range(3))
-    angles = [one.input_angle * (1.0 / BELIEVED.ratio - 1.0 / 50.5) for one in records]
-    records = tuple(
-        replace(one, output_angle=one.output_angle - angle)
-        for one, angle in zip(records, angles, strict=True)
-    )
-    conditions = Conditions(*np.ones((3, 3)), np.zeros((3, 3, 4), dtype=complex))
-    orders = np.array([1.0, 2.0])
-    features = Features(records, conditions, orders, np.zeros((3, 18)), np.zeros((3, 18, 18)))
-    # What the lines of such a ratio leak to comes after it.
-    assert unexpected_orders(unexpected_lines(features, 50.5, RIG), 50.5)[0] == 7.0
 
 
 def test_a_record_in_which_the_drive_would_rattle_says_nothing_of_a_clearance():

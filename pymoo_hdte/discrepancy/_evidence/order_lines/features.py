@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
+from scipy.stats import chi2, ncx2
 
 from pymoo_hdte.discrepancy._evidence.order_lines.folded_lines import orders_that_fold
 from pymoo_hdte.discrepancy._evidence.order_lines.prediction import Conditions, Prediction
@@ -36,17 +36,16 @@ from pymoo_hdte.discrepancy._records.line_fit import (
     unsteady_lines,
 )
 from pymoo_hdte.discrepancy._records.records import RunningRecord
-from pymoo_hdte.discrepancy._records.residual_spectrum import residual_spectrum
+from pymoo_hdte.discrepancy._records.residual_spectrum import residual_phasors
 from pymoo_hdte.discrepancy._selection.rules import RULES, Rules
 
-_OTHER_SPEED = 0.02
-"""Difference of the logarithms of speeds beyond which a tone of a scale is at another order."""
-_TELLING = 3.0
-"""Power above which a line shows beside noise, which exceeds it in 5 % of all places."""
-_SIMILAR = 0.4
-"""Least power of a line at another speed, as a share of what as long a record at that of the
-largest line would show: below six tenths of the resonance of the load, a static error moves the
-output by up to 1.6 times itself. What is raised more is shown by a torque."""
+_SPREAD = 0.1
+"""Most power of a line that differs between records, as a share of what they have in common. Below
+six tenths of the resonance of the load, a static error moves the output by 1 to 1.6 times itself,
+which is .05; where an error changes with the load, as much again. Random phases give .5 and more.
+"""
+_TAKEN_FOR_TONE = 0.01
+"""Chance that a line of that spread is taken for a tone of a scale."""
 _GUARD = 2
 """Neighbours on either side that a line may leak into."""
 MEANS = (0, 1)
@@ -277,17 +276,17 @@ def _load_variance(record: RunningRecord) -> float:
 
 
 class _Spectrum(NamedTuple):
-    """Orders and powers (5, k) of what lines leave of a record, its raw samples, and rad/s."""
+    """Orders and phasors (5, k) of what lines leave of a record, and its raw samples."""
 
     orders: NDArray[np.float64]
-    power: NDArray[np.float64]
+    phasors: NDArray[np.complex128]
     samples: int
-    speed: float
 
     @property
     def of_output(self) -> NDArray[np.float64]:
         """Power of what the output does and the input does not, shape (k,)."""
-        return np.minimum(self.power[CHANNELS.index("transmission_error")], self.power[-1])
+        error = self.phasors[CHANNELS.index("transmission_error")]
+        return np.minimum(np.abs(error), np.abs(self.phasors[-1])) ** 2
 
 
 def unexpected_lines(
@@ -298,19 +297,17 @@ def unexpected_lines(
     Each record has a mapping of orders, in cycles per input turn, to powers summed over channels.
     The input moves as it likes, so that what it alone does counts only as what a motor may do: in
     whole cycles of its turn, and beyond what it does beside them. A ``coarse`` scale shows tones of
-    its own, which are at other orders at other speeds: elsewhere, what no torque shows is then a
-    line only where the output has it at all speeds.
+    its own, which start anywhere in each record: elsewhere, what no torque shows is then a line
+    only where the output has it at the same angle in all records.
     """
     spectra = []
     for record in features.records:
-        orders, amplitudes = residual_spectrum(
-            record, rig, ratio, features.orders, rules.highest_order
-        )
+        orders, phasors = residual_phasors(record, rig, ratio, features.orders, rules.highest_order)
         samples = len(record.time) * record.samples_averaged
-        spectra.append(_Spectrum(orders.round(9), amplitudes**2, samples, abs(record.input_speed)))
+        spectra.append(_Spectrum(orders.round(9), phasors, samples))
     lines = []
     for spectrum in spectra:
-        orders, power = spectrum.orders, spectrum.power[: len(CHANNELS)]
+        orders, power = spectrum.orders, np.abs(spectrum.phasors[: len(CHANNELS)]) ** 2
         threshold = np.log(power.size * len(spectra) / rules.unexpected_line_chance)
         seen = (power[:3] > threshold).any(axis=0)
         whole = np.abs(orders - orders.round()) < WHOLE
@@ -318,7 +315,7 @@ def unexpected_lines(
             by_torque = (power[1:3] > threshold).any(axis=0)
             for place in np.flatnonzero(seen & ~whole & ~by_torque).tolist():
                 shown = spectrum.of_output[place] > threshold
-                seen[place] = shown and _at_all_speeds(spectra, orders[place])
+                seen[place] = shown and _is_common(spectra, orders[place])
         for place in np.flatnonzero(whole).tolist():
             seen[place] |= power[3, place] > _threshold_at(place, power[3], threshold)
         beyond = np.flatnonzero(seen)
@@ -327,21 +324,24 @@ def unexpected_lines(
     return lines
 
 
-def _at_all_speeds(spectra: Sequence[_Spectrum], order: float) -> bool:
-    """Tell whether the output has a line at all other speeds than where it is largest.
+def _is_common(spectra: Sequence[_Spectrum], order: float) -> bool:
+    """Tell whether a line of the transmission error may be the same in all records.
 
-    At those where it would show beside noise.
+    The phasors of n records, whose noise is of one size, have a part in common, and n - 1 in which
+    they differ; what these have is noncentral chi-square where the amplitudes spread.
     """
     reaching = [
-        (spectrum.of_output[places[0]], spectrum.samples, spectrum.speed)
+        (spectrum.phasors[0, places[0]], np.sqrt(spectrum.samples))
         for spectrum in spectra
         if (places := np.flatnonzero(spectrum.orders == order)).size
     ]
-    power, samples, speed = np.array(reaching).T
-    largest = int(np.argmax(power / samples))
-    expected = _SIMILAR * power[largest] * samples / samples[largest]
-    told = (np.abs(np.log(speed / speed[largest])) > _OTHER_SPEED) & (expected > _TELLING)
-    return bool(np.all(power[told] > expected[told]))
+    if len(reaching) < 2:
+        return True
+    phasors, sizes = np.array(reaching).T
+    common = np.abs(sizes @ phasors) ** 2 / np.sum(sizes.real**2)
+    differing = np.sum(np.abs(phasors) ** 2) - common
+    chance = ncx2.sf(2.0 * differing, 2 * (len(reaching) - 1), 2.0 * _SPREAD * common)
+    return bool(chance > _TAKEN_FOR_TONE)
 
 
 def _threshold_at(place: int, power: NDArray[np.float64], threshold: float) -> float:
