@@ -58,6 +58,10 @@ _SENTENCES: dict[str, Callable[[Reason, Label], str]] = {
     codes.RICHER_AT_BOUND: lambda reason, label: (
         f"{label(reason.effect)} fits better, but its {', '.join(reason.names)} ended at a bound"
     ),
+    codes.RICHER_LEAVES_LESS: lambda reason, label: (
+        f"{label(reason.effect)} together would leave "
+        f"{100.0 * dict(reason.numbers)['share']:.0f} % of the residual"
+    ),
     codes.MORE_MISSING: lambda reason, label: (
         "whether more is missing is open; outside the library it is with a probability of "
         f"{100.0 * dict(reason.numbers)['outside']:.0f} %"

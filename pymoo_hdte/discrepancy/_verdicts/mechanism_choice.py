@@ -27,6 +27,7 @@ from pymoo_hdte.discrepancy._selection.reason import (
     AT_TOLERANCE,
     EXPLAINS_TOO_LITTLE,
     RICHER_AT_BOUND,
+    RICHER_LEAVES_LESS,
     Reason,
 )
 from pymoo_hdte.discrepancy._selection.search import Search
@@ -80,7 +81,8 @@ def judged(
     scale = stated.reach / rules.certain_deviations
     unsure = uncertain(chosen.fit, rules, stated.covariance * np.outer(scale, scale))
     of_zeros = [reason for reason in holds_zero(unsure) if reason not in verdict.reasons]
-    return verdict.with_caveats([_too_little(removed)] * little + of_zeros)
+    further = _much_richer(data, verdict, chosen) if verdict.status == "named" else []
+    return verdict.with_caveats([_too_little(removed)] * little + of_zeros + further)
 
 
 def _compared(
@@ -112,6 +114,28 @@ def _compared(
     return judge(
         data, base, candidates, sorted(hypotheses, key=lambda hypothesis: hypothesis.bic)
     ), True
+
+
+def _much_richer(data: MeasuredData, verdict: Verdict, chosen: Hypothesis) -> list[Reason]:
+    """Return that a further effect would remove most of what a set leaves, if one would.
+
+    Small beside the misfit of the base, it is not named: what is left may be the form of a law.
+    """
+    rules, power = data.rules, data.power(chosen.fit.residuals)
+    richer = [
+        hypothesis
+        for hypothesis in verdict.alternatives
+        if label_of(hypothesis.candidates) > label_of(chosen.candidates)
+        and not _bounded(hypothesis.fit)
+        and not uncertain(hypothesis.fit, rules)
+    ]
+    if not richer:
+        return []
+    best = min(richer, key=lambda hypothesis: hypothesis.bic)
+    share = float(np.max(data.power(best.fit.residuals) / power))
+    if share > 1.0 - rules.second_share:
+        return []
+    return [Reason.of(RICHER_LEAVES_LESS, best.label, {"share": share})]
 
 
 def _largest_first(data: MeasuredData, hypothesis: Hypothesis) -> Hypothesis:

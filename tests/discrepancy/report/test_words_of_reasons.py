@@ -14,6 +14,7 @@ NUMBERS = {
     codes.EXPLAINS_TOO_LITTLE: {"share": 0.6},
     codes.HARMONIC_OF_ANOTHER: {"backlash:mesh@1": 2.0},
     codes.MORE_MISSING: {"outside": 0.6},
+    codes.RICHER_LEAVES_LESS: {"share": 0.16},
     codes.SENSOR_OFF: {"fitted": 0.1, "stated": 0.01},
     codes.LINES_ABOVE: {"20": 20.0, "highest": 18.0},
     codes.HARMONIC_ABOVE: {"order": 10.0, "highest": 18.0},

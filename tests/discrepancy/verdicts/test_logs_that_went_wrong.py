@@ -8,6 +8,7 @@ import pytest
 from places import SHARED
 
 from pymoo_hdte.discrepancy import analyse, read_rig
+from pymoo_hdte.discrepancy._selection.reason import RICHER_LEAVES_LESS
 
 LOGS = SHARED / "cases" / "real"
 UNQUALIFIED = ("named", "parameter")
@@ -45,6 +46,15 @@ def test_a_pendulum_that_has_no_slow_motion_is_known_where_it_swings():
 
 def test_effects_that_make_the_held_out_motion_worse_are_not_named():
     assert analysed("named_though_gap_grows").verdict.status not in UNQUALIFIED
+
+
+def test_an_effect_beside_which_another_removes_most_of_the_rest_is_no_plain_name():
+    """Gravity is 98 % of the misfit; dry friction removes five sixths of what it leaves."""
+    verdict = analysed("gravity_hides_coulomb").verdict
+    assert [effect.name for effect in verdict.accepted.effects] == ["gravity"]
+    assert verdict.status == "partial"
+    (reason,) = (reason for reason in verdict.reasons if reason.code == RICHER_LEAVES_LESS)
+    assert set(reason.effect.split("+")) == {"gravity:bearing", "coulomb_friction:bearing"}
 
 
 def test_an_order_beyond_the_band_at_its_bound_is_named_nowhere(tmp_path):
