@@ -81,8 +81,8 @@ def judged(
     scale = stated.reach / rules.certain_deviations
     unsure = uncertain(chosen.fit, rules, stated.covariance * np.outer(scale, scale))
     of_zeros = [reason for reason in holds_zero(unsure) if reason not in verdict.reasons]
-    further = _much_richer(data, verdict, chosen) if verdict.status == "named" else []
-    return verdict.with_caveats([_too_little(removed)] * little + of_zeros + further)
+    richer = _much_richer(data, verdict, chosen)
+    return verdict.with_caveats([_too_little(removed)] * little + of_zeros + richer)
 
 
 def _compared(
