@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import re
-from pathlib import Path
 
 import pytest
+from places import DOCS, PACKAGE, ROOT
 
-ROOT = Path(__file__).parents[2]
-PAGE = ROOT / "docs" / "architecture.md"
+PAGE = DOCS / "architecture.md"
 NAMED = sorted(set(re.findall(r"`([\w/]+/\w+\.py)[` ]", PAGE.read_text())))
 
 
@@ -18,4 +17,4 @@ def test_the_page_names_files_with_their_rooms():
 
 @pytest.mark.parametrize("name", NAMED)
 def test_a_named_file_exists(name):
-    assert any((root / name).is_file() for root in (ROOT, ROOT / "pymoo_hdte"))
+    assert any((root / name).is_file() for root in (ROOT, PACKAGE))

@@ -4,7 +4,7 @@ import re
 from itertools import chain
 
 import pytest
-from places import ROOT
+from places import PACKAGE
 
 from pymoo_hdte._reports.glossary import GLOSSARY, terms_of
 from pymoo_hdte._reports.html import page
@@ -12,7 +12,7 @@ from pymoo_hdte.discrepancy._selection.verdict import STATUSES
 
 REPORTS = {
     path.name: path.read_text(encoding="utf-8")
-    for path in (ROOT / "pymoo_hdte").rglob("*.html.j2")
+    for path in PACKAGE.rglob("*.html.j2")
     if "<html" in path.read_text(encoding="utf-8")
 }
 WORDS = {

@@ -7,7 +7,7 @@ from importlib import import_module
 from typing import get_type_hints
 
 import pytest
-from places import DOCS, ROOT
+from places import DOCS, PACKAGE, ROOT
 from public_names import PACKAGES
 
 import pymoo_hdte
@@ -39,7 +39,7 @@ def test_every_public_name_is_in_exactly_one_group():
 
 
 def test_every_package_for_users_is_in_the_reference():
-    packages = {path.parent.name for path in (ROOT / "pymoo_hdte").glob("*/__init__.py")}
+    packages = {path.parent.name for path in PACKAGE.glob("*/__init__.py")}
     # Those serve the command line and extensions, which have pages of their own.
     assert packages - {"cli", "_io", "effects", "_reports", "_runner", "_comparing"} <= {*PACKAGES}
 

@@ -3,7 +3,10 @@
 from pathlib import Path
 
 import experiments
+import pymoo_hdte
 
+PACKAGE = Path(pymoo_hdte.__file__).parent
+"""The package that is tested, which is installed elsewhere when a release is tested."""
 ROOT = Path(experiments.__file__).parents[1]
 DOCS = ROOT / "docs"
 STORED = ROOT / "tests" / "stored"

@@ -3,14 +3,13 @@
 import json
 import re
 from dataclasses import replace
-from pathlib import Path
 
 import made_joint
 import numpy as np
 import pytest
 from made_joint import ARCSECOND, DAMPING, STIFFNESS, Hidden, believed, record, records
+from places import DOCS
 
-import pymoo_hdte
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy import JointAnalysis, analyse, read_rig
 from pymoo_hdte.discrepancy._answers.joint_open_questions import (
@@ -178,7 +177,7 @@ def joint_analysis(tmp_path_factory):
     The wind-up of the gear and the motor's friction are hidden in it.
     """
     folder = tmp_path_factory.mktemp("joint")
-    page = (Path(pymoo_hdte.__file__).parents[1] / "docs" / "two_encoders.md").read_text()
+    page = (DOCS / "two_encoders.md").read_text(encoding="utf-8")
     (folder / "rig.toml").write_text(re.search(r"```toml\n(.*?)```", page, re.S)[1])
     log = record(Hidden(WINDUP, dry=4.0), "train", 36.0)
     counts = {"motor": 2**20 * 101, "load": 2**24}

@@ -15,6 +15,7 @@ from shutil import copytree, ignore_patterns
 import numpy as np
 import pytest
 from example_result import example
+from places import PACKAGE, ROOT
 
 import experiments
 from experiments.command_line import main
@@ -392,9 +393,8 @@ def test_a_result_depends_on_source_stored_outcomes_and_template(changed, tmp_pa
 
 def test_the_versions_are_those_of_all_that_computes_a_result():
     """Every package that the sources import, but for those that only run or show a computation."""
-    root = Path(experiments.__file__).parents[1]
     imported = set()
-    for path in [*(root / "pymoo_hdte").rglob("*.py"), *(root / "experiments").rglob("*.py")]:
+    for path in [*PACKAGE.rglob("*.py"), *(ROOT / "experiments").rglob("*.py")]:
         imported |= set(re.findall(r"^ *(?:import|from) (\w+)", path.read_text(), re.MULTILINE))
     distributions = packages_distributions()
     found = {name for module in imported & distributions.keys() for name in distributions[module]}
