@@ -231,5 +231,4 @@ def caveats(verdict: Verdict, error_orders: Sequence[float] = ()) -> list[str]:
 
 def sure_in_words(probability: float) -> str:
     """Return a probability in whole per cent; no model is right with 100 %."""
-    whole = int(100.0 * probability)
-    return f"{whole} %" if whole < 100 else "more than 99 %"
+    return "more than 99 %" if probability > 0.99 else f"{int(100.0 * probability)} %"

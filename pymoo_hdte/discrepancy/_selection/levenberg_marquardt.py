@@ -262,6 +262,8 @@ def _step(
     damping: float,
 ) -> _Step | None:
     """Return the next step; None if no damping reduces the sum of squares noticeably."""
+    if not values.size:
+        return None
     orthonormal, triangle = np.linalg.qr(jacobian)
     along, before = orthonormal.T @ residuals, residuals @ residuals
     size = np.maximum(size, 1e-12)

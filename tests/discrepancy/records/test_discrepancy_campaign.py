@@ -344,9 +344,7 @@ needs_shared = pytest.mark.skipif(not RIGS.is_dir(), reason="the shared rig data
 
 
 @needs_shared
-@pytest.mark.parametrize(
-    "path", others_at_night(SHARED_CAMPAIGNS, *SHARED_CAMPAIGNS[:4]), ids=lambda p: p.parent.name
-)
+@pytest.mark.parametrize("path", others_at_night(SHARED_CAMPAIGNS, *SHARED_CAMPAIGNS[:4]), ids=str)
 def test_shared_campaigns_are_read(path):
     read = read_campaign(path.parent)
     assert (len(read.train), len(read.held_out), len(read.torsion)) == (13, 6, 1)
