@@ -22,6 +22,13 @@ SHOWN = {
 """Lines that the README says are printed, by the picture that the same run gives."""
 
 
+def named_examples():
+    """Return the pictures' names; a swarm goes other ways where another NumPy rounds otherwise."""
+    older = np.lib.NumpyVersion(np.__version__) < "2.4.0"
+    skip = pytest.mark.skipif(older, reason="printed with NumPy 2.4 or later")
+    return [pytest.param(name, marks=[skip] * (name == "fronts.png")) for name in sorted(SHOWN)]
+
+
 def output_of(snippet: str) -> str:
     text = io.StringIO()
     with contextlib.redirect_stdout(text):
@@ -30,7 +37,7 @@ def output_of(snippet: str) -> str:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", sorted(SHOWN))
+@pytest.mark.parametrize("name", named_examples())
 def test_an_example_prints_what_the_readme_says(name):
     printed, _ = example(name)
     assert SHOWN[name]
@@ -38,7 +45,7 @@ def test_an_example_prints_what_the_readme_says(name):
         assert line in printed.splitlines(), printed
 
 
-@pytest.mark.parametrize("name", sorted(SHOWN))
+@pytest.mark.parametrize("name", named_examples())
 def test_a_picture_is_of_the_run_that_prints_the_text(name):
     """The picture of a report was once older than the report, and kinder."""
     printed, drawn = example(name)

@@ -70,8 +70,7 @@ def run(context: Context) -> Result:
         paragraphs=(
             *stored_outcome(context, "blind"),
             f"These figures are pooled over the runs since case {recent(runs)[0].first}, which met "
-            "the rules that decided of drives before the score does. The decision about the score "
-            f"has what it was compared on. {_extent(outcomes)}",
+            f"the score of drives; earlier ones met rules. {_extent(outcomes)}",
             SETTING,
         ),
         tables=(

@@ -45,9 +45,6 @@ def test_the_cheapest_ends_as_it_is_stored(outcomes):
 
 
 @pytest.mark.nightly
-@pytest.mark.xfail(
-    strict=True, reason="the stored outcomes are those of the rules, before drives had a score"
-)
 def test_a_dozen_ends_as_it_is_stored(outcomes):
     step = max(len(outcomes) // DOZEN, 1)
     for stored in outcomes[::step][:DOZEN]:
