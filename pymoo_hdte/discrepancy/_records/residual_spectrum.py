@@ -73,11 +73,7 @@ def residual_spectrum(
 
 
 def residual_phasors(
-    record: RunningRecord,
-    rig: Rig,
-    ratio: float,
-    orders: ArrayLike | Sequence[float],
-    highest_order: float = RULES.highest_order,
+    record: RunningRecord, rig: Rig, ratio: float, orders: ArrayLike, highest_order: float
 ) -> tuple[NDArray[np.float64], NDArray[np.complex128]]:
     """Return the lines of `residual_spectrum` with their phases at the zero of the input angle."""
     fit = LineFit.of(record, ratio, orders)
@@ -144,7 +140,7 @@ class _Sums:
     def phasors(self, n: int) -> tuple[NDArray[np.bool_], NDArray[np.complex128]]:
         """Fit cosine and sine of each wave, orthogonal to the basis, to residuals of variance 1.
 
-        Returns which lines are separate enough, and their amplitudes (5, k), for n rows.
+        Returns which lines are separate enough, and their phasors (5, k), for n rows.
         """
         shared, products = self.products[:-_N_CHANNELS], self.products[-_N_CHANNELS:]
         power = n - np.sum(np.abs(shared) ** 2, axis=0)

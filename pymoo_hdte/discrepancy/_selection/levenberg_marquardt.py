@@ -262,7 +262,7 @@ def _step(
     damping: float,
 ) -> _Step | None:
     """Return the next step; None if no damping reduces the sum of squares noticeably."""
-    if not values.size:
+    if not values.size:  # lsq_linear of older versions of SciPy refuses it.
         return None
     orthonormal, triangle = np.linalg.qr(jacobian)
     along, before = orthonormal.T @ residuals, residuals @ residuals

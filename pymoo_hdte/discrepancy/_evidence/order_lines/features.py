@@ -282,12 +282,6 @@ class _Spectrum(NamedTuple):
     phasors: NDArray[np.complex128]
     samples: int
 
-    @property
-    def of_output(self) -> NDArray[np.float64]:
-        """Power of what the output does and the input does not, shape (k,)."""
-        error = self.phasors[CHANNELS.index("transmission_error")]
-        return np.minimum(np.abs(error), np.abs(self.phasors[-1])) ** 2
-
 
 def unexpected_lines(
     features: Features, ratio: float, rig: Rig, rules: Rules = RULES, coarse: bool = False
@@ -307,14 +301,15 @@ def unexpected_lines(
         spectra.append(_Spectrum(orders.round(9), phasors, samples))
     lines = []
     for spectrum in spectra:
-        orders, power = spectrum.orders, np.abs(spectrum.phasors[: len(CHANNELS)]) ** 2
+        orders, powers = spectrum.orders, np.abs(spectrum.phasors) ** 2
+        power, of_output = powers[: len(CHANNELS)], powers[-1]
         threshold = np.log(power.size * len(spectra) / rules.unexpected_line_chance)
         seen = (power[:3] > threshold).any(axis=0)
         whole = np.abs(orders - orders.round()) < WHOLE
         if coarse:
-            by_torque = (power[1:3] > threshold).any(axis=0)
-            for place in np.flatnonzero(seen & ~whole & ~by_torque).tolist():
-                shown = spectrum.of_output[place] > threshold
+            by_angles = seen & ~whole & ~(power[1:3] > threshold).any(axis=0)
+            for place in np.flatnonzero(by_angles).tolist():
+                shown = of_output[place] > threshold
                 seen[place] = shown and _is_common(spectra, orders[place])
         for place in np.flatnonzero(whole).tolist():
             seen[place] |= power[3, place] > _threshold_at(place, power[3], threshold)
@@ -331,14 +326,14 @@ def _is_common(spectra: Sequence[_Spectrum], order: float) -> bool:
     they differ; what these have is noncentral chi-square where the amplitudes spread.
     """
     reaching = [
-        (spectrum.phasors[0, places[0]], np.sqrt(spectrum.samples))
+        (spectrum.phasors[0, places[0]], spectrum.samples)
         for spectrum in spectra
         if (places := np.flatnonzero(spectrum.orders == order)).size
     ]
     if len(reaching) < 2:
         return True
-    phasors, sizes = np.array(reaching).T
-    common = np.abs(sizes @ phasors) ** 2 / np.sum(sizes.real**2)
+    phasors, samples = map(np.array, zip(*reaching, strict=True))
+    common = np.abs(np.sqrt(samples) @ phasors) ** 2 / samples.sum()
     differing = np.sum(np.abs(phasors) ** 2) - common
     chance = ncx2.sf(2.0 * differing, 2 * (len(reaching) - 1), 2.0 * _SPREAD * common)
     return bool(chance > _TAKEN_FOR_TONE)
