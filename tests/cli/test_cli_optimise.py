@@ -4,11 +4,11 @@ import csv
 import json
 import re
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 from kept_results import put_files
+from places import SHARED
 from quick_campaigns import BOX, SETTINGS, study_and_report
 
 from pymoo_hdte._reports.html import with_error
@@ -21,7 +21,7 @@ from pymoo_hdte.drive import hs_20_100, load_datasheet, load_model, preset
 from pymoo_hdte.drive.toml_text import model_toml, sheet_toml
 from pymoo_hdte.problems import RobustDTEDirect, load_conditions
 
-CASES = Path(__file__).parents[3] / "shared" / "cases"
+CASES = SHARED / "cases"
 QUICK = ("--box", str(BOX), "--designs", "60")
 LOST = Check(np.full(8, np.nan), np.full(8, np.nan))
 

@@ -1,10 +1,10 @@
 """The second look at designs of a front: as sharp as the front is narrow, and all of it counted."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
+from places import SHARED
 
 from pymoo_hdte.cli import design_check
 from pymoo_hdte.cli.design_check import check_designs
@@ -13,7 +13,7 @@ from pymoo_hdte.cli.optimum_report import optimum_document
 from pymoo_hdte.drive import load_datasheet, load_model, preset
 from pymoo_hdte.problems import RobustDTEDirect
 
-CASES = Path(__file__).parents[3] / "shared" / "cases"
+CASES = SHARED / "cases"
 
 
 def size_32(name):

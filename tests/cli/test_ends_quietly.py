@@ -5,18 +5,17 @@ import re
 import signal
 import subprocess
 import sys
-from pathlib import Path
 from threading import Thread
 
 import pytest
 from night import others_at_night
+from places import ROOT
 
 from pymoo_hdte._interrupts import INTERRUPTED, UNREAD, ended_quietly, orderly
 from pymoo_hdte._reports.in_use import in_use
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.cli.command_line import COMMANDS, MISTAKE
 
-ROOT = Path(__file__).parents[2]
 # Whatever this process inherits: a shell starts programs in the background without Ctrl-C.
 MINDED = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)\n"
 AT_IMPORT = """

@@ -4,12 +4,9 @@ import ast
 from pathlib import Path
 
 import pytest
+from places import PACKAGE, ROOT
 
-import experiments
-import pymoo_hdte
-
-ROOT = Path(pymoo_hdte.__file__).parent
-EXPERIMENTS = Path(experiments.__file__).parent
+EXPERIMENTS = ROOT / "experiments"
 TESTS = Path(__file__).parents[1]
 LOWEST_FIRST = (
     *("checks", "_lazy", "units", "_compilation", "_one_thread", "_interrupts", "_unchanging"),
@@ -96,7 +93,7 @@ def rooms(root: Path, order: tuple[str, ...]) -> list[tuple[str, list[Path]]]:
 @pytest.mark.parametrize(
     ("package", "root", "order"),
     [
-        ("pymoo_hdte", ROOT, LOWEST_FIRST),
+        ("pymoo_hdte", PACKAGE, LOWEST_FIRST),
         ("experiments", EXPERIMENTS, LOWEST_EXPERIMENTS_FIRST),
     ],
 )
@@ -111,12 +108,12 @@ def test_no_import_runs_back(package, root, order):
     "rooms_of_it", ["discrepancy._selection", "discrepancy._records", "discrepancy._evidence"]
 )
 def test_the_workflow_knows_nothing_of_optimisation(rooms_of_it):
-    found = dict(rooms(ROOT, LOWEST_FIRST))[rooms_of_it]
-    names = set().union(*(imported(path, "pymoo_hdte", ROOT) for path in found))
+    found = dict(rooms(PACKAGE, LOWEST_FIRST))[rooms_of_it]
+    names = set().union(*(imported(path, "pymoo_hdte", PACKAGE) for path in found))
     assert not names & {"surrogate", "problems", "algorithms", "decision", "pymoo"}
 
 
 def test_the_engine_knows_no_machine():
-    found = dict(rooms(ROOT, LOWEST_FIRST))["discrepancy._selection"]
-    names = set().union(*(imported(path, "pymoo_hdte", ROOT) for path in found))
+    found = dict(rooms(PACKAGE, LOWEST_FIRST))["discrepancy._selection"]
+    names = set().union(*(imported(path, "pymoo_hdte", PACKAGE) for path in found))
     assert not {name for name in names if name.startswith(("drive", "mechanism"))}

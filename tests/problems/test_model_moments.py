@@ -2,10 +2,10 @@
 
 import copy
 import pickle
-from pathlib import Path
 
 import numpy as np
 import pytest
+from places import SHARED
 from scipy.stats import qmc, truncnorm
 
 from pymoo_hdte.checks import InvalidInput
@@ -13,7 +13,7 @@ from pymoo_hdte.drive import load_datasheet, load_model, preset
 from pymoo_hdte.problems import RobustDTE, RobustDTEDirect, robust_dte_family
 from pymoo_hdte.surrogate import sobol_indices
 
-CASES = Path(__file__).parents[3] / "shared" / "cases"
+CASES = SHARED / "cases"
 
 
 @pytest.fixture(scope="module")

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from places import SHARED
 from scipy.signal import lfilter
 
 from pymoo_hdte._io.even_steps import even_steps
@@ -28,7 +29,6 @@ from pymoo_hdte.discrepancy._selection.rules import RULES, Rules
 from pymoo_hdte.discrepancy._verdicts.mechanism import examine_mechanism
 from pymoo_hdte.effects.effect import effect_named
 from pymoo_hdte.mechanism import BelievedValue, Gear, Input, LawAt, Mechanism, Port, Record
-from tests.helpers.places import SHARED
 
 STEP, CUTOFF = 5e-3, 4.0
 TIME = np.arange(0.0, 20.0, STEP)

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from places import ROOT
 from pymoo.algorithms.moo.nsga2 import NSGA2
 from pymoo.algorithms.moo.nsga3 import NSGA3
 from pymoo.optimize import minimize
@@ -250,8 +251,7 @@ def test_a_stranger_s_algorithm_reaches_other_processes(tmp_path):
     write_stranger(tmp_path)
     command = [sys.executable, "-m", "experiments", "table7", "--seeds", "2", *SMALL]
     command += ["--problems", "zdt1", "--algorithms", "my_module:MyAlgorithm", "--workers", "2"]
-    root = Path(__file__).parents[3]
-    environment = os.environ | {"PYTHONPATH": str(root)}
+    environment = os.environ | {"PYTHONPATH": str(ROOT)}
     done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     assert len(rows_of(tmp_path / "results" / "table7" / "runs.csv")) == 2
